@@ -1,0 +1,75 @@
+# Needs only make and Python 3.11 or newer. `make help` lists the targets.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check --no-input
+
+# Extra options, e.g. `make test PYTEST_ARGS="-k rpem -x"` or `make lock LOCK_ARGS=--upgrade`.
+PYTEST_ARGS ?= -n auto --dist worksteal
+LOCK_ARGS ?=
+
+# Two stamps: new pins rebuild the environment, a change in pyproject.toml alone only redoes the editable install.
+PINS := $(VENV)/.pins
+READY := $(VENV)/.ready
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help install demo test check format bench lock clean
+
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+install: $(READY) ## Create .venv with the pinned dependencies and this project
+	@echo "Installed: run $(BIN)/adaptive-flot --help"
+
+demo: $(READY) ## Run the demonstration
+	@$(BIN)/python -m adaptive_flot.demo
+
+test: check ## Run all checks and the test suite
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+check: $(READY) ## Run the static checks: ruff, mypy, import contracts
+	$(BIN)/ruff check --quiet .
+	$(BIN)/ruff format --quiet --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+format: $(READY) ## Format the code and apply ruff's safe fixes
+	$(BIN)/ruff check --fix --quiet .
+	$(BIN)/ruff format --quiet .
+
+bench: $(READY) ## Run the benchmarks
+	@$(BIN)/python -m benchmarks
+
+lock: ## Pin the dependencies again in requirements.lock (uv, in a throw-away environment)
+	@$(require_python)
+	@set -e; tmp=$$(mktemp -d); trap 'rm -rf "$$tmp"' EXIT; \
+	$(PYTHON) -m venv "$$tmp/venv"; \
+	"$$tmp/venv/bin/python" -m pip --quiet --disable-pip-version-check --no-input install 'uv>=0.13'; \
+	"$$tmp/venv/bin/uv" pip compile --quiet --no-config --universal --python-version 3.11 --fork-strategy fewest \
+	  --generate-hashes --extra dev --custom-compile-command 'make lock' $(LOCK_ARGS) \
+	  --output-file requirements.lock pyproject.toml
+
+clean: ## Remove .venv, caches and build output
+	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(READY): $(PINS) pyproject.toml
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(PINS): requirements.lock
+	@$(require_python)
+	@$(PYTHON) -m venv --clear $(VENV)
+	@$(PIP) install --require-hashes --requirement requirements.lock
+	@touch $@
+
+define require_python
+command -v $(PYTHON) >/dev/null || { \
+  echo "adaptive-flot needs Python 3.11 or newer, and '$(PYTHON)' was not found." >&2; \
+  echo "Name another one, for example: make PYTHON=python3.12" >&2; exit 1; }; \
+$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+  echo "adaptive-flot needs Python 3.11 or newer, and '$(PYTHON)' is $$($(PYTHON) --version 2>&1)." >&2; \
+  echo "Name another one, for example: make PYTHON=python3.12" >&2; exit 1; }
+endef

@@ -1,0 +1,1 @@
+"""The adaptive_flot package of adaptive-flot."""

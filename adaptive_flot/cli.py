@@ -1,0 +1,146 @@
+"""The command `adaptive-flot`. Heavy libraries are imported by the command that needs them, so that help is quick."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from adaptive_flot.errors import AdaptiveFlotError
+
+USER_ERROR = 2
+
+app = typer.Typer(
+    help="Froth flotation: simulate the cell, track its parameters, report.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+Out = Annotated[Path | None, typer.Option("--out", help="Folder of the results; default results/<name>.")]
+Json = Annotated[Path | None, typer.Option("--json", help="Write the summary here too.")]
+CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML), or the name of a shipped one.")]
+
+
+@app.command(epilog="Example: adaptive-flot run paper_scenario_1 --estimator rpem --seed 1 --seed 2 --out results/s1")
+def run(
+    scenario: Annotated[str, typer.Argument(help="Scenario file, or the name of a shipped scenario.")],
+    estimator: Annotated[list[str] | None, typer.Option(help="Estimator (repeatable); default the scenario's.")] = None,
+    seed: Annotated[list[int] | None, typer.Option(min=0, help="Noise seed (repeatable); default the scenario's.")] = None,
+    out: Out = None,
+    json: Json = None,
+    parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
+) -> None:
+    """Run a scenario: plant, estimators and controller together."""
+    from adaptive_flot.console import print_fits, progress_bar
+    from adaptive_flot.runner.results import run_summary, write_json, write_runs
+    from adaptive_flot.runner.scenario import load_scenario
+    from adaptive_flot.runner.study import run_scenario
+
+    loaded = load_scenario(scenario)
+    count = len(estimator or loaded.file.estimators) * len(seed or loaded.file.seeds) * len(loaded.file.controllers)
+    with progress_bar(loaded.name, count) as advance:
+        runs = run_scenario(loaded, estimator or (), seed or (), advance)
+    folder = out or Path("results") / loaded.name
+    write_runs(runs, folder, ".parquet" if parquet else ".csv")
+    summary = run_summary(loaded, runs)
+    for target in filter(None, (folder / "summary.json", json)):
+        write_json(target, summary)
+    from adaptive_flot.report.html import write_run_report
+
+    write_run_report([(loaded, runs)], folder / "report.html", command=_command())
+    print_fits([(loaded, runs)])
+    typer.echo(f"Report: {folder / 'report.html'}")
+
+
+@app.command(epilog="Example: adaptive-flot simulate inputs.csv --out simulated.csv --accurate")
+def simulate(
+    inputs: Annotated[Path, typer.Argument(help="Table with time_s and the input columns (and n, C where they move).")],
+    out: Annotated[Path, typer.Option("--out", help="Table to write, .csv or .parquet.")],
+    cell: CellOption = None,
+    accurate: Annotated[bool, typer.Option("--accurate", help="IDAS on the DAE instead of the fast step.")] = False,
+) -> None:
+    """Simulate a table of inputs: every state and output column comes out."""
+    from adaptive_flot.greybox.tables import write_table
+    from adaptive_flot.processes.registry import make_model
+    from adaptive_flot.runner.simulate import simulate_file
+
+    table = simulate_file(inputs, make_model("flotation", cell=cell), accurate=accurate)
+    write_table(table, out)
+    typer.echo(f"{len(table)} rows: {out}")
+
+
+@app.command(epilog="Example: adaptive-flot estimate record.csv --fit n --fit C --fit floatability --save-cell fitted.yaml")
+def estimate(
+    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
+    model: Annotated[str, typer.Option(help="flotation, cascaded-tanks, or my_file:make_model.")] = "flotation",
+    cell: CellOption = None,
+    estimator: Annotated[
+        list[str] | None, typer.Option(help="Estimator (repeatable); default fixed, rpem and pem.")
+    ] = None,
+    fit: Annotated[list[str] | None, typer.Option(help="Parameter to estimate (repeatable), or a group of them.")] = None,
+    output: Annotated[list[str] | None, typer.Option(help="Output to fit to (repeatable); default all measured.")] = None,
+    fit_share: Annotated[float, typer.Option(min=0.05, max=0.95, help="Share of the record to fit on.")] = 0.6,
+    save_cell: Annotated[Path | None, typer.Option(help="Write the fitted parameters as a cell file.")] = None,
+    out: Out = None,
+    json: Json = None,
+) -> None:
+    """Replay a measured record through fixed, recursive and batch estimation."""
+    from adaptive_flot.console import print_estimate, progress_bar
+    from adaptive_flot.errors import CellError
+    from adaptive_flot.processes.registry import make_model
+    from adaptive_flot.runner.estimate import estimate_record, read_blocks
+    from adaptive_flot.runner.results import write_json
+    from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, write_replays
+
+    if save_cell is not None and model != "flotation":
+        raise CellError(f"--save-cell: model {model!r} has no cell file; leave the option out")
+    made = make_model(model, cell=cell, folder=data.parent)
+    blocks = read_blocks(data, made, fit_share)
+    names = estimator or ["fixed", "rpem", "pem"]
+    with progress_bar(data.stem, 1 + len(names)) as advance:
+        result = estimate_record(
+            blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent, progress=advance
+        )
+    folder = out or Path("results") / data.stem
+    write_replays(result, folder)
+    for target in filter(None, (folder / "summary.json", json)):
+        write_json(target, estimate_summary(data, result))
+    if save_cell is not None:
+        save_fitted_cell(result, cell, save_cell)
+    from adaptive_flot.report.estimate import write_estimate_report
+
+    write_estimate_report(result, folder / "report.html", command=_command())
+    print_estimate(result)
+    typer.echo(f"Report: {folder / 'report.html'}")
+
+
+@app.command(epilog="Example: adaptive-flot scenarios")
+def scenarios() -> None:
+    """List the shipped scenarios with a line each."""
+    import yaml
+
+    from adaptive_flot.runner.scenario import shipped_scenarios
+
+    for name, path in shipped_scenarios().items():
+        typer.echo(f"{name:26} {yaml.safe_load(path.read_text())['description']}")
+
+
+def main() -> None:
+    """Entry point: a user's mistake is one line on standard error and exit code 2."""
+    try:
+        app()
+    except AdaptiveFlotError as error:
+        sys.stderr.write(f"adaptive-flot: {' '.join(str(error).split())}\n")
+        sys.exit(USER_ERROR)
+    except (PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError) as error:
+        sys.stderr.write(f"adaptive-flot: {error.filename}: {error.strerror}; give a path that can be written\n")
+        sys.exit(USER_ERROR)
+
+
+def _command() -> str:
+    return shlex.join(["adaptive-flot", *sys.argv[1:]])

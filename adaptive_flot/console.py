@@ -1,0 +1,67 @@
+"""What the command line prints: tables on standard output, a progress bar on standard error."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from adaptive_flot.runner.estimate import RecordEstimate
+from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.study import Run
+
+
+@contextmanager
+def progress_bar(label: str, total: int) -> Iterator[Callable[[], None]]:
+    """Yield a function that advances the bar by one; nothing is drawn where standard error is no terminal."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(label, total=total)
+        yield lambda: progress.advance(task)
+
+
+def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
+    """Print the fits of each scenario and estimator, median [range] over the seeds, beside the published ones."""
+    table = Table(title="Fit [%], median [range] over the seeds; published value in brackets")
+    for heading in ("scenario", "estimator", "seeds"):
+        table.add_column(heading)
+    keys = list(dict.fromkeys(key for _, runs in results for run in runs for key in run.fit))
+    for key in keys:
+        table.add_column(key, justify="right")
+    for scenario, runs in results:
+        published = scenario.file.published.fits if scenario.file.published else {}
+        for name in dict.fromkeys(run.estimator for run in runs):
+            own = [run for run in runs if run.estimator == name]
+            cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
+            table.add_row(scenario.name, name, str(len(own)), *cells)
+    Console(width=None if Console().is_terminal else 140).print(table)
+
+
+def _fit_cell(values: Sequence[float], published: float | None) -> str:
+    if not values:
+        return ""
+    text = f"{statistics.median(values):.2f}"
+    if len(values) > 1:
+        text += f" [{min(values):.2f}, {max(values):.2f}]"
+    return text + (f"  ({published:.2f})" if published is not None else "")
+
+
+def print_estimate(result: RecordEstimate) -> None:
+    """Print the errors of each estimator on the fit and the test block, and what the record identifies."""
+    table = Table(title=f"{result.blocks.name}: root mean square errors")
+    for heading in ("estimator", "block", "output", "one step", "free run", "unit", "Ljung-Box p"):
+        table.add_column(heading, justify="right" if heading in ("one step", "free run") else "left")
+    for replay in result.replays:
+        for e in replay.errors:
+            p = f"{e.ljung_box_p:.2g}"
+            table.add_row(replay.estimator, e.block, e.output, f"{e.one_step:.4g}", f"{e.free_run:.4g}", e.unit, p)
+    console = Console(width=None if Console().is_terminal else 140)
+    console.print(table)
+    for estimate in result.batch.estimates:
+        console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
+    console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)

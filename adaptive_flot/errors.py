@@ -1,0 +1,51 @@
+"""The errors a user can cause. Each message says what is wrong, where, what was got and what to do.
+
+Numerical outcomes (a failed solve, a missing measurement) are never errors: they are `Status` values.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class AdaptiveFlotError(Exception):
+    """Root of every error that a user's input can cause; the command line prints it and exits with 2."""
+
+
+class DataError(AdaptiveFlotError):
+    """A table can not be used: missing column, wrong unit, gap, text, unordered time, empty file."""
+
+
+class ScenarioError(AdaptiveFlotError):
+    """A scenario file can not be used: unknown key, wrong type, value outside its range."""
+
+
+class CellError(AdaptiveFlotError):
+    """A cell file can not be used: missing entry, missing unit, value outside its physical range."""
+
+
+class ModelError(AdaptiveFlotError):
+    """A model is used wrongly: unknown name, wrong shape, an equation that is missing or given twice."""
+
+
+class RangeError(AdaptiveFlotError):
+    """A quantity leaves the range in which the model means anything: level above the cell, negative flow."""
+
+
+class PluginError(AdaptiveFlotError):
+    """An estimator, controller or model named in a file or on the command line can not be loaded."""
+
+
+def near_match(name: str, known: Iterable[str]) -> str:
+    """Return the hint that ends a message on an unknown name.
+
+    >>> near_match("rpm", ["rpem", "fixed"])
+    "did you mean 'rpem'? Known: fixed, rpem"
+    >>> near_match("x", ["rpem", "fixed"])
+    'known: fixed, rpem'
+    """
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    listing = ", ".join(names)
+    return f"did you mean '{close[0]}'? Known: {listing}" if close else f"known: {listing}"

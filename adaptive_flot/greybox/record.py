@@ -1,0 +1,48 @@
+"""Replay a model over a whole record, the first row included, with or without sensitivities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.fastcall import FastCall
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepper import Stepper
+
+
+class RecordSimulator:
+    """Free run of a model over records: outputs at every row, row 0 being the initial state itself."""
+
+    def __init__(self, model: Model, dt: float) -> None:
+        self.model = model
+        self.stepper = Stepper(model, dt)
+        self._first = FastCall(_first_row(model))
+
+    def outputs(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
+        """Outputs (N, ny) of the free run from x0 (nx,) with parameters p (np,)."""
+        run = self.stepper.simulate(x0, record.inputs[1:], p, record.time[0])
+        y0 = self.stepper.outputs_at(x0, record.time[0], record.inputs[0], p)[: len(self.model.outputs)]
+        return np.vstack([y0, run.outputs])
+
+    def last_state(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
+        """State (nx,) at the last row of the free run."""
+        return self.stepper.simulate(x0, record.inputs[1:], p, record.time[0]).states[-1]
+
+    def sensitivities(
+        self, record: Dataset, x0: FloatArray, p: FloatArray, wrt: Sequence[str], x0_gradient: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Outputs (N, ny) and their exact derivatives (N, ny, q); see `Stepper.simulate_sensitivities` for q."""
+        tail = self.stepper.simulate_sensitivities(x0, record.inputs[1:], p, wrt, x0_gradient, record.time[0])
+        y0, by_x, by_p = self._first(x0, record.time[0], record.inputs[0], p)
+        first = by_x.reshape(y0.size, -1) @ x0_gradient
+        first[:, : len(wrt)] += by_p.reshape(y0.size, -1)[:, self.model.indices("parameters", wrt)]
+        return np.vstack([y0, tail.outputs]), np.concatenate([first[None], tail.gradient])
+
+
+def _first_row(model: Model) -> ca.Function:
+    t, x, u, p = model.ode.sx_in()
+    y = model.ode(t, x, u, p)[1]
+    return ca.Function("first_row", [x, t, u, p], [y, ca.jacobian(y, x), ca.jacobian(y, p)])

@@ -1,0 +1,93 @@
+"""Steady states of a model and their sensitivities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import root
+
+from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.fastcall import FastCall
+from adaptive_flot.greybox.model import FloatArray, Model
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """A steady state x (nx,) and the largest scaled rate that is left, max |dx/dt / scale| [1/s]."""
+
+    state: FloatArray
+    residual: float
+
+
+def steady_state(
+    model: Model, inputs: FloatArray, parameters: FloatArray | None = None, guess: FloatArray | None = None
+) -> SteadyState:
+    """Solve dx/dt = 0 for held inputs by Newton's method in scaled states (scipy's hybrid Powell, exact Jacobian).
+
+    Parameters
+    ----------
+    model
+        The model; its `initial_guess` starts the search unless `guess` is given.
+    inputs
+        Held inputs (nu,), each in its unit.
+    parameters
+        Parameter vector (np,); default the model's values.
+    guess
+        First guess (nx,).
+
+    Raises
+    ------
+    RangeError
+        No steady state was found inside the physical range of every state.
+    """
+    p = model.parameter_values if parameters is None else np.asarray(parameters, dtype=float)
+    u = np.asarray(inputs, dtype=float)
+    scale = np.array([q.scale for q in model.states])
+    start = guess if guess is not None else np.array([model.initial_guess.get(q.name, q.scale) for q in model.states])
+    rate = FastCall(model.ode)
+    slope = FastCall(_state_jacobian(model))
+
+    solution = root(
+        lambda s: rate(0.0, s * scale, u, p)[0] / scale,
+        start / scale,
+        jac=lambda s: slope(0.0, s * scale, u, p)[0] * scale[None, :] / scale[:, None],
+        tol=1e-13,
+    )
+    state = cast(FloatArray, solution.x * scale)
+    residual = float(np.max(np.abs(solution.fun)))
+    lower = np.array([q.lower for q in model.states])
+    upper = np.array([q.upper for q in model.states])
+    if not (residual < 1e-9 and np.all(state >= lower) and np.all(state <= upper)):
+        where = ", ".join(f"{q.name} = {v:g} {q.unit}" for q, v in zip(model.inputs, u, strict=True))
+        raise RangeError(
+            f"model '{model.name}' has no steady state within its physical range at {where} "
+            f"(largest rate left {residual:.1e} of a state's scale a second); check the inputs and parameters"
+        )
+    return SteadyState(state, residual)
+
+
+def steady_state_gradient(
+    model: Model, state: FloatArray, inputs: FloatArray, parameters: FloatArray, wrt: Sequence[str]
+) -> FloatArray:
+    """d(steady state)/d(parameters) (nx, q) by the implicit function theorem, at a steady state."""
+    by_state = FastCall(_state_jacobian(model))(0.0, state, inputs, parameters)[0]
+    by_parameters = FastCall(_parameter_jacobian(model))(0.0, state, inputs, parameters)[0]
+    columns = model.indices("parameters", wrt)
+    scale = np.array([q.scale for q in model.states])
+    scaled = by_state * scale[None, :] / scale[:, None]
+    moved = np.linalg.solve(scaled, by_parameters[:, columns] / scale[:, None])
+    return cast(FloatArray, -moved * scale[:, None])
+
+
+def _state_jacobian(model: Model) -> ca.Function:
+    t, x, u, p = model.ode.sx_in()
+    return ca.Function("state_jacobian", [t, x, u, p], [ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], x))])
+
+
+def _parameter_jacobian(model: Model) -> ca.Function:
+    t, x, u, p = model.ode.sx_in()
+    return ca.Function("parameter_jacobian", [t, x, u, p], [ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], p))])

@@ -1,0 +1,1 @@
+"""First-principles models built on the grey-box engine."""

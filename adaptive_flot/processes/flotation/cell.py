@@ -1,0 +1,181 @@
+"""The flotation cell: 2 + I + K states, one algebraic variable of index 1, any number of minerals and bubble classes.
+
+Source of the equations: Gonzalez & Quintanilla (the *paper*) with the closures of Quintanilla et al. (2021, Part I).
+Two of its printed equations are read in the only way that is consistent:
+
+* the gas balance holds for r_k, the gas volume per volume of **gas-free** pulp; eps_k = r_k / (1 + sum r) is the holdup;
+* the level loop is stable with `+ (k_p / tau_i) (h_p - h_p_SP)`, not with the printed minus sign.
+"""
+
+from __future__ import annotations
+
+from adaptive_flot.greybox.model import Model, Quantity, Scope
+from adaptive_flot.processes.flotation import froth, pulp
+from adaptive_flot.processes.flotation.parameters import Cell, default_cell
+
+
+def make_model(cell: Cell | None = None) -> Model:
+    """Flotation model of a cell (default: the 87-litre laboratory cell of the paper).
+
+    =========== ============================================================ =======
+    vector      entries                                                      unit
+    =========== ============================================================ =======
+    states      tails_flow, level, m_<mineral> (I), gas_ratio_<k> (K)        m3/s, m, kg, -
+    inputs      air_flow, feed_flow, level_setpoint                          m3/s, m3/s, m
+    outputs     concentrate_grade, recovery, tails_flow, level,              -, -, m3/s, m,
+                concentrate_flow, air_recovery                               m3/s, -
+    algebraic   interfacial_gas_velocity                                     m/s
+    =========== ============================================================ =======
+
+    With two minerals the masses are named `m_valuable` and `m_gangue`. The first mineral is the valuable one.
+    """
+    cell = cell or default_cell()
+    height = cell.value("height")
+    masses = mass_names(cell.minerals)
+    ratios = [f"gas_ratio_{k + 1}" for k in range(cell.bubble_classes)]
+    flow = cell.value("cross_section_area") * 0.01  # 1 cm/s of superficial velocity: a large flow of pulp
+    air_low, air_high = cell.operation["air_flow_valid"]
+
+    states = [
+        Quantity("tails_flow", "m3/s", "tails flow asked for by the level loop", -flow, flow, 1e-4),
+        Quantity("level", "m", "pulp height", 0.0, height, 0.1),
+        *(Quantity(m, "kg", f"{n} in the pulp", 0.0, scale=1.0) for m, n in zip(masses, cell.minerals, strict=True)),
+        *(Quantity(r, "-", "gas volume of a bubble class over gas-free pulp volume", 0.0, 1.0, 0.01) for r in ratios),
+    ]
+    return Model(
+        name="flotation",
+        states=tuple(states),
+        inputs=(
+            Quantity("air_flow", "m3/s", "air flow", air_low, air_high, 1e-3),
+            Quantity("feed_flow", "m3/s", "feed flow", 0.0, flow, 1e-4),
+            Quantity("level_setpoint", "m", "pulp height set-point", 1e-3 * height, height * (1 - 1e-3), 0.1),
+        ),
+        parameters=cell.parameters,
+        outputs=(
+            Quantity("concentrate_grade", "-", "valuable mineral in the concentrate by mass", 0.0, 1.0, 0.1),
+            Quantity("recovery", "-", "valuable mineral to concentrate over valuable fed", 0.0, scale=0.1),
+            Quantity("tails_flow", "m3/s", "tails flow", -flow, flow, 1e-5),
+            Quantity("level", "m", "pulp height", 0.0, height, 0.01),
+            Quantity("concentrate_flow", "m3/s", "concentrate flow", 0.0, flow, 1e-6),
+            Quantity("air_recovery", "-", "air that overflows over air fed", 0.0, 1.0, 0.01),
+        ),
+        signals=(
+            Quantity("alpha_star", "-", "air recovery from the bursting rate", 0.0, 1.0, 0.1),
+            Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),
+            Quantity("interface_bubble_size", "m", "bubble size at the interface", 0.0, scale=1e-3),
+            Quantity("froth_bubble_size", "m", "bubble size at the top of the froth", 0.0, scale=1e-2),
+            Quantity("froth_depth", "m", "froth depth", 0.0, height, 0.1),
+            Quantity("solids", "kg/m3", "minerals in the pulp", 0.0, scale=100.0),
+            Quantity("valuable_solids", "kg/m3", "valuable mineral in the pulp", 0.0, scale=10.0),
+        ),
+        algebraic=(Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),),
+        equations=lambda m: _equations(m, masses, ratios),
+        initial_guess={
+            "tails_flow": 1.6e-4,
+            "level": 0.8 * height,
+            **dict.fromkeys(masses, 1.0),
+            **dict.fromkeys(ratios, 0.1 / len(ratios)),
+        },
+    )
+
+
+def mass_names(minerals: tuple[str, ...]) -> list[str]:
+    """State names of the masses: valuable and gangue for two minerals, else their own names."""
+    return ["m_valuable", "m_gangue"] if len(minerals) == 2 else [f"m_{name}" for name in minerals]
+
+
+def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
+    area, height = m.parameter("cross_section_area"), m.parameter("height")
+    phi, gravity = m.parameter("solids_fraction"), m.parameter("gravity")
+    h_p = m.state("level")
+    mass = [m.state(name) for name in masses]
+    r = [m.state(name) for name in ratios]
+    v_pulp = area * h_p
+    total_mass = sum(mass[1:], mass[0])
+
+    # What effects may depend on is named first: these need states and inputs only.
+    h_f = m.signal("froth_depth", height - h_p)
+    m.signal("solids", total_mass / v_pulp)
+    m.signal("valuable_solids", mass[0] / v_pulp)
+
+    q_air = m.site("air_flow", m.input("air_flow"))
+    q_feed = m.site("feed_flow", m.input("feed_flow"))
+    q_tails = m.site("tails_valve", m.state("tails_flow"))
+    jg = q_air / area
+
+    # Pulp
+    rho_p = pulp.pulp_density(phi, m.parameter("solids_density"), m.parameter("water_density"))
+    mu_p = pulp.pulp_viscosity(phi, m.parameter("water_viscosity"))
+    gas = sum(r[1:], r[0])
+    eps = [rk / (1 + gas) for rk in r]
+    d = [m.site("bubble_size", dk) for dk in m.parameter_group("bubble_diameter")]
+    v = [
+        m.site("gas_slip", pulp.slip_velocity(dk, ek, rho_p, mu_p, gravity)) for dk, ek in zip(d, eps, strict=True)
+    ]
+    out = pulp.gas_outflow(d, eps, v)
+    d_int = m.signal("interface_bubble_size", out.interface_bubble_size)
+
+    # Froth
+    vg = m.signal("interfacial_gas_velocity", m.algebraic("interfacial_gas_velocity"))
+    v_b = m.site(
+        "burst_rate", froth.bursting_rate(jg, m.parameter("burst_a"), m.parameter("burst_b"), m.parameter("burst_c"))
+    )
+    alpha = m.signal("alpha_star", 1 - v_b / vg)
+    n = m.site("growth_exponent", m.parameter("growth_exponent"))
+    growth = m.site("coalescence", m.parameter("coalescence_rate"))
+    d_froth = m.signal("froth_bubble_size", froth.froth_bubble_size(d_int, h_f / vg, n, growth))
+    k1 = froth.drainage_constant(rho_p, mu_p, gravity, m.parameter("drag_coefficient"))
+    dispersion = froth.axial_dispersion(jg, k1, m.parameter("peclet"))
+    q_conc = m.site(
+        "concentrate_flow", froth.concentrate_flow(alpha, vg, area, k1, d_froth, m.parameter("plateau_border"))
+    )
+    # v_g* = (Q_feed - Q_tails - Q_conc + Q_air) / A (paper, vg*); the concentrate is a small part of it
+    m.residual("interfacial_gas_velocity", vg - (q_feed - q_tails - q_conc + q_air) / area, (q_feed - q_tails + q_air) / area)
+
+    # Minerals: flow to the concentrate F_i and mass balance (paper, mass-balance)
+    feed = m.parameter_group("feed_concentration")
+    feed[0] = m.site("feed_grade", feed[0])
+    s_b = 6 * vg / d_int  # bubble surface area flux (Part I, 53)
+    to_concentrate = []
+    for i, (mi, p_i) in enumerate(zip(mass, m.parameter_group("floatability"), strict=True)):
+        p_i = m.site("floatability_valuable" if i == 0 else "floatability_gangue", p_i)
+        v_set = m.site(
+            "settling",
+            froth.settling_velocity(
+                m.parameter_group("mineral_density")[i],
+                m.parameter_group("particle_diameter")[i],
+                phi,
+                mu_p,
+                gravity,
+                m.parameter("water_density"),
+            ),
+        )
+        r_f = m.site("froth_recovery", froth.froth_recovery(alpha, vg, v_set, d_int, d_froth))
+        r_ent = m.site("entrainment", froth.entrainment(alpha, vg, v_set, h_f, dispersion))
+        flow = mi / v_pulp * (m.parameter("volume") * p_i * s_b * r_f + q_conc * r_ent)
+        to_concentrate.append(flow)
+        m.derivative(masses[i], feed[i] * q_feed - mi / v_pulp * q_tails - flow)
+
+    # Level and gas (paper, hp and gas-holdup)
+    m.derivative("level", vg - out.velocity)
+    numbers = m.parameter_group("bubble_number")
+    total_number = sum(numbers[1:], numbers[0])
+    for name, rk, vk, number in zip(ratios, r, v, numbers, strict=True):
+        balance = q_air * number / total_number - area * vk * rk / (1 + gas) - (q_feed - q_tails - q_conc) * rk
+        m.derivative(name, (1 + gas) / v_pulp * balance)
+
+    # Level loop on the measured level (paper, Qtails, with the stable sign)
+    level = m.site("level_sensor", h_p)
+    gain = m.parameter("proportional_gain")
+    error = level - m.input("level_setpoint")
+    m.derivative("tails_flow", gain * m.time_derivative(level) + gain / m.parameter("integral_time") * error)
+
+    grade = to_concentrate[0] / sum(to_concentrate[1:], to_concentrate[0])  # paper, grade
+    m.output("concentrate_grade", m.site("grade_sensor", grade))
+    m.output("recovery", to_concentrate[0] / (feed[0] * q_feed))
+    m.output("tails_flow", m.site("tails_sensor", q_tails))
+    m.output("level", level)
+    m.output("concentrate_flow", m.site("concentrate_flow_sensor", q_conc))
+    m.output("air_recovery", m.site("air_recovery_sensor", alpha * vg * area / q_air))
+
+

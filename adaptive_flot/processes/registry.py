@@ -1,0 +1,60 @@
+"""The shipped processes by name, and a user's own as `module:factory`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from adaptive_flot.errors import CellError, ModelError, PluginError, near_match
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.plugins import construct, load
+from adaptive_flot.processes import cascaded_tanks, flotation
+from adaptive_flot.resources import cell_file
+
+PROCESSES = ("flotation", "cascaded-tanks")
+
+
+def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path | None = None) -> Model:
+    """Model of a process.
+
+    Parameters
+    ----------
+    name
+        `flotation`, `cascaded-tanks`, or `module:factory` of a function without arguments that returns a `Model`.
+    cell
+        Cell file for the flotation model: a path (relative to `folder` or to here), or the name of a shipped one.
+    folder
+        Folder of the file that names the model.
+
+    Raises
+    ------
+    PluginError
+        Unknown name, or the factory does not return a `Model`.
+    CellError
+        The cell file can not be used, or the process takes none.
+    """
+    if name == "flotation":
+        return flotation.make_model(flotation.read_cell(find_cell(cell, folder)))
+    if cell is not None:
+        raise CellError(f"model {name!r} takes no cell file; leave 'cell' out")
+    if name == "cascaded-tanks":
+        return cascaded_tanks.make_model()
+    if ":" not in name:
+        raise PluginError(f"unknown model {name!r}; {near_match(name, PROCESSES)}, or your own as my_file:make_model")
+    try:
+        model = construct(load(name, {}, "model", folder), name, "model")
+    except ModelError as error:
+        raise ModelError(f"model {name!r}: {error}") from error
+    if not isinstance(model, Model):
+        raise PluginError(f"model {name!r}: the factory returned a {type(model).__name__}; return a Model")
+    return model
+
+
+def find_cell(cell: str | None, folder: Path | None = None) -> Path:
+    """Path of a cell file, given as path or shipped name (default: the laboratory cell)."""
+    if cell is None:
+        return cell_file()
+    for place in (Path(cell), *([folder / cell] if folder else []), cell_file(cell)):
+        if place.is_file():
+            return place
+    shipped = [f.stem for f in cell_file().parent.glob("*.yaml")]
+    raise CellError(f"{cell}: no such cell file; {near_match(cell, shipped)}")

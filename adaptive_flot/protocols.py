@@ -1,0 +1,216 @@
+"""The three contracts: Plant, Estimator, Controller. Plug-ins import nothing but this file and the engine.
+
+State in, state out. An estimator or a controller is a frozen configuration plus compiled functions, ready when its
+constructor returns; what changes from sample to sample is a frozen dataclass that is passed in and handed back. So a
+run can be replayed, resumed from any step and compared to the bit. What the next step needs is *state*; what a plot or
+a test needs is the *info* record (`Estimate`, `Decision`).
+
+Time convention: the inputs of a sample are those held during the interval that ends at its time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Protocol, TypeVar
+
+from adaptive_flot.greybox.model import FloatArray, Model
+
+State = TypeVar("State")
+
+
+class Status(Enum):
+    """What happened at one step. Numbers fail as values: none of these is an exception."""
+
+    OK = "ok"
+    MISSING = "measurement missing: predicted only"
+    PROJECTED = "estimate projected onto its bounds"
+    NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
+    INITIALISING = "collecting the record for the initial estimate"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sampling instant: time [s], inputs held until then (nu,), measured outputs (ny,) with NaN where missing."""
+
+    time: float
+    inputs: FloatArray
+    outputs: FloatArray
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an estimator is built for.
+
+    Attributes
+    ----------
+    model
+        The grey-box model; its parameter values are the nominal ones.
+    dt
+        Sampling interval [s].
+    parameters
+        Names of the q adapted parameters.
+    outputs
+        Names of the measured outputs that drive the adaptation.
+    """
+
+    model: Model
+    dt: float
+    parameters: tuple[str, ...] = ("growth_exponent", "coalescence_rate")
+    outputs: tuple[str, ...] = ("concentrate_grade",)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Where an estimator starts.
+
+    Attributes
+    ----------
+    time
+        Time of the state [s].
+    state
+        Model state (nx,).
+    parameters
+        Adapted parameters (q,), each in its unit.
+    covariance
+        Their covariance (q, q).
+    noise_std
+        Standard deviation of the measurement noise of each driving output (m,).
+    """
+
+    time: float
+    state: FloatArray
+    parameters: FloatArray
+    covariance: FloatArray
+    noise_std: FloatArray
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Info record of one estimator step.
+
+    Attributes
+    ----------
+    time
+        Time of the sample [s].
+    prediction
+        All outputs (ny,) predicted from the previous sample, before this one was used.
+    innovation
+        Measured minus predicted (ny,), NaN where missing.
+    innovation_std
+        Standard deviation the estimator expects of the innovation of each driving output (m,).
+    parameters
+        Adapted parameters after the sample (q,).
+    covariance
+        Their covariance (q, q), symmetric and positive semi-definite.
+    state
+        Model state (nx,) at the time of the sample.
+    status
+        What happened.
+    """
+
+    time: float
+    prediction: FloatArray
+    innovation: FloatArray
+    innovation_std: FloatArray
+    parameters: FloatArray
+    covariance: FloatArray
+    state: FloatArray
+    status: Status
+
+
+class Estimator(Protocol[State]):
+    """Tracks parameters (and the state) from one sample to the next.
+
+    Made by `Name(setup, **options)`. `setup` is kept as an attribute; nothing else may change after construction.
+    """
+
+    setup: Setup
+
+    def init(self, prior: Prior) -> State:
+        """State before the first sample."""
+        ...
+
+    def update(self, state: State, sample: Sample) -> tuple[State, Estimate]:
+        """Take one sample, one interval after the last. Missing outputs are NaN and give a status, not an error.
+
+        Raises
+        ------
+        ModelError
+            A vector of the wrong length.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Info record of one controller step: inputs (nu,) to hold until the next, a status and who decided."""
+
+    inputs: FloatArray
+    status: Status
+    decided_by: str
+
+
+@dataclass(frozen=True)
+class ControllerSetup:
+    """What a controller is built for: the model, the sampling interval [s] and the planned inputs (N, nu), row by row."""
+
+    model: Model
+    dt: float
+    schedule: FloatArray
+
+
+class Controller(Protocol[State]):
+    """Chooses the inputs of the next interval. Made by `Name(setup, **options)`."""
+
+    def init(self, time: float) -> State:
+        """State before the first decision, at a time [s]."""
+        ...
+
+    def decide(self, state: State, sample: Sample | None, estimate: Estimate | None) -> tuple[State, Decision]:
+        """Inputs for the next interval, from the newest sample and estimate (None before the first)."""
+        ...
+
+
+@dataclass(frozen=True)
+class PlantRecord:
+    """What a plant shows after one interval.
+
+    Attributes
+    ----------
+    sample
+        What is measured.
+    outputs
+        True outputs (ny,), NaN in a replayed record.
+    parameters
+        True parameter vector (np,) during the interval, NaN in a replayed record.
+    """
+
+    sample: Sample
+    outputs: FloatArray
+    parameters: FloatArray
+
+
+class Plant(Protocol[State]):
+    """The process: simulated, or a replayed record."""
+
+    def init(self) -> State:
+        """State at the start."""
+        ...
+
+    def apply(self, state: State, inputs: FloatArray) -> tuple[State, PlantRecord]:
+        """Hold the inputs (nu,) for one interval."""
+        ...
+
+
+AnyEstimator = Estimator[Any]
+AnyController = Controller[Any]
+AnyPlant = Plant[Any]
+
+
+def full_parameters(model: Model, names: Sequence[str], values: FloatArray) -> FloatArray:
+    """Parameter vector (np,) of the model with some entries replaced."""
+    p = model.parameter_values
+    p[model.indices("parameters", names)] = values
+    return p

@@ -1,0 +1,1 @@
+"""Scenarios, the closed loop and studies of several runs."""

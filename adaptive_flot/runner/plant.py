@@ -1,0 +1,94 @@
+"""Plants: a simulated one with noise and drifting parameters, and a measured record that is replayed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.protocols import PlantRecord, Sample
+
+
+@dataclass(frozen=True)
+class SimulatedState:
+    """Interval to come and the true state (nx,) at its start."""
+
+    row: int
+    x: FloatArray
+
+
+class SimulatedPlant:
+    """The model with its own parameters and measurement noise, both given for every interval.
+
+    Parameters
+    ----------
+    model
+        The plant's model.
+    dt
+        Sampling interval [s].
+    x0
+        True state at time 0 (nx,).
+    parameters
+        True parameters in each interval (N, np).
+    noise
+        Noise added to each output (N, ny); NaN where an output is not measured.
+    accurate
+        Integrate with IDAS.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        dt: float,
+        x0: FloatArray,
+        parameters: FloatArray,
+        noise: FloatArray,
+        *,
+        accurate: bool = False,
+    ) -> None:
+        self._dt = dt
+        self._x0 = x0
+        self._parameters = parameters
+        self._noise = noise
+        self._step = Stepper(model, dt, accurate=accurate).call
+
+    def init(self) -> SimulatedState:
+        """Start at the initial state."""
+        return SimulatedState(0, self._x0.copy())
+
+    def apply(self, state: SimulatedState, inputs: FloatArray) -> tuple[SimulatedState, PlantRecord]:
+        """Hold the inputs for one interval; see `Plant.apply`."""
+        k = state.row
+        p = self._parameters[k]
+        x, y, _ = self._step(state.x, k * self._dt, inputs, p)
+        sample = Sample((k + 1) * self._dt, inputs, y + self._noise[k])
+        return SimulatedState(k + 1, x), PlantRecord(sample, y, p)
+
+
+@dataclass(frozen=True)
+class ReplayState:
+    """Row of the record to show next."""
+
+    row: int
+
+
+class ReplayPlant:
+    """A measured record as a plant: it shows its rows 1, 2, ... whatever the inputs are; truth is unknown (NaN)."""
+
+    def __init__(self, record: Dataset, parameter_count: int) -> None:
+        self.record = record
+        self._unknown = np.full(parameter_count, np.nan)
+
+    def init(self) -> ReplayState:
+        """Start at row 0, the initial instant."""
+        return ReplayState(1)
+
+    def apply(self, state: ReplayState, inputs: FloatArray) -> tuple[ReplayState, PlantRecord]:
+        """Show the next row; the inputs are those of the record."""
+        del inputs
+        k = state.row
+        sample = Sample(float(self.record.time[k]), self.record.inputs[k], self.record.outputs[k])
+        return ReplayState(k + 1), PlantRecord(sample, np.full(len(sample.outputs), np.nan), self._unknown)

@@ -1,0 +1,103 @@
+"""How inputs and plant parameters move over a run: small typed descriptions that turn into one value an interval."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from adaptive_flot.greybox.model import FloatArray
+
+
+class _Profile(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class Constant(_Profile):
+    """One value throughout."""
+
+    profile: Literal["constant"]
+    value: float
+
+    def values(self, time: FloatArray, seed: int) -> FloatArray:
+        """Value held in the interval that starts at each time [s] (N,)."""
+        del seed
+        return np.full(len(time), self.value)
+
+
+class Staircase(_Profile):
+    """Equal steps from one value to another over the whole run."""
+
+    profile: Literal["staircase"]
+    start: float = Field(alias="from")
+    stop: float = Field(alias="to")
+    every_s: float = Field(gt=0)
+
+    def values(self, time: FloatArray, seed: int) -> FloatArray:
+        """Value held in the interval that starts at each time [s] (N,)."""
+        del seed
+        block = np.floor(time / self.every_s + 1e-9).astype(int)
+        steps = max(int(block[-1]), 1)
+        return self.start + (self.stop - self.start) * block / steps
+
+
+class Random(_Profile):
+    """Uniformly random level, redrawn at a fixed period."""
+
+    profile: Literal["random"]
+    between: tuple[float, float]
+    every_s: float = Field(gt=0)
+    seed: int | Literal["per_run"]
+    """A number fixes the sequence for all runs; `per_run` draws another one for each run seed."""
+
+    def values(self, time: FloatArray, seed: int) -> FloatArray:
+        """Value held in the interval that starts at each time [s] (N,)."""
+        generator = np.random.default_rng([seed, 1] if self.seed == "per_run" else [self.seed, 2])
+        block = np.floor(time / self.every_s + 1e-9).astype(int)
+        return generator.uniform(*self.between, size=int(block[-1]) + 1)[block]
+
+
+class Steps(_Profile):
+    """Given values from given times on."""
+
+    profile: Literal["steps"]
+    at_s: list[float]
+    values_: list[float] = Field(alias="values")
+
+    @model_validator(mode="after")
+    def _lengths(self) -> Steps:
+        if len(self.at_s) != len(self.values_) or self.at_s[:1] != [0.0] or self.at_s != sorted(set(self.at_s)):
+            raise ValueError("at_s must rise from 0 and have as many entries as values")
+        return self
+
+    def values(self, time: FloatArray, seed: int) -> FloatArray:
+        """Value held in the interval that starts at each time [s] (N,)."""
+        del seed
+        return np.array(self.values_)[np.searchsorted(self.at_s, time + 1e-9, side="right") - 1]
+
+
+class Change(_Profile):
+    """A parameter that leaves its nominal value by a share of it: as a ramp, or as a step at the start of the ramp."""
+
+    profile: Literal["ramp", "step"] = "ramp"
+    change: float
+    from_s: float = Field(ge=0)
+    to_s: float
+
+    @model_validator(mode="after")
+    def _order(self) -> Change:
+        if self.to_s <= self.from_s:
+            raise ValueError("to_s must lie after from_s")
+        return self
+
+    def factor(self, time: FloatArray) -> FloatArray:
+        """Factor on the nominal value in the interval that starts at each time [s] (N,)."""
+        if self.profile == "step":
+            share = (time >= self.from_s - 1e-9).astype(float)
+        else:
+            share = np.clip((time - self.from_s) / (self.to_s - self.from_s), 0.0, 1.0)
+        return 1.0 + self.change * share
+
+
+InputProfile = Annotated[Constant | Staircase | Random | Steps, Field(discriminator="profile")]

@@ -1,0 +1,279 @@
+"""Scenario files: YAML, validated once into frozen objects. Behind this file nobody sees a dictionary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from adaptive_flot.errors import AdaptiveFlotError, ScenarioError, near_match
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.processes.registry import make_model
+from adaptive_flot.protocols import Setup
+from adaptive_flot.resources import scenario_folder
+from adaptive_flot.runner.profiles import Change, InputProfile
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Measurement(_Part):
+    """Noise of one measured output: standard deviation in the output's unit."""
+
+    noise_std: float = Field(ge=0)
+
+
+class PlantPart(_Part):
+    """How the plant is simulated: `fast` is the Runge-Kutta step, `accurate` IDAS on the DAE."""
+
+    integrator: Literal["fast", "accurate"] = "fast"
+
+
+class Adapt(_Part):
+    """Adapted parameters and the outputs that drive the adaptation."""
+
+    parameters: list[str] = Field(min_length=1)
+    outputs: list[str] = Field(min_length=1)
+
+
+class InitialEstimate(_Part):
+    """First estimate: batch fit of the record up to a time, from a guess that is not the truth."""
+
+    method: str = "pem"
+    until_s: float = Field(gt=0)
+    guess: dict[str, float] = Field(default_factory=dict)
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
+class Plugin(_Part):
+    """An estimator or controller: shipped name or `my_file:MyClass`, and its options."""
+
+    use: str
+    options: dict[str, Any] = Field(default_factory=dict)
+    start: Literal["initial_estimate", "nominal"] = "initial_estimate"
+
+
+class Published(_Part):
+    """Published fits by estimator name, and their source, for the report."""
+
+    source: str
+    fits: dict[str, dict[str, float]]
+
+
+class ScenarioFile(_Part):
+    """Keys of a scenario file."""
+
+    description: str
+    model: str = "flotation"
+    cell: str | None = None
+    duration_s: float = Field(gt=0)
+    sampling_s: float = Field(default=1.0, gt=0)
+    seeds: list[int] = Field(default=[1], min_length=1)
+    inputs: dict[str, InputProfile]
+    parameters: dict[str, Change] = Field(default_factory=dict)
+    measurements: dict[str, Measurement]
+    plant: PlantPart = PlantPart()
+    adapt: Adapt
+    initial_estimate: InitialEstimate
+    estimators: dict[str, Plugin] = Field(min_length=1)
+    controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
+    fits_after_s: float = Field(default=0.0, ge=0)
+    published: Published | None = None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A validated scenario.
+
+    Attributes
+    ----------
+    name
+        Stem of its file.
+    path
+        The file.
+    file
+        Its content.
+    model
+        The nominal model.
+    setup
+        What estimators are built for.
+    """
+
+    name: str
+    path: Path
+    file: ScenarioFile
+    model: Model
+    setup: Setup
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+        return self.file.sampling_s
+
+    @property
+    def starts(self) -> FloatArray:
+        """Start of each sampling interval [s] (N,)."""
+        return self.dt * np.arange(round(self.file.duration_s / self.dt))
+
+    @property
+    def initial_rows(self) -> int:
+        """Number of intervals used for the initial estimate."""
+        return round(self.file.initial_estimate.until_s / self.dt)
+
+    def schedule(self, seed: int) -> FloatArray:
+        """Planned inputs (N, nu) of a run."""
+        columns = [self.file.inputs[q.column].values(self.starts, seed) for q in self.model.inputs]
+        return np.column_stack(columns)
+
+    def true_parameters(self) -> FloatArray:
+        """Plant parameters (N, np) in each interval."""
+        p = np.tile(self.model.parameter_values, (len(self.starts), 1))
+        for name, change in self.file.parameters.items():
+            p[:, self.model.index("parameters", name)] *= change.factor(self.starts)
+        return p
+
+    def noise_std(self) -> FloatArray:
+        """Noise of each output (ny,), NaN where it is not measured."""
+        std = np.full(len(self.model.outputs), np.nan)
+        for j, q in enumerate(self.model.outputs):
+            if q.name in self.file.measurements:
+                std[j] = self.file.measurements[q.name].noise_std
+        return std
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """Shipped scenario files by name."""
+    return {f.stem: f for f in sorted(scenario_folder().glob("*.yaml"))}
+
+
+def find_scenario(name: str) -> Path:
+    """Path of a scenario: a file, or the name of a shipped one.
+
+    Raises
+    ------
+    ScenarioError
+        Neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shipped = shipped_scenarios()
+    if path.stem in shipped and (path.suffix in ("", ".yaml")):
+        return shipped[path.stem]
+    raise ScenarioError(f"{name}: no such scenario file; shipped: {near_match(path.stem, shipped)}")
+
+
+def load_scenario(name: Path | str) -> Scenario:
+    """Read and check a scenario.
+
+    Raises
+    ------
+    ScenarioError
+        Unknown key (with the nearest one), wrong type, missing input, times that do not fit.
+    CellError, ModelError, RangeError, PluginError
+        The cell, a parameter name, an input value or the model is wrong.
+    """
+    path = find_scenario(str(name))
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not a YAML file ({' '.join(str(error).split())}); correct it") from error
+    if not isinstance(content, dict):
+        raise ScenarioError(f"{path}: holds no keys; see `adaptive-flot scenarios` for examples to copy")
+    try:
+        file = ScenarioFile.model_validate(content)
+    except ValidationError as error:
+        raise ScenarioError(f"{path}: {_first_problem(error, content)}") from error
+    try:
+        model = make_model(file.model, cell=file.cell, folder=path.parent)
+        scenario = Scenario(path.stem, path, file, model, _setup(file, model))
+        _check(scenario)
+    except ScenarioError:
+        raise
+    except AdaptiveFlotError as error:
+        raise type(error)(f"{path}: {error}") from error
+    return scenario
+
+
+def _setup(file: ScenarioFile, model: Model) -> Setup:
+    parameters = model.expand_parameters(file.adapt.parameters)
+    outputs = tuple(model.outputs[i].name for i in model.indices("outputs", file.adapt.outputs))
+    unmeasured = [o for o in outputs if o not in file.measurements]
+    if unmeasured:
+        raise ScenarioError(f"adapt.outputs: {unmeasured[0]!r} is not among the measurements; add it there")
+    return Setup(model, file.sampling_s, parameters, outputs)
+
+
+def _check(scenario: Scenario) -> None:
+    file, model = scenario.file, scenario.model
+    columns = [q.column for q in model.inputs]
+    for key in file.inputs:
+        if key not in columns:
+            raise ScenarioError(f"{scenario.path}: inputs: unknown input {key!r}; {near_match(key, columns)}")
+    for column in columns:
+        if column not in file.inputs:
+            raise ScenarioError(f"{scenario.path}: inputs: {column!r} is missing; give its profile")
+    model.indices("outputs", file.measurements)
+    for name in (*file.parameters, *file.initial_estimate.guess):
+        model.index("parameters", name)
+    intervals = file.duration_s / file.sampling_s
+    if abs(intervals - round(intervals)) > 1e-9 or round(intervals) < 2:
+        raise ScenarioError(f"{scenario.path}: duration_s must be a whole number (2 or more) of sampling_s intervals")
+    if not file.initial_estimate.until_s < file.duration_s:
+        raise ScenarioError(f"{scenario.path}: initial_estimate.until_s must lie before the end, {file.duration_s:g} s")
+    if not file.fits_after_s < file.duration_s:
+        raise ScenarioError(f"{scenario.path}: fits_after_s must lie before the end, {file.duration_s:g} s")
+    for seed in file.seeds:
+        model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
+
+
+def _first_problem(error: ValidationError, content: Mapping[str, Any]) -> str:
+    """Turn the first problem into one line: key path, what is wrong, nearest known key."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(first["loc"][:-1], content)
+        hint = f"; {near_match(str(first['loc'][-1]), known)}" if known else ""
+        return f"unknown key {place!r}{hint}"
+    if first["type"] == "missing":
+        return f"key {place!r} is missing; add it"
+    got = first.get("input")
+    shown = f", got {got!r}" if not isinstance(got, dict) else ""
+    return f"{place}: {first['msg'].removeprefix('Value error, ')}{shown}; correct it"
+
+
+def _known_keys(where: tuple[int | str, ...], content: Mapping[str, Any]) -> list[str]:
+    """Keys that are allowed at a place of the file."""
+    model: Any = ScenarioFile
+    for part in where:
+        fields = getattr(model, "model_fields", {})
+        model = _nested(fields[part].annotation, part, where) if part in fields else model
+        if isinstance(model, dict):
+            model = model.get(str(where[-1]), ScenarioFile)
+    fields = getattr(model, "model_fields", {})
+    del content
+    return [f.alias or name.rstrip("_") for name, f in fields.items()]
+
+
+def _nested(annotation: Any, part: int | str, where: tuple[int | str, ...]) -> Any:
+    del part
+    candidates = _models(annotation)
+    by_profile = {m.model_fields["profile"].annotation.__args__[0]: m for m in candidates if "profile" in m.model_fields}
+    if len(by_profile) > 1:
+        return by_profile.get(str(where[-1]), candidates[0])
+    return candidates[0] if candidates else None
+
+
+def _models(annotation: Any) -> list[Any]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    found: list[Any] = []
+    for argument in getattr(annotation, "__args__", ()):
+        found += _models(argument)
+    return found

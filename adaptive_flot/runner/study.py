@@ -1,0 +1,249 @@
+"""Run a scenario for several estimators, controllers and seeds; all of one seed see the same noise and inputs."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from adaptive_flot import metrics
+from adaptive_flot.batch import BatchFit
+from adaptive_flot.errors import ScenarioError, near_match
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
+from adaptive_flot.protocols import ControllerSetup, Prior, Status
+from adaptive_flot.runner.loop import Step, run_loop
+from adaptive_flot.runner.plant import SimulatedPlant
+from adaptive_flot.runner.scenario import Plugin, Scenario
+
+Progress = Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run.
+
+    Attributes
+    ----------
+    estimator, controller, seed
+        What ran.
+    table
+        Time series, one row an interval; see `time_series`.
+    fit
+        Fit in percent of each adapted parameter (by label) and driving output, over t > `fits_after_s`.
+    status_counts
+        How often the estimator returned which status.
+    initial
+        The batch fit that gave the initial estimate.
+    seconds
+        Wall-clock time of the run.
+    """
+
+    estimator: str
+    controller: str
+    seed: int
+    table: pd.DataFrame
+    fit: dict[str, float]
+    status_counts: dict[str, int]
+    initial: BatchFit
+    seconds: float
+
+    def summary(self) -> dict[str, object]:
+        """Entry of the JSON summary."""
+        return {
+            "estimator": self.estimator,
+            "controller": self.controller,
+            "seed": self.seed,
+            "fit": self.fit,
+            "status_counts": self.status_counts,
+            "seconds": self.seconds,
+        }
+
+
+def run_scenario(
+    scenario: Scenario,
+    estimators: Sequence[str] = (),
+    seeds: Sequence[int] = (),
+    progress: Progress = lambda: None,
+) -> list[Run]:
+    """Run every combination of estimator, controller and seed.
+
+    Parameters
+    ----------
+    scenario
+        The scenario.
+    estimators
+        Names among the scenario's estimators, shipped names or `my_file:MyEstimator`; default all of the scenario.
+    seeds
+        Noise seeds; default those of the scenario.
+    progress
+        Called after each run.
+
+    Raises
+    ------
+    PluginError, ScenarioError
+        An estimator or controller can not be loaded.
+    """
+    chosen = {name: _estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
+    runs: list[Run] = []
+    for seed in seeds or scenario.file.seeds:
+        for controller in scenario.file.controllers:
+            initial: dict[str, BatchFit] = {}  # before it starts, no estimator has touched the run: fit once
+            for name, plugin in chosen.items():
+                runs.append(_run(scenario, name, plugin, controller, seed, initial))
+                progress()
+    return runs
+
+
+def _estimator_plugin(scenario: Scenario, name: str) -> Plugin:
+    if name in scenario.file.estimators:
+        return scenario.file.estimators[name]
+    if name in ESTIMATORS or ":" in name:
+        return Plugin(use=name)
+    raise ScenarioError(f"{scenario.path}: unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}")
+
+
+def _run(
+    scenario: Scenario, name: str, plugin: Plugin, controller_name: str, seed: int, initial: dict[str, BatchFit]
+) -> Run:
+    begin = time.perf_counter()
+    model, folder = scenario.model, scenario.path.parent
+    schedule = scenario.schedule(seed)
+    parameters = scenario.true_parameters()
+    x0 = steady_state(model, schedule[0], parameters[0]).state
+    plant = SimulatedPlant(
+        model,
+        scenario.dt,
+        x0,
+        parameters,
+        measurement_noise(scenario, seed),
+        accurate=scenario.file.plant.integrator == "accurate",
+    )
+    factory = load(plugin.use, ESTIMATORS, "estimator", folder)
+    estimator = construct(factory, plugin.use, "estimator", scenario.setup, **plugin.options)
+    chosen = scenario.file.controllers[controller_name]
+    controller = construct(
+        load(chosen.use, CONTROLLERS, "controller", folder),
+        chosen.use,
+        "controller",
+        ControllerSetup(model, scenario.dt, schedule),
+        **chosen.options,
+    )
+
+    def make_prior(steps: list[Step]) -> Prior:
+        if "fit" not in initial:
+            initial["fit"] = initial_fit(scenario, steps)
+        prior = initial["fit"].prior(steps[-1].plant.sample.time)
+        return prior if plugin.start == "initial_estimate" else _nominal(scenario, steps, prior)
+
+    steps = run_loop(
+        plant,
+        estimator,
+        controller,
+        len(schedule),
+        initial_intervals=scenario.initial_rows,
+        make_prior=make_prior,
+    )
+    table = time_series(scenario, steps)
+    counts = Counter((s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps)
+    seconds = time.perf_counter() - begin
+    return Run(
+        name, controller_name, seed, table, fits(scenario, table), dict(counts), initial["fit"], round(seconds, 4)
+    )
+
+
+def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
+    """White Gaussian noise of a run (N, ny), the same for every estimator; NaN where nothing is measured."""
+    generator = np.random.default_rng([seed, 0])
+    std = scenario.noise_std()
+    return std * generator.standard_normal((len(scenario.starts), std.size))
+
+
+def initial_fit(scenario: Scenario, steps: list[Step]) -> BatchFit:
+    """Batch fit of the first steps, from the scenario's guess."""
+    part = scenario.file.initial_estimate
+    guess = scenario.setup.__class__(
+        scenario.model.with_parameters(part.guess), scenario.dt, scenario.setup.parameters, scenario.setup.outputs
+    )
+    factory = load(part.method, BATCH_ESTIMATORS, "batch estimator", scenario.path.parent)
+    fitted: BatchFit = construct(factory, part.method, "batch estimator", guess, **part.options).fit(record_of(steps))
+    return fitted
+
+
+def record_of(steps: list[Step]) -> Dataset:
+    """What was measured, as a record that starts one interval before the first step, at the initial instant."""
+    samples = [s.plant.sample for s in steps]
+    dt = samples[1].time - samples[0].time
+    return Dataset(
+        name="initial record",
+        time=np.array([samples[0].time - dt, *(s.time for s in samples)]),
+        dt=dt,
+        inputs=np.vstack([samples[0].inputs, *(s.inputs for s in samples)]),
+        outputs=np.vstack([np.full(samples[0].outputs.size, np.nan), *(s.outputs for s in samples)]),
+    )
+
+
+def _nominal(scenario: Scenario, steps: list[Step], prior: Prior) -> Prior:
+    """Nominal parameters and their own free run from the steady state of the first inputs."""
+    from adaptive_flot.greybox.record import RecordSimulator
+
+    model, record = scenario.model, record_of(steps)
+    x0 = steady_state(model, record.inputs[0]).state
+    state = RecordSimulator(model, scenario.dt).last_state(record, x0, model.parameter_values)
+    values = model.parameter_values[model.indices("parameters", scenario.setup.parameters)]
+    return Prior(prior.time, state, values, prior.covariance, prior.noise_std)
+
+
+def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
+    """Table of a run: `time_s`, inputs, and with suffixes.
+
+    For outputs `_true`, `_measured`, `_predicted`, `_innovation`, `_innovation_std`; for adapted parameters `_true`,
+    `_estimate`, `_std`; then `status` and `decided_by`.
+    """
+    model, setup = scenario.model, scenario.setup
+    estimates = [s.estimate for s in steps]
+    columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
+    inputs = np.vstack([s.plant.sample.inputs for s in steps])
+    columns |= {q.column: inputs[:, j] for j, q in enumerate(model.inputs)}
+    true = np.vstack([s.plant.outputs for s in steps])
+    measured = np.vstack([s.plant.sample.outputs for s in steps])
+    unknown = np.full(len(model.outputs), np.nan)
+    predicted = np.vstack([e.prediction if e else unknown for e in estimates])
+    innovation = np.vstack([e.innovation if e else unknown for e in estimates])
+    expected = np.vstack([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
+    for j, q in enumerate(model.outputs):
+        columns[f"{q.column}_true"] = true[:, j]
+        columns[f"{q.column}_predicted"] = predicted[:, j]
+        if np.isfinite(measured[:, j]).any():
+            columns[f"{q.column}_measured"] = measured[:, j]
+            columns[f"{q.column}_innovation"] = innovation[:, j]
+        if q.name in setup.outputs:
+            columns[f"{q.column}_innovation_std"] = expected[:, setup.outputs.index(q.name)]
+    p_true = np.vstack([s.plant.parameters for s in steps])
+    blank = np.full(len(setup.parameters), np.nan)
+    theta = np.vstack([e.parameters if e else blank for e in estimates])
+    std = np.vstack([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
+    for j, i in enumerate(model.indices("parameters", setup.parameters)):
+        label = model.parameters[i].label
+        columns |= {f"{label}_true": p_true[:, i], f"{label}_estimate": theta[:, j], f"{label}_std": std[:, j]}
+    columns["status"] = [(e.status if e else Status.INITIALISING).name.lower() for e in estimates]
+    columns["decided_by"] = [s.decision.decided_by for s in steps]
+    return pd.DataFrame(columns)
+
+
+def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
+    """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
+    late = table[table["time_s"] > scenario.file.fits_after_s + 1e-9]
+    model, setup = scenario.model, scenario.setup
+    labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
+    found = {x: metrics.fit(late[f"{x}_true"].to_numpy(), late[f"{x}_estimate"].to_numpy()) for x in labels}
+    for i in model.indices("outputs", setup.outputs):
+        q = model.outputs[i]
+        found[q.name] = metrics.fit(late[f"{q.column}_true"].to_numpy(), late[f"{q.column}_predicted"].to_numpy())
+    return found

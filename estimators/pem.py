@@ -1,0 +1,259 @@
+"""Batch prediction-error method: fits any named parameters of a model, and its initial state, to a record.
+
+Nonlinear least squares on the free-run error with exact sensitivities over the whole record (Ljung, *System
+Identification*, 1999, chapter 7; Gauss-Newton in a trust region with bounds, `scipy.optimize.least_squares`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from adaptive_flot.batch import BatchFit, Identifiability, ParameterEstimate
+from adaptive_flot.errors import DataError, ModelError, near_match
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
+from adaptive_flot.protocols import Setup, Status, full_parameters
+
+InitialState = Literal["steady", "estimated", "given"]
+WEIGHT_PASSES = 5
+"""Fits in turn, each weighted with the noise levels that the last one left, until these stand still."""
+NOISE_CONVERGED = 0.01
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Least squares in scaled unknowns: parameters, then the initial state where it is estimated."""
+
+    centre: FloatArray
+    scale: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    prior_std: FloatArray
+    steady: FloatArray
+
+
+class Pem:
+    """Batch fit of `setup.parameters` to `setup.outputs` of a record.
+
+    Parameters
+    ----------
+    setup
+        Model, sampling interval, the q parameters to fit and the m outputs to fit them to. A parameter's bounds, scale
+        and prior standard deviation are those of the model.
+    initial_state
+        `steady`: the record starts at the steady state of its first inputs, which moves with the parameters;
+        `estimated`: the state at the first row is fitted too, with a wide prior (its scale) around that steady state;
+        `given`: the record carries it.
+    free
+        Names of states that are fitted with `initial_state="estimated"`; default all.
+
+    Raises
+    ------
+    ModelError
+        Unknown option.
+    """
+
+    def __init__(
+        self, setup: Setup, *, initial_state: InitialState = "steady", free: Sequence[str] | None = None
+    ) -> None:
+        if initial_state not in ("steady", "estimated", "given"):
+            known = ["steady", "estimated", "given"]
+            raise ModelError(f"pem: unknown initial_state {initial_state!r}; {near_match(initial_state, known)}")
+        self.setup = setup
+        self.initial_state = initial_state
+        self._columns = setup.model.indices("outputs", setup.outputs)
+        self._simulator = RecordSimulator(setup.model, setup.dt)
+        names = setup.model.names("states") if free is None else free
+        self._free = setup.model.indices("states", names) if initial_state == "estimated" else []
+
+    def fit(self, record: Dataset) -> BatchFit:
+        """Fit the record; missing measurements drop out.
+
+        Returns
+        -------
+        BatchFit
+            Estimates with covariance, noise level, initial and last state, identifiability verdict and a status:
+            `OK`, `PROJECTED` (a parameter ends on a bound) or `NOT_FINITE` (the model can not simulate the record).
+
+        Raises
+        ------
+        DataError
+            Fewer measurements than unknowns, or no initial state in the record where it should be given.
+        """
+        problem = self._problem(record)
+        measured = record.outputs[:, self._columns]
+        present = np.isfinite(measured)
+        if present.sum() <= len(problem.centre):
+            raise DataError(
+                f"{record.name}: {int(present.sum())} measurements of {', '.join(self.setup.outputs)} for "
+                f"{len(problem.centre)} unknowns; give a longer record or fit fewer parameters"
+            )
+        noise = self._first_noise(measured)
+        unknowns = np.zeros(len(problem.centre))
+        for _ in range(WEIGHT_PASSES):
+            solution = self._solve(record, problem, unknowns, noise, measured, present)
+            if solution is None:
+                return self._failed(record, problem)
+            unknowns = cast(FloatArray, solution.x)
+            error = self._errors(record, problem, unknowns, measured)
+            used = noise
+            noise = np.array([np.sqrt(np.mean(e[p] ** 2)) for e, p in zip(error.T, present.T, strict=True)])
+            noise = np.maximum(noise, 1e-12 * np.array([self.setup.model.outputs[c].scale for c in self._columns]))
+            if np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
+                break
+        return self._result(record, problem, solution, noise, int(present.sum()))
+
+    # -- the least-squares problem ---------------------------------------------------------------------------------
+
+    def _problem(self, record: Dataset) -> _Problem:
+        model = self.setup.model
+        parameters = [model.parameters[i] for i in model.indices("parameters", self.setup.parameters)]
+        states = [model.states[i] for i in self._free]
+        if self.initial_state == "given":
+            if record.initial_state is None:
+                raise DataError(f"{record.name}: the first row does not hold all states; use initial_state: estimated")
+            start = record.initial_state
+        else:
+            start = self._start(record)
+        centre = np.array([p.value for p in parameters] + [start[i] for i in self._free])
+        scale = np.array([p.scale for p in parameters] + [q.scale for q in states])
+        prior = np.array([p.prior_std or np.inf for p in parameters] + [q.scale for q in states]) / scale
+        lower = (np.array([p.lower for p in parameters] + [q.lower for q in states]) - centre) / scale
+        upper = (np.array([p.upper for p in parameters] + [q.upper for q in states]) - centre) / scale
+        return _Problem(centre, scale, np.minimum(lower, -1e-9), np.maximum(upper, 1e-9), prior, start)
+
+    def _start(self, record: Dataset) -> FloatArray:
+        model = self.setup.model
+        guess = np.array([model.initial_guess.get(q.name, q.scale) for q in model.states])
+        if self.initial_state == "estimated" and not model.starts_steady:
+            return guess
+        return steady_state(model, record.inputs[0]).state
+
+    def _unpack(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Parameter vector (np,) and initial state (nx,)."""
+        values = problem.centre + problem.scale * unknowns
+        q = len(self.setup.parameters)
+        p = full_parameters(self.setup.model, self.setup.parameters, values[:q])
+        if self.initial_state == "steady":
+            return p, steady_state(self.setup.model, record.inputs[0], p, problem.steady).state
+        x0 = problem.steady.copy()
+        x0[self._free] = values[q:]
+        return p, x0
+
+    def _errors(self, record: Dataset, problem: _Problem, unknowns: FloatArray, measured: FloatArray) -> FloatArray:
+        p, x0 = self._unpack(record, problem, unknowns)
+        return measured - self._simulator.outputs(record, x0, p)[:, self._columns]
+
+    def _jacobian(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> FloatArray:
+        """d(prediction)/d(unknowns) (N, m, q + free)."""
+        p, x0 = self._unpack(record, problem, unknowns)
+        names, q = self.setup.parameters, len(self.setup.parameters)
+        x0_gradient = np.zeros((x0.size, len(problem.centre)))
+        if self.initial_state == "steady":
+            x0_gradient[:, :q] = steady_state_gradient(self.setup.model, x0, record.inputs[0], p, names)
+        x0_gradient[self._free, q + np.arange(len(self._free))] = 1.0
+        gradient = self._simulator.sensitivities(record, x0, p, names, x0_gradient)[1]
+        return gradient[:, self._columns, :] * problem.scale
+
+    def _solve(
+        self,
+        record: Dataset,
+        problem: _Problem,
+        start: FloatArray,
+        noise: FloatArray,
+        measured: FloatArray,
+        present: FloatArray,
+    ) -> OptimizeResult | None:
+        with_prior = np.isfinite(problem.prior_std)
+
+        def residuals(unknowns: FloatArray) -> FloatArray:
+            error = (self._errors(record, problem, unknowns, measured) / noise)[present]
+            return np.concatenate([error, (unknowns / problem.prior_std)[with_prior]])
+
+        def jacobian(unknowns: FloatArray) -> FloatArray:
+            rows = (-self._jacobian(record, problem, unknowns) / noise[:, None])[present]
+            return np.vstack([rows, np.diag(1 / problem.prior_std)[with_prior]])
+
+        if not np.isfinite(residuals(start)).all():
+            return None
+        inside = np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9)
+        return least_squares(
+            residuals, inside, jacobian, bounds=(problem.lower, problem.upper), method="trf", xtol=1e-10, ftol=1e-10
+        )
+
+    def _first_noise(self, measured: FloatArray) -> FloatArray:
+        # the noise of an output is at most what is left of it after differencing: a start that needs no model
+        steps = np.diff(measured, axis=0)
+        scale = np.array([self.setup.model.outputs[c].scale for c in self._columns])
+        found = np.array([np.sqrt(np.mean(s[np.isfinite(s)] ** 2) / 2) if np.isfinite(s).any() else 0 for s in steps.T])
+        return np.maximum(found, 1e-6 * scale)
+
+    # -- results ---------------------------------------------------------------------------------------------------
+
+    def _result(
+        self, record: Dataset, problem: _Problem, solution: OptimizeResult, noise: FloatArray, samples: int
+    ) -> BatchFit:
+        model, q = self.setup.model, len(self.setup.parameters)
+        freedom = max(samples - len(problem.centre), 1)
+        noise = noise * np.sqrt(samples / freedom)
+        scaled = _covariance(cast(FloatArray, solution.jac)) * samples / freedom
+        covariance = (scaled * np.outer(problem.scale, problem.scale))[:q, :q]
+        p, x0 = self._unpack(record, problem, cast(FloatArray, solution.x))
+        values = problem.centre[:q] + problem.scale[:q] * solution.x[:q]
+        at_bound = np.minimum(solution.x - problem.lower, problem.upper - solution.x)[:q] < 1e-6
+        estimates = tuple(
+            ParameterEstimate(name, model.parameters[i].label, model.parameters[i].unit, float(v), float(s), bool(b))
+            for name, i, v, s, b in zip(
+                self.setup.parameters,
+                model.indices("parameters", self.setup.parameters),
+                values,
+                np.sqrt(np.diag(covariance)),
+                at_bound,
+                strict=True,
+            )
+        )
+        return BatchFit(
+            record=record.name,
+            estimates=estimates,
+            covariance=covariance,
+            noise_std=noise,
+            parameters=p,
+            initial_state=x0,
+            last_state=self._simulator.last_state(record, x0, p),
+            evaluations=int(solution.nfev),
+            status=Status.PROJECTED if at_bound.any() else Status.OK,
+            identifiability=Identifiability.judge(
+                [e.label for e in estimates], scaled[:q, :q], [e.at_bound for e in estimates]
+            ),
+        )
+
+    def _failed(self, record: Dataset, problem: _Problem) -> BatchFit:
+        model, q = self.setup.model, len(self.setup.parameters)
+        nan = float("nan")
+        parameters = [model.parameters[i] for i in model.indices("parameters", self.setup.parameters)]
+        return BatchFit(
+            record=record.name,
+            estimates=tuple(ParameterEstimate(p.name, p.label, p.unit, p.value, nan, False) for p in parameters),
+            covariance=np.full((q, q), nan),
+            noise_std=np.full(len(self._columns), nan),
+            parameters=model.parameter_values,
+            initial_state=problem.steady,
+            last_state=problem.steady,
+            evaluations=0,
+            status=Status.NOT_FINITE,
+            identifiability=Identifiability((), (), "the model can not simulate the record from its first guess"),
+        )
+
+
+def _covariance(jacobian: FloatArray) -> FloatArray:
+    """(J'J)^-1 by singular values; a direction that the data do not touch gets a huge variance, not a zero one."""
+    _, s, vt = np.linalg.svd(jacobian, full_matrices=False)
+    floor = max(float(s[0]), 1e-300) * 1e-12
+    return cast(FloatArray, (vt.T / np.maximum(s, floor) ** 2) @ vt)
