@@ -74,9 +74,7 @@ def _word(relative_std: float) -> str:
     return "weak" if relative_std < NOT_IDENTIFIED else "not identified"
 
 
-def _sentence(
-    judged: Sequence[tuple[str, float, str]], pairs: Sequence[tuple[str, str, float]]
-) -> str:
+def _sentence(judged: Sequence[tuple[str, float, str]], pairs: Sequence[tuple[str, str, float]]) -> str:
     parts = []
     for word, text in (
         ("not identified", "the record does not identify {}"),

@@ -30,7 +30,9 @@ CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML)
 def run(
     scenario: Annotated[str, typer.Argument(help="Scenario file, or the name of a shipped scenario.")],
     estimator: Annotated[list[str] | None, typer.Option(help="Estimator (repeatable); default the scenario's.")] = None,
-    seed: Annotated[list[int] | None, typer.Option(min=0, help="Noise seed (repeatable); default the scenario's.")] = None,
+    seed: Annotated[
+        list[int] | None, typer.Option(min=0, help="Noise seed (repeatable); default the scenario's.")
+    ] = None,
     out: Out = None,
     json: Json = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
@@ -74,7 +76,9 @@ def simulate(
     typer.echo(f"{len(table)} rows: {out}")
 
 
-@app.command(epilog="Example: adaptive-flot estimate record.csv --fit n --fit C --fit floatability --save-cell fitted.yaml")
+@app.command(
+    epilog="Example: adaptive-flot estimate record.csv --fit n --fit C --fit floatability --save-cell fitted.yaml"
+)
 def estimate(
     data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
     model: Annotated[str, typer.Option(help="flotation, cascaded-tanks, or my_file:make_model.")] = "flotation",
@@ -82,8 +86,12 @@ def estimate(
     estimator: Annotated[
         list[str] | None, typer.Option(help="Estimator (repeatable); default fixed, rpem and pem.")
     ] = None,
-    fit: Annotated[list[str] | None, typer.Option(help="Parameter to estimate (repeatable), or a group of them.")] = None,
-    output: Annotated[list[str] | None, typer.Option(help="Output to fit to (repeatable); default all measured.")] = None,
+    fit: Annotated[
+        list[str] | None, typer.Option(help="Parameter to estimate (repeatable), or a group of them.")
+    ] = None,
+    output: Annotated[
+        list[str] | None, typer.Option(help="Output to fit to (repeatable); default all measured.")
+    ] = None,
     fit_share: Annotated[float, typer.Option(min=0.05, max=0.95, help="Share of the record to fit on.")] = 0.6,
     save_cell: Annotated[Path | None, typer.Option(help="Write the fitted parameters as a cell file.")] = None,
     out: Out = None,

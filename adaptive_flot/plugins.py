@@ -49,12 +49,18 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
     try:
         module = importlib.import_module(module_name)
     except ModuleNotFoundError as error:
-        raise PluginError(f"{what} {address!r}: no module {error.name!r}; put {module_name}.py beside the file that names it or here") from error
+        raise PluginError(
+            f"{what} {address!r}: no module {error.name!r}; put {module_name}.py beside the file that names it or here"
+        ) from error
     except Exception as error:
-        raise PluginError(f"{what} {address!r}: importing {module_name!r} failed: {type(error).__name__}: {error}") from error
+        raise PluginError(
+            f"{what} {address!r}: importing {module_name!r} failed: {type(error).__name__}: {error}"
+        ) from error
     if not hasattr(module, attribute):
         names = [n for n in vars(module) if not n.startswith("_")]
-        raise PluginError(f"{what} {address!r}: module {module_name!r} has no {attribute!r}; {near_match(attribute, names)}")
+        raise PluginError(
+            f"{what} {address!r}: module {module_name!r} has no {attribute!r}; {near_match(attribute, names)}"
+        )
     return getattr(module, attribute)
 
 

@@ -154,7 +154,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class ControllerSetup:
-    """What a controller is built for: the model, the sampling interval [s] and the planned inputs (N, nu), row by row."""
+    """What a controller is built for: the model, the sampling interval [s] and the planned inputs (N, nu)."""
 
     model: Model
     dt: float

@@ -97,6 +97,7 @@ class Pem:
             )
         noise = self._first_noise(measured)
         unknowns = np.zeros(len(problem.centre))
+        solution = None
         for _ in range(WEIGHT_PASSES):
             solution = self._solve(record, problem, unknowns, noise, measured, present)
             if solution is None:
@@ -108,6 +109,7 @@ class Pem:
             noise = np.maximum(noise, 1e-12 * np.array([self.setup.model.outputs[c].scale for c in self._columns]))
             if np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
                 break
+        assert solution is not None  # at least one pass
         return self._result(record, problem, solution, noise, int(present.sum()))
 
     # -- the least-squares problem ---------------------------------------------------------------------------------
@@ -193,7 +195,7 @@ class Pem:
         steps = np.diff(measured, axis=0)
         scale = np.array([self.setup.model.outputs[c].scale for c in self._columns])
         found = np.array([np.sqrt(np.mean(s[np.isfinite(s)] ** 2) / 2) if np.isfinite(s).any() else 0 for s in steps.T])
-        return np.maximum(found, 1e-6 * scale)
+        return cast(FloatArray, np.maximum(found, 1e-6 * scale))
 
     # -- results ---------------------------------------------------------------------------------------------------
 

@@ -127,7 +127,14 @@ class Rpem:
             status = Status.PROJECTED
         new = RpemState(sample.time, x, theta, covariance, state.noise_std)
         estimate = Estimate(
-            sample.time, prediction, measured - prediction, expected_std, theta.copy(), covariance.copy(), x.copy(), status
+            sample.time,
+            prediction,
+            measured - prediction,
+            expected_std,
+            theta.copy(),
+            covariance.copy(),
+            x.copy(),
+            status,
         )
         return new, estimate
 

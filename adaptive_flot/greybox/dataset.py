@@ -157,13 +157,16 @@ def _interval(time: FloatArray, file: Path) -> float:
         raise DataError(f"{file}: {len(time)} row; a record needs at least 2")
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
-        raise DataError(f"{file}: {TIME_COLUMN!r} is empty in line {int(bad[0]) + FIRST_LINE}; give the time of every row")
+        raise DataError(
+            f"{file}: {TIME_COLUMN!r} is empty in line {int(bad[0]) + FIRST_LINE}; give the time of every row"
+        )
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if back.size:
         k = int(back[0]) + 1
         raise DataError(
-            f"{file}: time does not increase in line {k + FIRST_LINE} ({time[k - 1]:g} s, then {time[k]:g} s); sort the rows"
+            f"{file}: time does not increase in line {k + FIRST_LINE} ({time[k - 1]:g} s, then {time[k]:g} s); "
+            "sort the rows and remove repeated ones"
         )
     dt = float(np.median(steps))
     uneven = np.flatnonzero(np.abs(steps - dt) > UNIFORMITY * dt)

@@ -22,10 +22,11 @@ class FastCall:
         self._arguments = [np.zeros(self.function.nnz_in(i)) for i in range(self.function.n_in())]
         self._results = [np.zeros(self.function.nnz_out(i)) for i in range(self.function.n_out())]
         self._shapes = [_array_shape(self.function.size_out(i)) for i in range(self.function.n_out())]
+        # SWIG turns a memoryview into pointer and size; the stubs know only the C signature
         for i, argument in enumerate(self._arguments):
-            self._buffer.set_arg(i, memoryview(argument))
+            self._buffer.set_arg(i, argument.data)  # type: ignore[call-arg]
         for i, result in enumerate(self._results):
-            self._buffer.set_res(i, memoryview(result))
+            self._buffer.set_res(i, result.data)  # type: ignore[call-arg]
 
     def __call__(self, *arguments: FloatArray | float) -> tuple[FloatArray, ...]:
         """Evaluate. Column vectors come back as (n,), matrices as (n, m).
@@ -45,8 +46,7 @@ class FastCall:
             target[:] = flat
         self._evaluate()
         return tuple(
-            result.reshape(shape, order="F").copy()
-            for result, shape in zip(self._results, self._shapes, strict=True)
+            result.reshape(shape, order="F").copy() for result, shape in zip(self._results, self._shapes, strict=True)
         )
 
 
@@ -58,6 +58,11 @@ def _dense(function: ca.Function) -> ca.Function:
     if all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
         return function
     arguments = function.mx_in()
-    results = [ca.densify(r) for r in function(*arguments)] if function.n_out() > 1 else [ca.densify(function(*arguments))]
-    names = [function.name_in(i) for i in range(function.n_in())], [function.name_out(i) for i in range(function.n_out())]
+    results = (
+        [ca.densify(r) for r in function(*arguments)] if function.n_out() > 1 else [ca.densify(function(*arguments))]
+    )
+    names = (
+        [function.name_in(i) for i in range(function.n_in())],
+        [function.name_out(i) for i in range(function.n_out())],
+    )
     return ca.Function(function.name(), arguments, results, *names)

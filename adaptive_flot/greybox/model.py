@@ -292,7 +292,7 @@ class Model:
 
     @property
     def tangent(self) -> ca.Function:
-        """Directional derivative of the right-hand side and the outputs, z moving along by the implicit function rule."""
+        """Directional derivative of the right-hand side and the outputs, with z moving along; see the class."""
         return self._built.tangent
 
     @property
@@ -354,9 +354,7 @@ def _build(model: Model) -> _Built:
     else:
         value = ca.SX(0, 1)
     xdot, _, y, s = dae(t, x, u, p, value)
-    ode = ca.Function(
-        "ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options
-    )
+    ode = ca.Function("ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options)
     return _Built(dae, ode, _tangent(dae), tuple(scope.sites))
 
 

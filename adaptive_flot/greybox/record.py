@@ -29,7 +29,8 @@ class RecordSimulator:
 
     def last_state(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
         """State (nx,) at the last row of the free run."""
-        return self.stepper.simulate(x0, record.inputs[1:], p, record.time[0]).states[-1]
+        run = self.stepper.simulate(x0, record.inputs[1:], p, float(record.time[0]))
+        return np.array(run.states[-1])
 
     def sensitivities(
         self, record: Dataset, x0: FloatArray, p: FloatArray, wrt: Sequence[str], x0_gradient: FloatArray

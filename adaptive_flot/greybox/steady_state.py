@@ -51,12 +51,15 @@ def steady_state(
     rate = FastCall(model.ode)
     slope = FastCall(_state_jacobian(model))
 
-    solution = root(
-        lambda s: rate(0.0, s * scale, u, p)[0] / scale,
-        start / scale,
-        jac=lambda s: slope(0.0, s * scale, u, p)[0] * scale[None, :] / scale[:, None],
-        tol=1e-13,
-    )
+    def scaled_rate(s: FloatArray) -> FloatArray:
+        scaled: FloatArray = rate(0.0, s * scale, u, p)[0] / scale
+        return scaled
+
+    def scaled_slope(s: FloatArray) -> FloatArray:
+        scaled: FloatArray = slope(0.0, s * scale, u, p)[0] * scale[None, :] / scale[:, None]
+        return scaled
+
+    solution = root(scaled_rate, start / scale, jac=scaled_slope, tol=1e-13)
     state = cast(FloatArray, solution.x * scale)
     residual = float(np.max(np.abs(solution.fun)))
     lower = np.array([q.lower for q in model.states])

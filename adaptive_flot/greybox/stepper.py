@@ -38,7 +38,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """A record with its derivatives for q unknowns: outputs (N, ny), gradient (N, ny, q), last state and its (nx, q)."""
+    """A record and its derivatives for q unknowns: outputs (N, ny), gradient (N, ny, q), last state, its (nx, q)."""
 
     outputs: FloatArray
     gradient: FloatArray
@@ -240,13 +240,14 @@ class Stepper:
         if u.shape[1] != len(self.model.inputs):
             raise ModelError(f"inputs have {u.shape[1]} columns, model '{self.model.name}' {len(self.model.inputs)}")
         if p.shape not in ((len(self.model.parameters),), (len(u), len(self.model.parameters))):
-            raise ModelError(f"parameters have shape {p.shape}; give (np,) or (N, np), np = {len(self.model.parameters)}")
-        return u, p, t0 + self.dt * np.arange(len(u))
+            raise ModelError(
+                f"parameters have shape {p.shape}; give (np,) or (N, np), np = {len(self.model.parameters)}"
+            )
+        return u, p, t0 + self.dt * np.arange(len(u), dtype=float)
 
 
 def _chunks(n: int) -> list[slice]:
     return [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
-
 
 
 def _rk4_step(model: Model, dt: float, substeps: int) -> ca.Function:

@@ -89,5 +89,7 @@ def read_benchmark(path: Path | str) -> tuple[Dataset, Dataset]:
         if not np.isfinite(u).all():
             raise DataError(f"{file}: column 'u{name}' has an empty cell; inputs can not be missing")
         held = np.concatenate([u[:1], u[:-1]])
-        records.append(Dataset(f"{file.stem}:{name}", dt * np.arange(len(u)), dt, held[:, None], y[:, None]))
+        records.append(
+            Dataset(f"{file.stem}:{name}", dt * np.arange(len(u), dtype=float), dt, held[:, None], y[:, None])
+        )
     return records[0], records[1]

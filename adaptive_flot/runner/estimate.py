@@ -278,7 +278,7 @@ def _errors(setup: Setup, table: pd.DataFrame) -> list[OutputError]:
 
 
 def ljung_box_p(innovation: FloatArray, lags: int = WHITENESS_LAGS) -> float:
-    """p value of the Ljung-Box test over `lags` lags (statsmodels); NaN for too short or constant a series.
+    """Return the p value of the Ljung-Box test over `lags` lags (statsmodels); NaN for too short or constant a series.
 
     Missing samples are left out, which is exact for the white series that the test supposes.
     """

@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import AnyController, AnyEstimator, AnyPlant, Decision, Estimate, PlantRecord, Prior, Sample
+from adaptive_flot.protocols import (
+    AnyController,
+    AnyEstimator,
+    AnyPlant,
+    Decision,
+    Estimate,
+    PlantRecord,
+    Prior,
+    Sample,
+)
 
 
 @dataclass(frozen=True)
@@ -63,4 +71,3 @@ def run_loop(
             estimator_state, estimate = estimator.update(estimator_state, sample)
         steps.append(Step(decision, record, estimate))
     return steps
-

@@ -55,7 +55,8 @@ class Random(_Profile):
         """Value held in the interval that starts at each time [s] (N,)."""
         generator = np.random.default_rng([seed, 1] if self.seed == "per_run" else [self.seed, 2])
         block = np.floor(time / self.every_s + 1e-9).astype(int)
-        return generator.uniform(*self.between, size=int(block[-1]) + 1)[block]
+        levels: FloatArray = generator.uniform(*self.between, size=int(block[-1]) + 1)
+        return np.take(levels, block)
 
 
 class Steps(_Profile):

@@ -119,7 +119,7 @@ class Scenario:
     @property
     def starts(self) -> FloatArray:
         """Start of each sampling interval [s] (N,)."""
-        return self.dt * np.arange(round(self.file.duration_s / self.dt))
+        return self.dt * np.arange(round(self.file.duration_s / self.dt), dtype=float)
 
     @property
     def initial_rows(self) -> int:
@@ -264,7 +264,9 @@ def _known_keys(where: tuple[int | str, ...], content: Mapping[str, Any]) -> lis
 def _nested(annotation: Any, part: int | str, where: tuple[int | str, ...]) -> Any:
     del part
     candidates = _models(annotation)
-    by_profile = {m.model_fields["profile"].annotation.__args__[0]: m for m in candidates if "profile" in m.model_fields}
+    by_profile = {
+        m.model_fields["profile"].annotation.__args__[0]: m for m in candidates if "profile" in m.model_fields
+    }
     if len(by_profile) > 1:
         return by_profile.get(str(where[-1]), candidates[0])
     return candidates[0] if candidates else None

@@ -106,7 +106,9 @@ def _estimator_plugin(scenario: Scenario, name: str) -> Plugin:
         return scenario.file.estimators[name]
     if name in ESTIMATORS or ":" in name:
         return Plugin(use=name)
-    raise ScenarioError(f"{scenario.path}: unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}")
+    raise ScenarioError(
+        f"{scenario.path}: unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}"
+    )
 
 
 def _run(

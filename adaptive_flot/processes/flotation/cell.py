@@ -3,7 +3,7 @@
 Source of the equations: Gonzalez & Quintanilla (the *paper*) with the closures of Quintanilla et al. (2021, Part I).
 Two of its printed equations are read in the only way that is consistent:
 
-* the gas balance holds for r_k, the gas volume per volume of **gas-free** pulp; eps_k = r_k / (1 + sum r) is the holdup;
+* the gas balance holds for r_k, gas volume per volume of **gas-free** pulp; eps_k = r_k / (1 + sum r) is the holdup;
 * the level loop is stable with `+ (k_p / tau_i) (h_p - h_p_SP)`, not with the printed minus sign.
 """
 
@@ -109,9 +109,7 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     gas = sum(r[1:], r[0])
     eps = [rk / (1 + gas) for rk in r]
     d = [m.site("bubble_size", dk) for dk in m.parameter_group("bubble_diameter")]
-    v = [
-        m.site("gas_slip", pulp.slip_velocity(dk, ek, rho_p, mu_p, gravity)) for dk, ek in zip(d, eps, strict=True)
-    ]
+    v = [m.site("gas_slip", pulp.slip_velocity(dk, ek, rho_p, mu_p, gravity)) for dk, ek in zip(d, eps, strict=True)]
     out = pulp.gas_outflow(d, eps, v)
     d_int = m.signal("interface_bubble_size", out.interface_bubble_size)
 
@@ -130,7 +128,9 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
         "concentrate_flow", froth.concentrate_flow(alpha, vg, area, k1, d_froth, m.parameter("plateau_border"))
     )
     # v_g* = (Q_feed - Q_tails - Q_conc + Q_air) / A (paper, vg*); the concentrate is a small part of it
-    m.residual("interfacial_gas_velocity", vg - (q_feed - q_tails - q_conc + q_air) / area, (q_feed - q_tails + q_air) / area)
+    m.residual(
+        "interfacial_gas_velocity", vg - (q_feed - q_tails - q_conc + q_air) / area, (q_feed - q_tails + q_air) / area
+    )
 
     # Minerals: flow to the concentrate F_i and mass balance (paper, mass-balance)
     feed = m.parameter_group("feed_concentration")
@@ -177,5 +177,3 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     m.output("level", level)
     m.output("concentrate_flow", m.site("concentrate_flow_sensor", q_conc))
     m.output("air_recovery", m.site("air_recovery_sensor", alpha * vg * area / q_air))
-
-

@@ -45,7 +45,8 @@ def settling_velocity(
 ) -> ca.SX:
     """Hindered settling in the froth [m/s]: g (rho_i - rho_w) d^2 (1 - phi)^4.65 / (18 mu_p 3) (Part I, 55)."""
     stokes = gravity * (density - water_density) * diameter**2 / (18 * viscosity)
-    return stokes * (1 - solids_fraction) ** HINDERED_SETTLING / 3
+    settling: ca.SX = stokes * (1 - solids_fraction) ** HINDERED_SETTLING / 3
+    return settling
 
 
 def axial_dispersion(jg: ca.SX, k1: ca.SX, peclet: ca.SX) -> ca.SX:
@@ -54,9 +55,11 @@ def axial_dispersion(jg: ca.SX, k1: ca.SX, peclet: ca.SX) -> ca.SX:
 
 
 def froth_recovery(a: ca.SX, vg: ca.SX, settling: ca.SX, d_int: ca.SX, d_froth: ca.SX) -> ca.SX:
-    """R_f = (alpha*(1 - alpha*) v_g* / v_set)^0.25 (d_int / d_froth)^0.5, or with 1/4 for alpha*(1 - alpha*)
-    above alpha* = 0.5 (paper, rf).
-    """  # noqa: D205
+    """Froth recovery, the fraction of attached particles that overflows [-] (paper, rf).
+
+    R_f = (alpha*(1 - alpha*) v_g* / v_set)^0.25 (d_int / d_froth)^0.5; above alpha* = 0.5 with 1/4 in the place of
+    alpha*(1 - alpha*).
+    """
     w = branch_weight(a)
     low = ca.sqrt(ca.sqrt(a * (1 - a) * vg / settling))
     high = ca.sqrt(ca.sqrt(vg / (4 * settling)))
@@ -64,9 +67,10 @@ def froth_recovery(a: ca.SX, vg: ca.SX, settling: ca.SX, d_int: ca.SX, d_froth: 
 
 
 def entrainment(a: ca.SX, vg: ca.SX, settling: ca.SX, froth_depth: ca.SX, dispersion: ca.SX) -> ca.SX:
-    """R_ent = exp(-v_set^1.5 h_f / (D sqrt(v_g* (1 - alpha*)))), above 0.5 exp(-2 v_set^1.5 h_f / (D sqrt(v_g*)))
-    (paper, ent).
-    """  # noqa: D205
+    """Entrainment factor, mineral per concentrate water over that in the pulp [-] (paper, ent).
+
+    R_ent = exp(-v_set^1.5 h_f / (D sqrt(v_g* (1 - alpha*)))); above alpha* = 0.5 exp(-2 v_set^1.5 h_f / (D sqrt v_g*)).
+    """
     w = branch_weight(a)
     drop = settling**1.5 * froth_depth / dispersion
     return (1 - w) * ca.exp(-drop / ca.sqrt(vg * (1 - a))) + w * ca.exp(-2 * drop / ca.sqrt(vg))

@@ -140,7 +140,9 @@ def read_cell(path: Path | str) -> Cell:
                 sizes["bubble"] = len(entry.values)
             count = sizes[spec.group] if spec.group else 1
             if len(entry.values) != count:
-                raise CellError(f"{file}: {section}.{key} has {len(entry.values)} values; give {count}, one a {spec.group}")
+                raise CellError(
+                    f"{file}: {section}.{key} has {len(entry.values)} values; give {count}, one a {spec.group}"
+                )
             labels = minerals if spec.group == "mineral" else [str(i + 1) for i in range(count)]
             parameters += _parameters(file, section, key, spec, entry, labels)
     cell = Cell(file.stem, tuple(parameters), tuple(minerals), sizes["bubble"], _operation(file, content))
@@ -171,7 +173,11 @@ def save_cell(source: Path | str, values: Mapping[str, float], note: str, path: 
             if spec.group is None and spec.name in values:
                 entry["value"], entry["source"] = float(values[spec.name]), note
             elif spec.group is not None:
-                changed = {i: values[f"{spec.name}.{labels[i]}"] for i in range(len(entry["value"])) if f"{spec.name}.{labels[i]}" in values}
+                changed = {
+                    i: values[f"{spec.name}.{labels[i]}"]
+                    for i in range(len(entry["value"]))
+                    if f"{spec.name}.{labels[i]}" in values
+                }
                 if changed:
                     entry["value"] = [float(changed.get(i, v)) for i, v in enumerate(entry["value"])]
                     entry["source"] = note
@@ -226,9 +232,7 @@ def _entry(file: Path, given: Mapping[str, Any], section: str, key: str, unit: s
     return entry
 
 
-def _parameters(
-    file: Path, section: str, key: str, spec: _Spec, entry: _Entry, labels: list[str]
-) -> list[Parameter]:
+def _parameters(file: Path, section: str, key: str, spec: _Spec, entry: _Entry, labels: list[str]) -> list[Parameter]:
     lower, upper = entry.bounds or (spec.lower, spec.upper)
     prior = entry.prior_std if isinstance(entry.prior_std, list) else [entry.prior_std] * len(entry.values)
     found = []
@@ -241,16 +245,30 @@ def _parameters(
             )
         scale = abs(value) or 1.0
         found.append(
-            Parameter(name, value, spec.unit, entry.source, spec.symbol, max(lower, spec.lower), min(upper, spec.upper), scale, std, entry.role)
+            Parameter(
+                name,
+                value,
+                spec.unit,
+                entry.source,
+                spec.symbol,
+                max(lower, spec.lower),
+                min(upper, spec.upper),
+                scale,
+                std,
+                entry.role,
+            )
         )
     return found
 
 
 def _mineral_names(file: Path, content: Mapping[str, Any]) -> list[str]:
-    names = _section(file, content, "minerals").get("names")
-    valid = isinstance(names, list) and len(names) >= 2 and all(isinstance(n, str) for n in names)
-    if not valid or len(set(names)) != len(names):
-        raise CellError(f"{file}: minerals.names = {names!r}; give at least two different names, the valuable one first")
+    given = _section(file, content, "minerals").get("names")
+    names = given if isinstance(given, list) and all(isinstance(n, str) for n in given) else []
+    if len(names) < 2 or len(set(names)) != len(names):
+        raise CellError(
+            f"{file}: minerals.names must be a list of words, got {given!r}; "
+            "give at least two different names, the valuable one first"
+        )
     return [str(n) for n in names]
 
 

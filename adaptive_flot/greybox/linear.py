@@ -1,0 +1,63 @@
+"""Linearise a model at an operating point into a python-control state space."""
+
+from __future__ import annotations
+
+import casadi as ca
+import control
+import numpy as np
+
+from adaptive_flot.greybox.fastcall import FastCall
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.steady_state import steady_state
+
+
+def linearise(
+    model: Model, inputs: FloatArray, parameters: FloatArray | None = None, state: FloatArray | None = None
+) -> control.StateSpace:
+    """State space of small deviations, with named states, inputs and outputs, exact derivatives.
+
+    Parameters
+    ----------
+    model
+        The model.
+    inputs
+        Inputs of the operating point (nu,).
+    parameters
+        Parameter vector (np,); default the model's values.
+    state
+        State of the operating point (nx,); default the steady state of the inputs.
+
+    Returns
+    -------
+    control.StateSpace
+        dx = A dx + B du, dy = C dx + D du; units are those of the model.
+
+    Raises
+    ------
+    RangeError
+        There is no steady state at these inputs.
+    """
+    p = model.parameter_values if parameters is None else np.asarray(parameters, dtype=float)
+    x0 = steady_state(model, inputs, p).state if state is None else state
+    t, x, u, q = model.ode.sx_in()
+    xdot, y, _, _ = model.ode(t, x, u, q)
+    blocks = [ca.jacobian(a, b) for a in (xdot, y) for b in (x, u)]
+    a, b, c, d = (
+        m.reshape(rows, -1)
+        for m, rows in zip(
+            FastCall(ca.Function("linear", [t, x, u, q], blocks))(0.0, x0, inputs, p),
+            (len(model.states), len(model.states), len(model.outputs), len(model.outputs)),
+            strict=True,
+        )
+    )
+    # an output and a state may share a name (level): python-control wants them apart only within a kind
+    return control.ss(
+        a,
+        b,
+        c,
+        d,
+        states=list(model.names("states")),
+        inputs=list(model.names("inputs")),
+        outputs=list(model.names("outputs")),
+        name=model.name,
+    )
