@@ -4,6 +4,7 @@ In a user's test file::
 
     from adaptive_flot.testing import ESTIMATOR_CHECKS, estimator_case
 
+
     @pytest.mark.parametrize("check", ESTIMATOR_CHECKS, ids=lambda c: c.__name__)
     def test_contract(check):
         check(estimator_case(MyEstimator))
@@ -100,9 +101,7 @@ def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...]]:
 # -- estimators ----------------------------------------------------------------------------------------------------
 
 
-def run_estimator(
-    estimator: AnyEstimator, state: Any, samples: Sequence[Sample]
-) -> tuple[Any, list[Estimate]]:
+def run_estimator(estimator: AnyEstimator, state: Any, samples: Sequence[Sample]) -> tuple[Any, list[Estimate]]:
     """Replay samples; the last state and every estimate."""
     estimates = []
     for sample in samples:
@@ -308,9 +307,7 @@ def _same(a: Any, b: Any) -> bool:
     if isinstance(a, np.ndarray):
         return bool(isinstance(b, np.ndarray) and np.array_equal(a, b, equal_nan=True))
     if dataclasses.is_dataclass(a):
-        return type(a) is type(b) and all(
-            _same(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a)
-        )
+        return type(a) is type(b) and all(_same(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a))
     if isinstance(a, list | tuple):
         return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
     return bool(a == b) or (isinstance(a, float) and isinstance(b, float) and np.isnan(a) and np.isnan(b))

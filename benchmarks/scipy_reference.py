@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from scipy.integrate import solve_ivp  # type: ignore[import-untyped, unused-ign
 from scipy.optimize import brentq  # type: ignore[import-untyped, unused-ignore]
 
 Array = NDArray[np.float64]
+Method = Literal["RK45", "LSODA", "BDF", "Radau"]
 
 AREA, V_CELL, H_CELL = 0.18, 0.087, 0.48  # m2, m3, m
 PHI, RHO_S, RHO_W, MU_W, G = 0.2, 2650.0, 1000.0, 1.0e-3, 9.81  # -, kg/m3, kg/m3, Pa s, m/s2
@@ -158,10 +159,18 @@ def steady_state(u: Array, theta: Array) -> Array:
     return x
 
 
-def step(x: Array, u: Array, theta: Array, dt: float = 1.0, rtol: float = 1e-8, atol: Array | None = None) -> Array:
+def step(
+    x: Array,
+    u: Array,
+    theta: Array,
+    dt: float = 1.0,
+    rtol: float = 1e-8,
+    atol: Array | None = None,
+    method: Method = "LSODA",
+) -> Array:
     """State (9,) after dt [s] with u (3,) and theta (2,) held; atol (9,) defaults to rtol times typical sizes."""
     tolerance = rtol * STATE_SCALE if atol is None else atol
-    sol: Any = solve_ivp(rhs, (0.0, dt), x, method="LSODA", args=(u, theta), rtol=rtol, atol=tolerance)
+    sol: Any = solve_ivp(rhs, (0.0, dt), x, method=method, args=(u, theta), rtol=rtol, atol=tolerance)
     if not sol.success:
         raise RuntimeError(f"integration failed: {sol.message}")
     return np.asarray(sol.y[:, -1], dtype=np.float64)
@@ -190,7 +199,7 @@ class RpemResult(NamedTuple):
 
 def rpem(
     x0: Array, theta0: Array, l0: Array, inputs: Array, grade: Array, *,
-    forgetting: float = 0.995, fd_step: float = 1e-4, rtol: float = 1e-8,
+    forgetting: float = 0.995, fd_step: float = 1e-4, rtol: float = 1e-8, method: Method = "LSODA",
 ) -> RpemResult:  # fmt: skip
     """Run the recursive prediction error method of the paper (1 s sampling), five simulations per sample.
 
@@ -200,7 +209,7 @@ def rpem(
     """
 
     def predict(x: Array, u: Array, theta: Array) -> tuple[Array, float]:
-        x_next = step(x, u, theta, rtol=rtol)
+        x_next = step(x, u, theta, rtol=rtol, method=method)
         return x_next, outputs(x_next, u, theta)["concentrate_grade"]
 
     count = len(grade)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -109,7 +110,7 @@ class Rpem:
             raise ModelError(f"a sample has {measured.shape} outputs, the model ({len(self.setup.model.outputs)},)")
         driving = measured[self._columns]
         present = np.isfinite(driving)
-        x, theta, covariance, prediction, expected_std, clipped = self._update(
+        x, theta, covariance, prediction, expected_std, flags = self._update(
             state.x,
             state.time,
             sample.inputs,
@@ -121,9 +122,9 @@ class Rpem:
             present,
         )
         status = Status.OK if present.any() else Status.MISSING
-        if not (np.isfinite(theta).all() and np.isfinite(x).all() and np.isfinite(covariance).all()):
+        if not math.isfinite(flags[0]):
             x, theta, covariance, status = state.x, state.theta, state.covariance, Status.NOT_FINITE
-        elif clipped[0] > 0:
+        elif flags[1] > 0:
             status = Status.PROJECTED
         new = RpemState(sample.time, x, theta, covariance, state.noise_std)
         estimate = Estimate(
@@ -171,13 +172,15 @@ def _update_function(setup: Setup, forgetting: float, gradient: Gradient) -> ca.
     lower = ca.DM([model.parameters[i].lower for i in columns])
     upper = ca.DM([model.parameters[i].upper for i in columns])
     inside = ca.fmin(ca.fmax(theta_next, lower), upper)
-    clipped = ca.sum1(inside != theta_next)
+    # one number that is finite only if the whole new state is, and the number of parameters that were projected
+    size = ca.sumsqr(x_next) + ca.sumsqr(theta_next) + ca.sumsqr(updated)
+    flags = ca.vertcat(size, ca.sum1(inside != theta_next))
     return ca.Function(
         "rpem_update",
         [x, t, u, p, theta, cov, noise, measured, present],
-        [x_next, inside, updated, y, ca.vertcat(*expected), clipped],
+        [x_next, inside, updated, y, ca.vertcat(*expected), flags],
         ["x", "t", "u", "p", "theta", "covariance", "noise", "measured", "present"],
-        ["x_next", "theta_next", "covariance_next", "prediction", "expected_std", "clipped"],
+        ["x_next", "theta_next", "covariance_next", "prediction", "expected_std", "flags"],
         {"cse": True},
     )
 

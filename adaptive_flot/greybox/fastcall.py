@@ -19,38 +19,38 @@ class FastCall:
     def __init__(self, function: ca.Function) -> None:
         self.function = _dense(function)
         self._buffer, self._evaluate = self.function.buffer()
-        self._arguments = [np.zeros(self.function.nnz_in(i)) for i in range(self.function.n_in())]
-        self._results = [np.zeros(self.function.nnz_out(i)) for i in range(self.function.n_out())]
-        self._shapes = [_array_shape(self.function.size_out(i)) for i in range(self.function.n_out())]
+        arguments = [np.zeros(self.function.nnz_in(i)) for i in range(self.function.n_in())]
+        results = [np.zeros(self.function.nnz_out(i)) for i in range(self.function.n_out())]
         # SWIG turns a memoryview into pointer and size; the stubs know only the C signature
-        for i, argument in enumerate(self._arguments):
+        for i, argument in enumerate(arguments):
             self._buffer.set_arg(i, argument.data)  # type: ignore[call-arg]
-        for i, result in enumerate(self._results):
+        for i, result in enumerate(results):
             self._buffer.set_res(i, result.data)  # type: ignore[call-arg]
+        # CasADi stores matrices by columns: these views have the shape that the caller sees
+        self._arguments = [a.reshape(_shape(self.function.size_in(i)), order="F") for i, a in enumerate(arguments)]
+        self._results = [r.reshape(_shape(self.function.size_out(i)), order="F") for i, r in enumerate(results)]
 
     def __call__(self, *arguments: FloatArray | float) -> tuple[FloatArray, ...]:
-        """Evaluate. Column vectors come back as (n,), matrices as (n, m).
+        """Evaluate. Column vectors come and go as (n,), matrices as (n, m); a number fits a (1,) argument.
 
         Raises
         ------
         ModelError
-            An argument has the wrong number of elements.
+            Wrong number of arguments, or one has the wrong shape.
         """
         if len(arguments) != len(self._arguments):
             raise ModelError(f"{self.function.name()}: {len(arguments)} arguments given, {len(self._arguments)} taken")
-        for i, (target, value) in enumerate(zip(self._arguments, arguments, strict=True)):
-            flat = np.asarray(value, dtype=float).ravel(order="F")
-            if flat.size != target.size:
-                name = self.function.name_in(i)
-                raise ModelError(f"argument {name!r} has {flat.size} elements, the model takes {target.size}")
-            target[:] = flat
+        for target, value in zip(self._arguments, arguments, strict=True):
+            # NumPy would stretch a value of size 1 over a longer argument without a word
+            if target.size != 1 and np.shape(value) != target.shape:
+                name = self.function.name_in([a is target for a in self._arguments].index(True))
+                raise ModelError(f"argument {name!r} has the shape {np.shape(value)}, the model takes {target.shape}")
+            target[...] = value
         self._evaluate()
-        return tuple(
-            result.reshape(shape, order="F").copy() for result, shape in zip(self._results, self._shapes, strict=True)
-        )
+        return tuple([result.copy() for result in self._results])
 
 
-def _array_shape(size: tuple[int, int]) -> tuple[int, ...]:
+def _shape(size: tuple[int, int]) -> tuple[int, ...]:
     return (size[0],) if size[1] == 1 else size
 
 

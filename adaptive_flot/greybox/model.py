@@ -91,6 +91,7 @@ class Scope:
         self.time = time
         self._symbols = symbols
         self.derivatives: dict[str, ca.SX] = {}
+        self.decays: dict[str, ca.SX] = {}
         self.outputs: dict[str, ca.SX] = {}
         self.signals: dict[str, ca.SX] = {}
         self.residuals: dict[str, tuple[ca.SX, ca.SX]] = {}
@@ -131,10 +132,16 @@ class Scope:
         """Name an internal quantity that tables, plots and effects may use."""
         return self._define(self.signals, "signal", name, value)
 
-    def derivative(self, name: str, value: ca.SX) -> None:
-        """Give d(state)/dt in the state's unit per second."""
+    def derivative(self, name: str, value: ca.SX, decay: ca.SX | None = None) -> None:
+        """Give d(state)/dt in the state's unit per second.
+
+        `decay` [1/s], for a fast state, is the (negative) factor of the state itself in its derivative. The fast step
+        integrates that part exactly; it changes how large a step may be, not what the equations mean.
+        """
         self._symbol("states", name)
         self._define(self.derivatives, "derivative", name, value)
+        if decay is not None:
+            self.decays[name] = decay
 
     def output(self, name: str, value: ca.SX) -> None:
         """Give an output."""
@@ -167,14 +174,15 @@ class Scope:
 class Model:
     """Named quantities plus equations; building it compiles nothing and takes milliseconds.
 
-    Attributes `dae`, `ode` and `tangent` are CasADi functions of `(t, x, u, p[, z])`:
+    Attributes `dae`, `ode`, `tangent` and `decay` are CasADi functions of `(t, x, u, p[, z])`:
 
     ========= ============================================= ==========================================
     function  arguments                                     results
     ========= ============================================= ==========================================
     `dae`     t, x (nx,), u (nu,), p (np,), z (nz,)         dx/dt (nx,), residual (nz,), y (ny,), s (ns,)
     `ode`     t, x, u, p                                    dx/dt, y, s, z, with z solved inside
-    `tangent` t, x, u, p, z, dx (nx,), dp (np,)             derivatives of dx/dt and y along (dx, dp)
+    `tangent` t, x, u, p, z, dx (nx,), dp (np,)             derivatives of dx/dt, y and decay along (dx, dp)
+    `decay`   t, x, u, p, z                                 decay rate of each state (nx,), 0 where none is given
     ========= ============================================= ==========================================
 
     Raises
@@ -193,6 +201,8 @@ class Model:
     algebraic: tuple[Quantity, ...] = ()
     initial_guess: Mapping[str, float] = field(default_factory=dict)
     """First guess of the steady state by state name; the scale of the state where it is not given."""
+    max_step_s: float = 1.0
+    """Largest step [s] at which the fast integration of this model is accurate (about 1e-5 of each state)."""
     starts_steady: bool = True
     """A record without further knowledge is taken to start near a steady state; else near `initial_guess`."""
 
@@ -296,6 +306,11 @@ class Model:
         return self._built.tangent
 
     @property
+    def decay(self) -> ca.Function:
+        """Decay rates of the fast states, see the class."""
+        return self._built.decay
+
+    @property
     def sites(self) -> tuple[str, ...]:
         """Names of the sites that the equations pass through."""
         return self._built.sites
@@ -310,6 +325,7 @@ class _Built:
     dae: ca.Function
     ode: ca.Function
     tangent: ca.Function
+    decay: ca.Function
     sites: tuple[str, ...]
 
 
@@ -355,10 +371,12 @@ def _build(model: Model) -> _Built:
         value = ca.SX(0, 1)
     xdot, _, y, s = dae(t, x, u, p, value)
     ode = ca.Function("ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options)
-    return _Built(dae, ode, _tangent(dae), tuple(scope.sites))
+    rates_of_decay = ca.vertcat(*(scope.decays.get(n, ca.SX(0)) for n in model.names("states")))
+    decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
+    return _Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites))
 
 
-def _tangent(dae: ca.Function) -> ca.Function:
+def _tangent(dae: ca.Function, decay: ca.Function) -> ca.Function:
     t, x, u, p, z = dae.sx_in()
     dx, dp = ca.SX.sym("dx", x.numel()), ca.SX.sym("dp", p.numel())
     rates, residual, y, _ = dae(t, x, u, p, z)
@@ -369,14 +387,14 @@ def _tangent(dae: ca.Function) -> ca.Function:
         dz = -moved / slope if z.numel() == 1 else -ca.solve(slope, moved)
     else:
         dz = ca.SX(0, 1)
-    both = ca.vertcat(rates, y)
+    both = ca.vertcat(rates, y, decay(t, x, u, p, z))
     change = ca.jtimes(both, ca.vertcat(known, z), ca.vertcat(direction, dz))
     nx = x.numel()
     return ca.Function(
         "tangent",
         [t, x, u, p, z, dx, dp],
-        [change[:nx], change[nx:]],
+        [change[:nx], change[nx:-nx], change[-nx:]],
         ["t", "x", "u", "p", "z", "dx", "dp"],
-        ["dxdot", "dy"],
+        ["dxdot", "dy", "ddecay"],
         {"cse": True},
     )

@@ -1,8 +1,8 @@
 """One sampling interval as one compiled function, with exact sensitivities; whole records in one call.
 
-The fast step is the classical Runge-Kutta method of order 4 on the explicit right-hand side, unrolled in SX, so
-that forward automatic differentiation gives sensitivities that are exact for the map itself. The accurate step is
-IDAS (SUNDIALS) on the index-1 DAE. No compiler is needed for either.
+The fast step (`fast_step.py`) is a Runge-Kutta method of order 4 on the explicit right-hand side, unrolled in SX, with
+sensitivities that are exact for the map itself. The accurate step is IDAS (SUNDIALS) on the index-1 DAE. No compiler is
+needed for either.
 
 Time convention: the inputs of row k are held during the interval that ends at the time of row k, and states,
 outputs and signals are those at that time.
@@ -10,6 +10,7 @@ outputs and signals are those at that time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.fast_step import Moving, fast_step, fast_step_along
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
 
@@ -56,21 +58,20 @@ class Stepper:
     dt
         Sampling interval [s].
     substeps
-        Runge-Kutta steps an interval (fast step). Largest state error of the flotation cell at dt = 1 s against the
-        reference trajectories, relative to each state: 3.4e-3 with 1, 1.4e-4 with 2, 2.4e-5 with 3.
+        Steps an interval of the fast method; default as many as the model's `max_step_s` asks for.
     accurate
         Integrate the DAE with IDAS at a relative tolerance of 1e-11 instead.
     """
 
-    def __init__(self, model: Model, dt: float, *, substeps: int = 3, accurate: bool = False) -> None:
-        if not (np.isfinite(dt) and dt > 0 and substeps >= 1):
+    def __init__(self, model: Model, dt: float, *, substeps: int | None = None, accurate: bool = False) -> None:
+        if not (np.isfinite(dt) and dt > 0 and (substeps is None or substeps >= 1)):
             raise ModelError(f"a stepper needs dt > 0 and substeps >= 1, got dt = {dt}, substeps = {substeps}")
         self.model = model
         self.dt = float(dt)
-        self.substeps = substeps
+        self.substeps = substeps or max(1, math.ceil(dt / model.max_step_s - 1e-9))
         self.accurate = accurate
         self._compiled: dict[tuple[str, tuple[str, ...], int], ca.Function] = {}
-        self.step: ca.Function = _idas_step(model, self.dt) if accurate else _rk4_step(model, self.dt, substeps)
+        self.step: ca.Function = _idas_step(model, self.dt) if accurate else fast_step(model, self.dt, self.substeps)
         """`(x, t, u, p) -> (x_next, y, s)`: t [s] at the start of the interval, y and s at its end."""
 
     @cached_property
@@ -91,9 +92,9 @@ class Stepper:
         """
         x, t, u, p = self._symbols()
         seeds = self._parameter_seeds(wrt)
-        x_next, _, y, dy = self._propagate(x, ca.SX(x.numel(), len(wrt)), t, u, p, seeds)
+        end, y = self._along(ca.SX(x.numel(), len(wrt)), seeds)
         names = ["x", "t", "u", "p"], ["x_next", "y", "dy_dtheta"]
-        return ca.Function("one_step_gradient", [x, t, u, p], [x_next, y, dy], *names, {"cse": True})
+        return ca.Function("one_step_gradient", [x, t, u, p], [end.value, y.value, y.along], *names, {"cse": True})
 
     def one_step_jacobians(self, wrt: Sequence[str]) -> ca.Function:
         """Return `(x, t, u, p) -> (x_next, y, dx_dx, dx_dtheta, dy_dx, dy_dtheta)`, exact, in forward mode."""
@@ -101,10 +102,10 @@ class Stepper:
         nx, q = x.numel(), len(wrt)
         moved = ca.horzcat(ca.SX.eye(nx), ca.SX(nx, q))
         seeds = ca.horzcat(ca.DM(p.numel(), nx), self._parameter_seeds(wrt))
-        x_next, dx, y, dy = self._propagate(x, moved, t, u, p, seeds)
-        blocks = [dx[:, :nx], dx[:, nx:], dy[:, :nx], dy[:, nx:]]
+        end, y = self._along(moved, seeds)
+        blocks = [m.along[:, columns] for m in (end, y) for columns in (slice(0, nx), slice(nx, nx + q))]
         names = ["x", "t", "u", "p"], ["x_next", "y", "dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"]
-        return ca.Function("one_step_jacobians", [x, t, u, p], [x_next, y, *blocks], *names, {"cse": True})
+        return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, {"cse": True})
 
     def simulate(
         self, x0: FloatArray, inputs: FloatArray, parameters: FloatArray | None = None, t0: float = 0.0
@@ -178,8 +179,8 @@ class Stepper:
         x, t, u, p = self._symbols()
         sensitivity = ca.SX.sym("S", x.numel(), q)
         seeds = ca.horzcat(self._parameter_seeds(wrt), ca.DM(p.numel(), q - len(wrt)))
-        x_next, moved, y, dy = self._propagate(x, sensitivity, t, u, p, seeds)
-        results = [x_next, ca.densify(moved), y, ca.densify(dy)]
+        end, y = self._along(sensitivity, seeds)
+        results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
         names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
         self._compiled[key] = ca.Function(
             f"sensitivity_step_{q}", [x, sensitivity, t, u, p], results, *names, {"cse": True}
@@ -200,37 +201,11 @@ class Stepper:
         x, t, u, p = self.step.sx_in()
         return x, t, u, p
 
+    def _along(self, moved: ca.SX, seeds: ca.DM) -> tuple[Moving, Moving]:
+        return fast_step_along(self.model, self.dt, self.substeps, self._symbols(), moved, seeds)
+
     def _parameter_seeds(self, wrt: Sequence[str]) -> ca.DM:
         return ca.DM.eye(len(self.model.parameters))[:, self.model.indices("parameters", wrt)]
-
-    def _propagate(
-        self, x: ca.SX, moved: ca.SX, t: ca.SX, u: ca.SX, p: ca.SX, seeds: ca.DM
-    ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Fast step of the state and of its derivative `moved` (nx, q): Runge-Kutta on the variational equation.
-
-        This is the derivative of the Runge-Kutta map itself, and three times cheaper than differentiating the
-        unrolled Newton iterations.
-        """
-        ode, tangent = self.model.ode, self.model.tangent
-        q = moved.shape[1]
-
-        def rates(time: ca.SX, state: ca.SX, along: ca.SX) -> tuple[ca.SX, ca.SX]:
-            xdot, _, _, z = ode(time, state, u, p)
-            return xdot, ca.horzcat(*(tangent(time, state, u, p, z, along[:, j], seeds[:, j])[0] for j in range(q)))
-
-        h = self.dt / self.substeps
-        for i in range(self.substeps):
-            ti = t + i * h
-            k1, m1 = rates(ti, x, moved)
-            k2, m2 = rates(ti + h / 2, x + h / 2 * k1, moved + h / 2 * m1)
-            k3, m3 = rates(ti + h / 2, x + h / 2 * k2, moved + h / 2 * m2)
-            k4, m4 = rates(ti + h, x + h * k3, moved + h * m3)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            moved = moved + h / 6 * (m1 + 2 * m2 + 2 * m3 + m4)
-        end = t + self.dt
-        _, y, _, z = ode(end, x, u, p)
-        dy = ca.horzcat(*(tangent(end, x, u, p, z, moved[:, j], seeds[:, j])[1] for j in range(q)))
-        return x, moved, y, dy
 
     def _tables(
         self, inputs: FloatArray, parameters: FloatArray | None, t0: float
@@ -248,23 +223,6 @@ class Stepper:
 
 def _chunks(n: int) -> list[slice]:
     return [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
-
-
-def _rk4_step(model: Model, dt: float, substeps: int) -> ca.Function:
-    t, x, u, p = model.ode.sx_in()
-    rate = model.ode
-    h = dt / substeps
-    end = x
-    for i in range(substeps):
-        ti = t + i * h
-        k1 = rate(ti, end, u, p)[0]
-        k2 = rate(ti + h / 2, end + h / 2 * k1, u, p)[0]
-        k3 = rate(ti + h / 2, end + h / 2 * k2, u, p)[0]
-        k4 = rate(ti + h, end + h * k3, u, p)[0]
-        end = end + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    _, y, s, _ = rate(t + dt, end, u, p)
-    names = ["x", "t", "u", "p"], ["x_next", "y", "s"]
-    return ca.Function("step", [x, t, u, p], [end, y, s], *names, {"cse": True})
 
 
 def _idas_step(model: Model, dt: float) -> ca.Function:

@@ -46,6 +46,7 @@ def make_model() -> Model:
             Parameter("pump_gain", 0.05, "1/s", source, "k4", 0.0, 1.0, 0.05, role="estimated"),
         ),
         outputs=(Quantity("level", "V", "measured level of the lower tank", 0.0, 12.0, 1.0),),
+        max_step_s=2.0,
         equations=_equations,
         initial_guess={"upper_level": 5.0, "lower_level": 5.0},
         starts_steady=False,

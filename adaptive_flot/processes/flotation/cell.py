@@ -69,6 +69,7 @@ def make_model(cell: Cell | None = None) -> Model:
             Quantity("valuable_solids", "kg/m3", "valuable mineral in the pulp", 0.0, scale=10.0),
         ),
         algebraic=(Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),),
+        max_step_s=1.0,
         equations=lambda m: _equations(m, masses, ratios),
         initial_guess={
             "tails_flow": 1.6e-4,
@@ -162,7 +163,7 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     total_number = sum(numbers[1:], numbers[0])
     for name, rk, vk, number in zip(ratios, r, v, numbers, strict=True):
         balance = q_air * number / total_number - area * vk * rk / (1 + gas) - (q_feed - q_tails - q_conc) * rk
-        m.derivative(name, (1 + gas) / v_pulp * balance)
+        m.derivative(name, (1 + gas) / v_pulp * balance, decay=-vk / h_p)
 
     # Level loop on the measured level (paper, Qtails, with the stable sign)
     level = m.site("level_sensor", h_p)
