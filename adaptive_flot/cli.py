@@ -52,10 +52,10 @@ def run(
     summary = run_summary(loaded, runs)
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, summary)
+    print_fits([(loaded, runs)])
     from adaptive_flot.report.html import write_run_report
 
     write_run_report([(loaded, runs)], folder / "report.html", command=_command())
-    print_fits([(loaded, runs)])
     typer.echo(f"Report: {folder / 'report.html'}")
 
 
@@ -120,10 +120,10 @@ def estimate(
         write_json(target, estimate_summary(data, result))
     if save_cell is not None:
         save_fitted_cell(result, cell, save_cell)
+    print_estimate(result)
     from adaptive_flot.report.estimate import write_estimate_report
 
     write_estimate_report(result, folder / "report.html", command=_command())
-    print_estimate(result)
     typer.echo(f"Report: {folder / 'report.html'}")
 
 

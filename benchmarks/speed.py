@@ -70,7 +70,7 @@ def _record() -> _Record:
     x0 = steady_state(model, schedule[0]).state
     plant = SimulatedPlant(model, 1.0, x0, scenario.true_parameters(), measurement_noise(scenario, 1))
     state = plant.init()
-    samples = []
+    samples: list[Sample] = []
     for row in schedule:
         if len(samples) == scenario.initial_rows:
             start = state.x

@@ -166,7 +166,9 @@ def _update_function(setup: Setup, forgetting: float, gradient: Gradient) -> ca.
         expected.append(noise[j] * ca.sqrt(spread))
         gain = present[j] * (updated @ row.T) / spread
         theta_next = theta_next + gain * (residual[j] - row @ (theta_next - theta))
-        updated = updated - gain @ (row @ updated)
+        # Joseph's form of (lupdate): the same in exact arithmetic, and never indefinite in rounded one
+        left = ca.SX.eye(q) - gain @ row
+        updated = left @ updated @ left.T + gain @ gain.T
     updated = (updated + updated.T) / 2
 
     lower = ca.DM([model.parameters[i].lower for i in columns])

@@ -15,159 +15,19 @@ it is the place where an effect can be attached without touching the equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from adaptive_flot.errors import ModelError, RangeError, near_match
+from adaptive_flot.greybox.build import Built, build
+from adaptive_flot.greybox.quantities import FloatArray, Kind, Parameter, Quantity
+from adaptive_flot.greybox.scope import Scope
 
-FloatArray = NDArray[np.float64]
-Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
-
-NEWTON_STEPS = 2
-"""Newton iterations that close the algebraic loop inside the explicit right-hand side. Convergence is quadratic from a
-physical guess: in the flotation cell the first leaves 1e-6 of the gas velocity, the second less than 1e-11."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A named physical quantity: state, input, output, signal or algebraic variable.
-
-    `lower` and `upper` are the physical range in the unit given; `scale` is a typical size, used to condition
-    solvers and as the standard deviation of an unknown initial state.
-    """
-
-    name: str
-    unit: str
-    description: str
-    lower: float = -np.inf
-    upper: float = np.inf
-    scale: float = 1.0
-
-    @property
-    def column(self) -> str:
-        """Name of the table column: the name, then the unit as a suffix.
-
-        >>> Quantity("air_flow", "m3/s", "air").column
-        'air_flow_m3_s'
-        """
-        return self.name if self.unit == "-" else f"{self.name}_{self.unit.replace('/', '_').replace(' ', '_')}"
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A model parameter with its value, unit, source, physical range and role in a calibration.
-
-    `symbol` is the letter of the literature, accepted wherever the name is. `scale` is the size of a change that
-    matters (relative scale of fits); `prior_std` the standard deviation of the prior in a calibration, None for none.
-    """
-
-    name: str
-    value: float
-    unit: str
-    source: str
-    symbol: str | None = None
-    lower: float = -np.inf
-    upper: float = np.inf
-    scale: float = 1.0
-    prior_std: float | None = None
-    role: Literal["fixed", "estimated"] = "fixed"
-
-    @property
-    def label(self) -> str:
-        """Symbol where there is one, else the name: what tables and plots print."""
-        return self.symbol or self.name
-
-
-class Scope:
-    """The symbols of one model while its equations are written. Values are scalar `casadi.SX`."""
-
-    def __init__(self, symbols: Mapping[Kind, Mapping[str, ca.SX]], time: ca.SX) -> None:
-        self.time = time
-        self._symbols = symbols
-        self.derivatives: dict[str, ca.SX] = {}
-        self.decays: dict[str, ca.SX] = {}
-        self.outputs: dict[str, ca.SX] = {}
-        self.signals: dict[str, ca.SX] = {}
-        self.residuals: dict[str, tuple[ca.SX, ca.SX]] = {}
-        self.sites: dict[str, ca.SX] = {}
-
-    def _symbol(self, kind: Kind, name: str) -> ca.SX:
-        table = self._symbols[kind]
-        if name not in table:
-            raise ModelError(f"no {name!r} among the model's {kind}; {near_match(name, table)}")
-        return table[name]
-
-    def state(self, name: str) -> ca.SX:
-        """Symbol of a state."""
-        return self._symbol("states", name)
-
-    def input(self, name: str) -> ca.SX:
-        """Symbol of an input."""
-        return self._symbol("inputs", name)
-
-    def parameter(self, name: str) -> ca.SX:
-        """Symbol of a parameter."""
-        return self._symbol("parameters", name)
-
-    def parameter_group(self, prefix: str) -> list[ca.SX]:
-        """Symbols of all parameters named `prefix.something`, in the order of the model."""
-        return [s for name, s in self._symbols["parameters"].items() if name.startswith(prefix + ".")]
-
-    def algebraic(self, name: str) -> ca.SX:
-        """Symbol of an algebraic variable; give its equation with `residual`."""
-        return self._symbol("algebraic", name)
-
-    def site(self, name: str, value: ca.SX) -> ca.SX:
-        """Pass a physical quantity through a named site, once or once per component of the same quantity."""
-        self.sites.setdefault(name, value)
-        return value
-
-    def signal(self, name: str, value: ca.SX) -> ca.SX:
-        """Name an internal quantity that tables, plots and effects may use."""
-        return self._define(self.signals, "signal", name, value)
-
-    def derivative(self, name: str, value: ca.SX, decay: ca.SX | None = None) -> None:
-        """Give d(state)/dt in the state's unit per second.
-
-        `decay` [1/s], for a fast state, is the (negative) factor of the state itself in its derivative. The fast step
-        integrates that part exactly; it changes how large a step may be, not what the equations mean.
-        """
-        self._symbol("states", name)
-        self._define(self.derivatives, "derivative", name, value)
-        if decay is not None:
-            self.decays[name] = decay
-
-    def output(self, name: str, value: ca.SX) -> None:
-        """Give an output."""
-        self._define(self.outputs, "output", name, value)
-
-    def residual(self, name: str, value: ca.SX, guess: ca.SX) -> None:
-        """Give the equation `value = 0` of an algebraic variable and an explicit first guess of it."""
-        self._symbol("algebraic", name)
-        if name in self.residuals:
-            raise ModelError(f"residual {name!r} is given twice; give each equation once")
-        self.residuals[name] = (value, guess)
-
-    def time_derivative(self, expression: ca.SX) -> ca.SX:
-        """d(expression)/dt by the chain rule over the states whose derivative has been given already."""
-        names = list(self.derivatives)
-        states = ca.vertcat(*(self._symbols["states"][n] for n in names))
-        rates = ca.vertcat(*(self.derivatives[n] for n in names))
-        partial_time = ca.jacobian(expression, self.time)
-        return ca.jtimes(expression, states, rates) + partial_time
-
-    @staticmethod
-    def _define(table: dict[str, ca.SX], what: str, name: str, value: ca.SX) -> ca.SX:
-        if name in table:
-            raise ModelError(f"{what} {name!r} is given twice; give each equation once")
-        table[name] = value
-        return value
+__all__ = ["FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
 
 
 @dataclass(frozen=True)
@@ -316,85 +176,5 @@ class Model:
         return self._built.sites
 
     @cached_property
-    def _built(self) -> _Built:
-        return _build(self)
-
-
-@dataclass(frozen=True)
-class _Built:
-    dae: ca.Function
-    ode: ca.Function
-    tangent: ca.Function
-    decay: ca.Function
-    sites: tuple[str, ...]
-
-
-def _collect(what: str, declared: Sequence[str], given: Mapping[str, ca.SX], model: str) -> ca.SX:
-    missing = [n for n in declared if n not in given]
-    extra = [n for n in given if n not in declared]
-    if missing or extra:
-        problem = f"{what} not given: {', '.join(missing)}" if missing else f"{what} not declared: {', '.join(extra)}"
-        raise ModelError(f"model '{model}': {problem}; declare and give each of them once")
-    return ca.vertcat(*(given[n] for n in declared)) if declared else ca.SX(0, 1)
-
-
-def _build(model: Model) -> _Built:
-    kinds: tuple[Kind, ...] = ("states", "inputs", "parameters", "algebraic")
-    symbols: dict[Kind, dict[str, ca.SX]] = {k: {n: ca.SX.sym(n) for n in model.names(k)} for k in kinds}
-    t = ca.SX.sym("t")
-    scope = Scope(symbols, t)
-    model.equations(scope)
-
-    x, u, p, z = (ca.vertcat(*symbols[k].values()) if symbols[k] else ca.SX(0, 1) for k in kinds)
-    rates = _collect("derivatives", model.names("states"), scope.derivatives, model.name)
-    outputs = _collect("outputs", model.names("outputs"), scope.outputs, model.name)
-    signals = _collect("signals", model.names("signals"), scope.signals, model.name)
-    residuals = {n: r for n, (r, _) in scope.residuals.items()}
-    residual = _collect("residuals", model.names("algebraic"), residuals, model.name)
-
-    options = {"cse": True}
-    dae = ca.Function(
-        "dae",
-        [t, x, u, p, z],
-        [rates, residual, outputs, signals],
-        ["t", "x", "u", "p", "z"],
-        ["xdot", "residual", "y", "s"],
-        options,
-    )
-    value = ca.vertcat(*(scope.residuals[n][1] for n in model.names("algebraic")))
-    if model.algebraic:
-        newton = ca.Function("newton", [t, x, u, p, z], [residual, ca.jacobian(residual, z)], options)
-        for _ in range(NEWTON_STEPS):
-            f, slope = newton(t, x, u, p, value)
-            value = value - (f / slope if len(model.algebraic) == 1 else ca.solve(slope, f))
-    else:
-        value = ca.SX(0, 1)
-    xdot, _, y, s = dae(t, x, u, p, value)
-    ode = ca.Function("ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options)
-    rates_of_decay = ca.vertcat(*(scope.decays.get(n, ca.SX(0)) for n in model.names("states")))
-    decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
-    return _Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites))
-
-
-def _tangent(dae: ca.Function, decay: ca.Function) -> ca.Function:
-    t, x, u, p, z = dae.sx_in()
-    dx, dp = ca.SX.sym("dx", x.numel()), ca.SX.sym("dp", p.numel())
-    rates, residual, y, _ = dae(t, x, u, p, z)
-    known, direction = ca.vertcat(x, p), ca.vertcat(dx, dp)
-    if z.numel():
-        slope = ca.jacobian(residual, z)
-        moved = ca.jtimes(residual, known, direction)
-        dz = -moved / slope if z.numel() == 1 else -ca.solve(slope, moved)
-    else:
-        dz = ca.SX(0, 1)
-    both = ca.vertcat(rates, y, decay(t, x, u, p, z))
-    change = ca.jtimes(both, ca.vertcat(known, z), ca.vertcat(direction, dz))
-    nx = x.numel()
-    return ca.Function(
-        "tangent",
-        [t, x, u, p, z, dx, dp],
-        [change[:nx], change[nx:-nx], change[-nx:]],
-        ["t", "x", "u", "p", "z", "dx", "dp"],
-        ["dxdot", "dy", "ddecay"],
-        {"cse": True},
-    )
+    def _built(self) -> Built:
+        return build(self)

@@ -167,7 +167,9 @@ def _legend_above(figure: Figure, axes: Sequence[Axes]) -> None:
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=min(len(entries), 5))
+    rows = -(-len(entries) // 5)
+    columns = -(-len(entries) // rows)  # even rows
+    figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=columns)
 
 
 def _draw_residuals(ax: Axes, row: Residuals) -> None:
@@ -177,6 +179,7 @@ def _draw_residuals(ax: Axes, row: Residuals) -> None:
         ax.axhline(level, color="black", lw=0.8, ls=(0, (4, 2)))
     ax.set_ylabel("innovation / std [–]")
     ax.set_title(row.label)
+    ax.xaxis.set_major_locator(MaxNLocator(4, steps=_TIME_STEPS))
     ax.margins(x=0)
 
 
@@ -212,10 +215,11 @@ def p_text(p: float) -> str:
 def _draw_histogram(ax: Axes, row: Residuals) -> None:
     finite = row.values[np.isfinite(row.values)]
     look = {"color": _look(row.role, row.index)["color"], "alpha": 0.55}
-    ax.hist(finite, bins=30, density=True, **look)
+    if len(finite):
+        ax.hist(finite, bins=30, density=True, **look)
     x = np.linspace(-4.0, 4.0, 161)
     ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="black", lw=1.1)
-    ax.set_title("with N(0, 1)")
+    ax.set_title("histogram, N(0, 1)")
     ax.set_ylabel("density [–]")
 
 

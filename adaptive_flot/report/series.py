@@ -11,6 +11,7 @@ import pandas as pd
 
 from adaptive_flot.greybox.model import FloatArray, Quantity
 from adaptive_flot.report.plotdata import Panel, Residuals, Role, Spread, Trace
+from adaptive_flot.report.style import exponent, unit_text
 from adaptive_flot.runner.estimate import ljung_box_p
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
@@ -79,7 +80,7 @@ class Case:
 
     def shown(self, run: Run) -> pd.DataFrame:
         """Rows of a run that the report shows and the fits use: t > `fits_after_s`."""
-        return run.table[run.table["time_s"] > self.scenario.file.fits_after_s + 1e-9]
+        return run.table[run.table["time_s"] > self.scenario.fits_after + 1e-9]
 
 
 def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[Case]:
@@ -98,7 +99,7 @@ def input_panels(case: Case) -> tuple[list[Panel], list[str]]:
         name = q.name.replace("_", " ")
         lines = _distinct(case, q.column)
         if not any(_moves(values) for _, _, values in lines):
-            still.append(f"{name} {lines[0][2][0]:.4g} {q.unit if q.unit != '-' else ''}".strip())
+            still.append(f"{name} {_amount(float(lines[0][2][0]), q.unit)}")
             continue
         traces = [
             Trace(_suffixed("input", who), time, values, Role.ESTIMATE, j, held=True)
@@ -190,6 +191,13 @@ def _distinct(case: Case, column: str) -> list[tuple[str, FloatArray, FloatArray
 def _truth(case: Case, column: str) -> list[Trace]:
     courses = enumerate(_distinct(case, column))
     return [Trace(_suffixed("truth", who), time, values, Role.TRUTH, j) for j, (who, time, values) in courses]
+
+
+def _amount(value: float, unit: str) -> str:
+    """Value and unit as text: "1.67 × 10⁻⁴ m³/s"."""
+    power = exponent(np.array([value]))
+    scaled = f"{value * 10.0**-power:.4g}" + (" ×" if power else "")
+    return scaled if unit == "-" and not power else f"{scaled} {unit_text(unit, power)}"
 
 
 def _suffixed(text: str, who: str) -> str:

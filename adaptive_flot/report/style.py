@@ -6,6 +6,7 @@ import base64
 import io
 import re
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import wraps
 from typing import Any, ParamSpec
 from urllib.parse import quote
@@ -62,10 +63,17 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
     @wraps(draw)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with matplotlib.rc_context({**matplotlib.rcParamsDefault, **LOOK, "backend": "agg"}):
+        with _look():
             return draw(*args, **kwargs)
 
     return wrapped
+
+
+def _look() -> AbstractContextManager[None]:
+    """Use the defaults of matplotlib and our changes; the backend belongs to the caller (figures here need none)."""
+    settings: Any = {**matplotlib.rcParamsDefault, **LOOK}
+    del settings["backend"]
+    return matplotlib.rc_context(settings)
 
 
 def colour(index: int) -> str:
@@ -126,7 +134,7 @@ def _svg_uri(svg: bytes) -> str:
 
 def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
     stream = io.BytesIO()
-    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **LOOK, "backend": "agg"}):
+    with _look():
         figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else None, **options)
     return _shorter(stream.getvalue()) if kind == "svg" else stream.getvalue()
 

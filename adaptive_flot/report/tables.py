@@ -13,7 +13,9 @@ from adaptive_flot.report.figures import p_text
 from adaptive_flot.report.page import Table, number
 from adaptive_flot.report.plotdata import Role
 from adaptive_flot.report.series import Case, residuals
-from adaptive_flot.report.style import unit_text
+from adaptive_flot.report.style import exponent, unit_text
+from adaptive_flot.runner.estimate import WHITENESS_LAGS
+from adaptive_flot.runner.study import Run
 
 SIGNIFICANT = 0.05
 """p value below which innovations are called not white."""
@@ -36,17 +38,16 @@ def fits_table(case: Case) -> Table:
     for who in case.roles:
         for quantity in quantities(case):
             fits, published = case.fits(who, quantity), case.published(who, quantity)
-            beside = (
-                ("–", "–") if published is None else (number(published), number(median(fits) - published, "+.2f"))
-            )
-            rows.append((who, _spaced(quantity), number(median(fits)), _range(fits), *beside))
-    after = case.scenario.file.fits_after_s
+            beside = ("–", "–") if published is None else (number(published), number(median(fits) - published, "+.2f"))
+            row = (who, _spaced(quantity), number(median(fits)), _range(fits))
+            rows.append((*row, *beside) if case.scenario.file.published else row)
+    after = case.scenario.fits_after
     caption = (
-        f"Fit in percent, 100 (1 − ‖truth − estimate‖ / ‖truth‖) over t > {after:g} s; the estimate of an output is its "
-        f"prediction before the sample is used. Over {seeds_text(case)}."
+        f"Fit in percent, 100 (1 − ‖truth − estimate‖ / ‖truth‖) over t > {after:g} s; the estimate of an output is "
+        f"its prediction before the sample is used. Over {seeds_text(case)}."
     )
-    header = ("Estimator", "Quantity", "Median", "Min – max", "Published", "Difference")
-    return Table(caption, header, tuple(rows), words=2)
+    header = ("Estimator", "Quantity", "Median", "Min\u00a0–\u00a0max", "Published", "Difference")
+    return Table(caption, header if case.scenario.file.published else header[:4], tuple(rows), words=2)
 
 
 def parameter_table(case: Case) -> Table:
@@ -54,8 +55,8 @@ def parameter_table(case: Case) -> Table:
     rows = []
     for who, (role, _) in case.roles.items():
         for label in case.labels:
-            errors = [relative_error(case, run_index, who, label) for run_index in range(len(case.of(who)))]
-            inside = np.array([coverage(case, i, who, label) for i in range(len(case.of(who)))])
+            errors = [relative_error(case, run, label) for run in case.of(who)]
+            inside = np.array([coverage(case, run, label) for run in case.of(who)])
             rms = median(np.array([100 * rmse(e) for e in errors]))
             last = median(np.array([100 * e[-1] for e in errors]))
             within = number(100 * median(inside), ".0f") if role is Role.ESTIMATE else "–"
@@ -77,8 +78,8 @@ def innovation_table(case: Case) -> Table:
             rejected = f"{int(np.sum(p < SIGNIFICANT))} of {int(np.sum(np.isfinite(p)))}"
             rows.append((_spaced(q.name), who, number(bias, "+.2f"), number(size), p_text(p[0]), rejected))
     caption = (
-        "Innovations (measured − predicted) divided by the standard deviation the estimator expects: white with mean 0 "
-        f"and RMS 1 if model and noise are right. Mean and RMS are medians over {seeds_text(case)}; Ljung–Box over 20 lags."
+        "Innovations (measured − predicted) over the standard deviation the estimator expects: white with mean 0, "
+        f"RMS 1 if all is right. Mean and RMS: medians over {seeds_text(case)}. p: Ljung–Box, {WHITENESS_LAGS} lags."
     )
     first = f"p, seed {case.seeds[0]}"
     header = ("Output", "Estimator", "Mean", "RMS", first, f"Seeds with p < {SIGNIFICANT:g}")
@@ -90,22 +91,34 @@ def initial_table(case: Case) -> Table:
     fits = {run.seed: run.initial for run in case.runs}
     first = fits[case.seeds[0]]
     table = next(iter(case.first.values())).table
-    guesses = dict(zip(case.labels, case.scenario.model.with_parameters(case.scenario.file.initial_estimate.guess).parameter_values[
-        case.scenario.model.indices("parameters", case.scenario.setup.parameters)], strict=True))
+    model, part = case.scenario.model, case.scenario.file.initial_estimate
+    started = model.with_parameters(part.guess).parameter_values
+    guesses = dict(zip(case.labels, started[model.indices("parameters", case.scenario.setup.parameters)], strict=True))
     rows = []
-    for estimate, (_, _, verdict) in zip(first.estimates, first.identifiability.parameters, strict=True):
+    for estimate, (_, _, judged) in zip(first.estimates, first.identifiability.parameters, strict=True):
         every = np.array([e.value for fit in fits.values() for e in fit.estimates if e.label == estimate.label])
         label = estimate.label
         truth = table[f"{label}_true"].iloc[0] if f"{label}_true" in table else float("nan")
         guess = guesses.get(label, float("nan"))
-        rows.append((label, unit_text(estimate.unit), verdict, *(number(v, ".4g") for v in (truth, guess, estimate.value)),
-                     number(estimate.std, ".2g"), f"{number(every.min(), '.4g')} – {number(every.max(), '.4g')}"))
-    part = case.scenario.file.initial_estimate
+        power = exponent(np.array([estimate.value]))
+        scaled = (10.0**-power * v for v in (truth, guess, estimate.value, estimate.std, every.min(), every.max()))
+        *values, low, high = (number(v, ".3f") for v in scaled)
+        rows.append((label, unit_text(estimate.unit, power), judged, *values, f"{low} – {high}"))
+    verdict = first.identifiability.verdict
     caption = (
-        f"Initial estimate by {part.method} from the record up to {part.until_s:g} s, seed {case.seeds[0]}; last column over "
-        f"{seeds_text(case)}. {first.identifiability.verdict[:1].upper()}{first.identifiability.verdict[1:]}."
+        f"Initial estimate by {part.method} from the record up to {part.until_s:g} s, seed {case.seeds[0]}; last "
+        f"column over {seeds_text(case)}. In words: {verdict}."
     )
-    header = ("Parameter", "Unit", "Verdict", "Truth at the start", "First guess", "Estimate", "σ", "Min – max")
+    header = (
+        "Parameter",
+        "Unit",
+        "Verdict",
+        "Truth at the start",
+        "First guess",
+        "Estimate",
+        "σ",
+        "Min\u00a0–\u00a0max",
+    )
     return Table(caption, header, tuple(rows), words=3)
 
 
@@ -116,26 +129,32 @@ def status_table(case: Case) -> Table:
     for who in case.roles:
         runs = case.of(who)
         counts = (sum(run.status_counts.get(s.name.lower(), 0) for run in runs) for s in known)
-        rows.append((who, *(f"{n:,}".replace(",", " ") for n in counts), number(median(np.array([r.seconds for r in runs])))))
-    caption = f"Statuses of the samples of all runs ({seeds_text(case)}) and median wall-clock time of a run."
+        took = median(np.array([r.seconds for r in runs]))
+        rows.append((who, *(f"{n:,}".replace(",", " ") for n in counts), number(took)))
+    caption = (
+        "Samples of all runs by status, and median wall-clock time of a run (that of the first estimator holds the "
+        "initial fit, which the others share)."
+    )
     header = ("Estimator", *(s.value[:1].upper() + s.value[1:] for s in known), "Time of a run [s]")
     return Table(caption, header, tuple(rows))
 
 
-def relative_error(case: Case, index: int, estimator: str, label: str) -> FloatArray:
-    """(estimate − truth) / truth of a parameter over the rows shown (N,), in one run of an estimator."""
-    table = case.shown(case.of(estimator)[index])
+def relative_error(case: Case, run: Run, label: str) -> FloatArray:
+    """(estimate − truth) / truth of a parameter over the rows shown (N,)."""
+    table = case.shown(run)
     true = table[f"{label}_true"].to_numpy()
     error: FloatArray = (table[f"{label}_estimate"].to_numpy() - true) / true
     return error
 
 
-def coverage(case: Case, index: int, estimator: str, label: str) -> float:
+def coverage(case: Case, run: Run, label: str) -> float:
     """Share of the rows shown in which the truth lies within two standard deviations of the estimate."""
-    table = case.shown(case.of(estimator)[index])
+    table = case.shown(run)
     distance = np.abs(table[f"{label}_estimate"].to_numpy() - table[f"{label}_true"].to_numpy())
     known = np.isfinite(distance)
-    return float(np.mean(distance[known] <= 2 * table[f"{label}_std"].to_numpy()[known])) if known.any() else float("nan")
+    if not known.any():
+        return float("nan")
+    return float(np.mean(distance[known] <= 2 * table[f"{label}_std"].to_numpy()[known]))
 
 
 def seeds_text(case: Case) -> str:

@@ -83,7 +83,8 @@ class ScenarioFile(_Part):
     initial_estimate: InitialEstimate
     estimators: dict[str, Plugin] = Field(min_length=1)
     controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
-    fits_after_s: float = Field(default=0.0, ge=0)
+    fits_after_s: float | None = None
+    """Fits are taken over later times; default from the end of the initial record on."""
     published: Published | None = None
 
 
@@ -120,6 +121,12 @@ class Scenario:
     def starts(self) -> FloatArray:
         """Start of each sampling interval [s] (N,)."""
         return self.dt * np.arange(round(self.file.duration_s / self.dt), dtype=float)
+
+    @property
+    def fits_after(self) -> float:
+        """Fits are taken over times after this one [s]."""
+        given = self.file.fits_after_s
+        return self.file.initial_estimate.until_s if given is None else given
 
     @property
     def initial_rows(self) -> int:
@@ -227,8 +234,11 @@ def _check(scenario: Scenario) -> None:
         raise ScenarioError(f"{scenario.path}: duration_s must be a whole number (2 or more) of sampling_s intervals")
     if not file.initial_estimate.until_s < file.duration_s:
         raise ScenarioError(f"{scenario.path}: initial_estimate.until_s must lie before the end, {file.duration_s:g} s")
-    if not file.fits_after_s < file.duration_s:
-        raise ScenarioError(f"{scenario.path}: fits_after_s must lie before the end, {file.duration_s:g} s")
+    if not file.initial_estimate.until_s <= scenario.fits_after < file.duration_s:
+        raise ScenarioError(
+            f"{scenario.path}: fits_after_s = {scenario.fits_after:g} must lie between initial_estimate.until_s "
+            f"({file.initial_estimate.until_s:g} s) and the end ({file.duration_s:g} s); correct it"
+        )
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
 

@@ -241,7 +241,7 @@ def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
 
 def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
     """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
-    late = table[table["time_s"] > scenario.file.fits_after_s + 1e-9]
+    late = table[table["time_s"] > scenario.fits_after + 1e-9]
     model, setup = scenario.model, scenario.setup
     labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
     found = {x: metrics.fit(late[f"{x}_true"].to_numpy(), late[f"{x}_estimate"].to_numpy()) for x in labels}

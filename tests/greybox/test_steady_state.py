@@ -12,10 +12,8 @@ from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradie
 from benchmarks import scipy_reference as reference
 
 NOMINAL = np.array([1.5e-3, 1.67e-4, 0.38])
-operating_point = st.tuples(st.floats(9.05e-4, 2.17e-3), st.floats(1.0e-4, 3.0e-4), st.floats(0.345, 0.45)).map(
-    np.array
-)
-froth = st.tuples(st.floats(0.8, 1.25), st.floats(5e-4, 8e-4)).map(np.array)
+operating_point = st.tuples(st.floats(9.05e-4, 2.17e-3), st.floats(1e-4, 3e-4), st.floats(0.345, 0.42)).map(np.array)
+froth = st.tuples(st.floats(1.0, 1.25), st.floats(6e-4, 8e-4)).map(np.array)
 
 
 def with_froth(model: Model, theta: FloatArray) -> FloatArray:

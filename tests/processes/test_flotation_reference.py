@@ -85,7 +85,7 @@ def test_first_row_of_the_stored_trajectories(
 @integrators
 @pytest.mark.parametrize("seed", [0, 1])
 def test_random_record_of_the_scipy_reference(model: Model, stepper: Stepper, integrator: str, seed: int) -> None:
-    """Air, feed and set-point jump every 15 s, n and C move with them; LSODA with a root find in the right-hand side."""
+    """Air, feed and set-point jump every 15 s, n and C move with them; LSODA with an inner root find."""
     rng = np.random.default_rng(seed)
     low, high = [9.05e-4, 1.3e-4, 0.34, 0.95, 6e-4], [2.17e-3, 2.2e-4, 0.42, 1.25, 8e-4]
     held = np.repeat(rng.uniform(low, high, (10, 5)), 15, axis=0)

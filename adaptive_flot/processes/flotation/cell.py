@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.processes.flotation import froth, pulp
-from adaptive_flot.processes.flotation.parameters import Cell, default_cell
+from adaptive_flot.processes.flotation.cell_file import default_cell
+from adaptive_flot.processes.flotation.parameters import Cell
 
 
 def make_model(cell: Cell | None = None) -> Model:

@@ -51,7 +51,8 @@ def settling_velocity(
 
 def axial_dispersion(jg: ca.SX, k1: ca.SX, peclet: ca.SX) -> ca.SX:
     """D_axial = j_g^1.5 / (sqrt(k_1 (sqrt 3 - pi/2)) Pe) [m2/s] (Part I, 58)."""
-    return jg**1.5 / (ca.sqrt(k1 * (np.sqrt(3) - np.pi / 2)) * peclet)
+    dispersion: ca.SX = jg**1.5 / (ca.sqrt(k1 * (np.sqrt(3) - np.pi / 2)) * peclet)
+    return dispersion
 
 
 def froth_recovery(a: ca.SX, vg: ca.SX, settling: ca.SX, d_int: ca.SX, d_froth: ca.SX) -> ca.SX:

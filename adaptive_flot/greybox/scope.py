@@ -1,0 +1,96 @@
+"""The symbols of one model while its equations are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.quantities import Kind
+
+
+class Scope:
+    """The symbols of one model while its equations are written. Values are scalar `casadi.SX`."""
+
+    def __init__(self, symbols: Mapping[Kind, Mapping[str, ca.SX]], time: ca.SX) -> None:
+        self.time = time
+        self._symbols = symbols
+        self.derivatives: dict[str, ca.SX] = {}
+        self.decays: dict[str, ca.SX] = {}
+        self.outputs: dict[str, ca.SX] = {}
+        self.signals: dict[str, ca.SX] = {}
+        self.residuals: dict[str, tuple[ca.SX, ca.SX]] = {}
+        self.sites: dict[str, ca.SX] = {}
+
+    def _symbol(self, kind: Kind, name: str) -> ca.SX:
+        table = self._symbols[kind]
+        if name not in table:
+            raise ModelError(f"no {name!r} among the model's {kind}; {near_match(name, table)}")
+        return table[name]
+
+    def state(self, name: str) -> ca.SX:
+        """Symbol of a state."""
+        return self._symbol("states", name)
+
+    def input(self, name: str) -> ca.SX:
+        """Symbol of an input."""
+        return self._symbol("inputs", name)
+
+    def parameter(self, name: str) -> ca.SX:
+        """Symbol of a parameter."""
+        return self._symbol("parameters", name)
+
+    def parameter_group(self, prefix: str) -> list[ca.SX]:
+        """Symbols of all parameters named `prefix.something`, in the order of the model."""
+        return [s for name, s in self._symbols["parameters"].items() if name.startswith(prefix + ".")]
+
+    def algebraic(self, name: str) -> ca.SX:
+        """Symbol of an algebraic variable; give its equation with `residual`."""
+        return self._symbol("algebraic", name)
+
+    def site(self, name: str, value: ca.SX) -> ca.SX:
+        """Pass a physical quantity through a named site, once or once per component of the same quantity."""
+        self.sites.setdefault(name, value)
+        return value
+
+    def signal(self, name: str, value: ca.SX) -> ca.SX:
+        """Name an internal quantity that tables, plots and effects may use."""
+        return self._define(self.signals, "signal", name, value)
+
+    def derivative(self, name: str, value: ca.SX, decay: ca.SX | None = None) -> None:
+        """Give d(state)/dt in the state's unit per second.
+
+        `decay` [1/s], for a fast state, is the (negative) factor of the state itself in its derivative. The fast step
+        integrates that part exactly; it changes how large a step may be, not what the equations mean.
+        """
+        self._symbol("states", name)
+        self._define(self.derivatives, "derivative", name, value)
+        if decay is not None:
+            self.decays[name] = decay
+
+    def output(self, name: str, value: ca.SX) -> None:
+        """Give an output."""
+        self._define(self.outputs, "output", name, value)
+
+    def residual(self, name: str, value: ca.SX, guess: ca.SX) -> None:
+        """Give the equation `value = 0` of an algebraic variable and an explicit first guess of it."""
+        self._symbol("algebraic", name)
+        if name in self.residuals:
+            raise ModelError(f"residual {name!r} is given twice; give each equation once")
+        self.residuals[name] = (value, guess)
+
+    def time_derivative(self, expression: ca.SX) -> ca.SX:
+        """d(expression)/dt by the chain rule over the states whose derivative has been given already."""
+        names = list(self.derivatives)
+        states = ca.vertcat(*(self._symbols["states"][n] for n in names))
+        rates = ca.vertcat(*(self.derivatives[n] for n in names))
+        partial_time = ca.jacobian(expression, self.time)
+        return ca.jtimes(expression, states, rates) + partial_time
+
+    @staticmethod
+    def _define(table: dict[str, ca.SX], what: str, name: str, value: ca.SX) -> ca.SX:
+        if name in table:
+            raise ModelError(f"{what} {name!r} is given twice; give each equation once")
+        table[name] = value
+        return value

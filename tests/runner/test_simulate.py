@@ -1,0 +1,108 @@
+"""Simulating a table: what comes out is the stepper's run of what went in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.tables import write_table
+from adaptive_flot.runner.simulate import simulate_file, simulate_record
+
+ROWS = 30
+
+
+@pytest.fixture
+def record(model: Model) -> Dataset:
+    """Half a minute with an air step and a drifting C."""
+    inputs = np.tile([1.5e-3, 1.67e-4, 0.38], (ROWS, 1))
+    inputs[10:, 0] = 1.7e-3
+    outputs = np.full((ROWS, len(model.outputs)), np.nan)
+    drift = {"coalescence_rate": 6.38e-4 * np.linspace(1.0, 1.1, ROWS)}
+    return Dataset("table", 5.0 + np.arange(ROWS), 1.0, inputs, outputs, drift)
+
+
+def test_it_is_the_stepper_from_the_steady_state_of_the_first_row(model: Model, record: Dataset) -> None:
+    """Row 0 is the initial instant: its inputs and parameters are those of the steady state; row 1 is the first step."""
+    table = simulate_record(record, model)
+    p = np.tile(model.parameter_values, (ROWS, 1))
+    p[:, model.index("parameters", "C")] = record.parameters["coalescence_rate"]
+    x0 = steady_state(model, record.inputs[0], p[0]).state
+    run = Stepper(model, 1.0).simulate(x0, record.inputs[1:], p[1:])
+    for j, q in enumerate(model.states):
+        np.testing.assert_allclose(table[q.column], [x0[j], *run.states[:, j]], rtol=1e-12)
+    for j, q in enumerate(model.outputs):
+        np.testing.assert_allclose(table[q.column].iloc[1:], run.outputs[:, j], rtol=1e-12)
+    for j, q in enumerate(model.signals):
+        np.testing.assert_allclose(table[q.column].iloc[1:], run.signals[:, j], rtol=1e-12)
+    np.testing.assert_array_equal(table["C"], record.parameters["coalescence_rate"])
+    np.testing.assert_array_equal(table["time_s"], record.time)
+    grade = table["concentrate_grade"]
+    assert grade.iloc[0] == pytest.approx(grade.iloc[1], rel=1e-2) and grade.iloc[-1] != pytest.approx(grade.iloc[0])
+
+
+def test_a_steady_record_stays_where_it_is(model: Model, record: Dataset) -> None:
+    constant = replace(record, inputs=np.tile(record.inputs[0], (ROWS, 1)), parameters={})
+    table = simulate_record(constant, model)
+    values = table.drop(columns="time_s").to_numpy(dtype=float)
+    np.testing.assert_allclose(values, np.tile(values[0], (ROWS, 1)), rtol=1e-9)
+
+
+def test_the_rest_of_a_simulation_can_be_simulated_from_its_table(
+    model: Model, record: Dataset, tmp_path: Path
+) -> None:
+    """The states in the first row of a table are its initial condition, whatever its inputs are."""
+    whole = simulate_record(record, model)
+    write_table(whole.iloc[12:], tmp_path / "rest.parquet")
+    rest = simulate_file(tmp_path / "rest.parquet", model)
+    for column in whole.columns:
+        np.testing.assert_allclose(rest[column], whole[column].iloc[12:], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("state", "value", "says"),
+    [("level", 0.6, "level"), ("m_valuable", -1.0, "m_valuable"), ("gas_ratio_1", 2.0, "gas_ratio_1")],
+)
+def test_a_state_outside_its_range_is_named_with_the_time(
+    model: Model, record: Dataset, state: str, value: float, says: str
+) -> None:
+    x0 = steady_state(model, record.inputs[0]).state
+    x0[model.index("states", state)] = value
+    with pytest.raises(RangeError, match=rf"table: .*{says}.* at time 5 s") as caught:
+        simulate_record(replace(record, initial_state=x0), model)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("accurate", [False, True])
+def test_a_run_that_leaves_the_model_is_an_error_with_the_time_it_did(
+    model: Model, record: Dataset, accurate: bool
+) -> None:
+    """No feed for ten minutes while the set-point rises to the lip: the froth is drawn into the tails."""
+    rows = 600
+    inputs = np.tile([5.3e-3, 1.67e-4, 0.479], (rows, 1))
+    inputs[:5] = [9.1e-4, 1.67e-4, 0.33]
+    long = replace(
+        record,
+        time=np.arange(rows, dtype=float),
+        inputs=inputs,
+        outputs=np.full((rows, len(model.outputs)), np.nan),
+        parameters={},
+    )
+    with pytest.raises(RangeError, match=r"table: .* at time [0-9.]+ s") as caught:
+        simulate_record(long, model, accurate=accurate)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [0.1, 9.0])
+def test_a_parameter_outside_its_range_is_named_with_the_time(model: Model, record: Dataset, value: float) -> None:
+    n = np.ones(ROWS)
+    n[7] = value
+    with pytest.raises(RangeError, match=rf"table: parameter n = {value:g} - at time 12 s"):
+        simulate_record(replace(record, parameters={"growth_exponent": n}), model)
