@@ -27,7 +27,7 @@ def progress_bar(label: str, total: int) -> Iterator[Callable[[], None]]:
 
 def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
     """Print the fits of each scenario and estimator, median [range] over the seeds, beside the published ones."""
-    table = Table(title="Fit [%], median [range] over the seeds; published value in brackets")
+    table = Table(title="Fit in percent: median and range over the seeds, published value in brackets")
     for heading in ("scenario", "estimator", "seeds"):
         table.add_column(heading)
     keys = list(dict.fromkeys(key for _, runs in results for run in runs for key in run.fit))

@@ -20,9 +20,8 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import Prior, Sample
-from adaptive_flot.runner.plant import SimulatedPlant
 from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import measurement_noise
+from adaptive_flot.runner.study import simulate_plant
 from benchmarks import scipy_reference
 from estimators.rpem import Rpem
 
@@ -67,15 +66,8 @@ class _Record:
 def _record() -> _Record:
     scenario = load_scenario("paper_scenario_1")
     model, schedule = scenario.model, scenario.schedule(1)
-    x0 = steady_state(model, schedule[0]).state
-    plant = SimulatedPlant(model, 1.0, x0, scenario.true_parameters(), measurement_noise(scenario, 1))
-    state = plant.init()
-    samples: list[Sample] = []
-    for row in schedule:
-        if len(samples) == scenario.initial_rows:
-            start = state.x
-        state, record = plant.apply(state, row)
-        samples.append(record.sample)
+    samples = [record.sample for record in simulate_plant(scenario, 1)]
+    start = steady_state(model, schedule[scenario.initial_rows]).state
     nominal = scipy_reference.THETA_NOMINAL.copy()
     prior = Prior(600.0, start, nominal, np.diag((0.01 * nominal) ** 2), np.array([1e-3]))
     late = samples[scenario.initial_rows :]

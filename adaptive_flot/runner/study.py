@@ -15,9 +15,10 @@ from adaptive_flot.batch import BatchFit
 from adaptive_flot.errors import ScenarioError, near_match
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
-from adaptive_flot.protocols import ControllerSetup, Prior, Status
+from adaptive_flot.protocols import ControllerSetup, PlantRecord, Prior, Setup, Status
 from adaptive_flot.runner.loop import Step, run_loop
 from adaptive_flot.runner.plant import SimulatedPlant
 from adaptive_flot.runner.scenario import Plugin, Scenario
@@ -115,18 +116,8 @@ def _run(
     scenario: Scenario, name: str, plugin: Plugin, controller_name: str, seed: int, initial: dict[str, BatchFit]
 ) -> Run:
     begin = time.perf_counter()
-    model, folder = scenario.model, scenario.path.parent
+    folder = scenario.path.parent
     schedule = scenario.schedule(seed)
-    parameters = scenario.true_parameters()
-    x0 = steady_state(model, schedule[0], parameters[0]).state
-    plant = SimulatedPlant(
-        model,
-        scenario.dt,
-        x0,
-        parameters,
-        measurement_noise(scenario, seed),
-        accurate=scenario.file.plant.integrator == "accurate",
-    )
     factory = load(plugin.use, ESTIMATORS, "estimator", folder)
     estimator = construct(factory, plugin.use, "estimator", scenario.setup, **plugin.options)
     chosen = scenario.file.controllers[controller_name]
@@ -134,7 +125,7 @@ def _run(
         load(chosen.use, CONTROLLERS, "controller", folder),
         chosen.use,
         "controller",
-        ControllerSetup(model, scenario.dt, schedule),
+        ControllerSetup(scenario.model, scenario.dt, schedule),
         **chosen.options,
     )
 
@@ -145,7 +136,7 @@ def _run(
         return prior if plugin.start == "initial_estimate" else _nominal(scenario, steps, prior)
 
     steps = run_loop(
-        plant,
+        make_plant(scenario, seed),
         estimator,
         controller,
         len(schedule),
@@ -160,6 +151,25 @@ def _run(
     )
 
 
+def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
+    """Plant of a run: at the steady state of its first planned inputs, with its own drift and noise."""
+    parameters = scenario.true_parameters()
+    x0 = steady_state(scenario.model, scenario.schedule(seed)[0], parameters[0]).state
+    noise = measurement_noise(scenario, seed)
+    accurate = scenario.file.plant.integrator == "accurate"
+    return SimulatedPlant(scenario.model, scenario.dt, x0, parameters, noise, accurate=accurate)
+
+
+def simulate_plant(scenario: Scenario, seed: int) -> list[PlantRecord]:
+    """What the plant of a run shows under the planned inputs, one record an interval, without any estimator."""
+    plant = make_plant(scenario, seed)
+    state, records = plant.init(), []
+    for inputs in scenario.schedule(seed):
+        state, record = plant.apply(state, inputs)
+        records.append(record)
+    return records
+
+
 def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
     """White Gaussian noise of a run (N, ny), the same for every estimator; NaN where nothing is measured."""
     generator = np.random.default_rng([seed, 0])
@@ -170,7 +180,7 @@ def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
 def initial_fit(scenario: Scenario, steps: list[Step]) -> BatchFit:
     """Batch fit of the first steps, from the scenario's guess."""
     part = scenario.file.initial_estimate
-    guess = scenario.setup.__class__(
+    guess = Setup(
         scenario.model.with_parameters(part.guess), scenario.dt, scenario.setup.parameters, scenario.setup.outputs
     )
     factory = load(part.method, BATCH_ESTIMATORS, "batch estimator", scenario.path.parent)
@@ -193,8 +203,6 @@ def record_of(steps: list[Step]) -> Dataset:
 
 def _nominal(scenario: Scenario, steps: list[Step], prior: Prior) -> Prior:
     """Nominal parameters and their own free run from the steady state of the first inputs."""
-    from adaptive_flot.greybox.record import RecordSimulator
-
     model, record = scenario.model, record_of(steps)
     x0 = steady_state(model, record.inputs[0]).state
     state = RecordSimulator(model, scenario.dt).last_state(record, x0, model.parameter_values)

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
+from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.runner.scenario import load_scenario, shipped_scenarios
 from adaptive_flot.runner.study import run_scenario
+from benchmarks import scipy_reference
 from tests.runner.conftest import WriteScenario
 
 PROFILE = "inputs.air_flow_m3_s"
@@ -135,6 +137,16 @@ def test_every_shipped_scenario_loads_by_name_and_is_that_of_the_paper(name: str
         factor = truth[:, model.index("parameters", label)] / truth[0, model.index("parameters", label)]
         assert factor[start - 1] == 1.0 and factor[end] == pytest.approx(1.2)
         assert factor[(start + end) // 2] == pytest.approx(1.2 if name.endswith("step") else 1.1)
+
+
+@pytest.mark.parametrize("level", np.linspace(0.33, 0.42, 7).round(3))
+@pytest.mark.parametrize("air", [9.05e-4, 2.17e-3])
+def test_every_start_that_the_paper_s_scenarios_may_draw_has_its_steady_state(air: float, level: float) -> None:
+    """A run starts steady at its first inputs; the level set-point is any in [0.33, 0.42] m, another for each seed."""
+    u = np.array([air, 1.67e-4, level])
+    expected = scipy_reference.steady_state(u, scipy_reference.THETA_NOMINAL)
+    found = steady_state(load_scenario("paper_scenario_1").model, u).state
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
 
 
 def test_a_shipped_scenario_is_found_by_file_name_too() -> None:

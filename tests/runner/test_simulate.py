@@ -30,7 +30,7 @@ def record(model: Model) -> Dataset:
 
 
 def test_it_is_the_stepper_from_the_steady_state_of_the_first_row(model: Model, record: Dataset) -> None:
-    """Row 0 is the initial instant: its inputs and parameters are those of the steady state; row 1 is the first step."""
+    """Row 0 is the initial instant, steady at its own inputs and parameters; row 1 is the first step."""
     table = simulate_record(record, model)
     p = np.tile(model.parameter_values, (ROWS, 1))
     p[:, model.index("parameters", "C")] = record.parameters["coalescence_rate"]
@@ -81,20 +81,17 @@ def test_a_state_outside_its_range_is_named_with_the_time(
 
 
 @pytest.mark.parametrize("accurate", [False, True])
+@pytest.mark.parametrize(
+    ("feed", "setpoint"), [(1.7e-3, 0.38), (1.67e-4, 0.001)], ids=["pulp over the lip", "froth breaks down"]
+)
 def test_a_run_that_leaves_the_model_is_an_error_with_the_time_it_did(
-    model: Model, record: Dataset, accurate: bool
+    model: Model, record: Dataset, feed: float, setpoint: float, accurate: bool
 ) -> None:
-    """No feed for ten minutes while the set-point rises to the lip: the froth is drawn into the tails."""
-    rows = 600
-    inputs = np.tile([5.3e-3, 1.67e-4, 0.479], (rows, 1))
-    inputs[:5] = [9.1e-4, 1.67e-4, 0.33]
-    long = replace(
-        record,
-        time=np.arange(rows, dtype=float),
-        inputs=inputs,
-        outputs=np.full((rows, len(model.outputs)), np.nan),
-        parameters={},
-    )
+    """Ten times the feed, or a set-point at the bottom: the inputs are in their range, the states do not stay so."""
+    inputs = np.tile([1.5e-3, feed, setpoint], (300, 1))
+    inputs[:5] = [1.5e-3, 1.67e-4, 0.38]
+    outputs = np.full((300, len(model.outputs)), np.nan)
+    long = replace(record, time=np.arange(300.0), inputs=inputs, outputs=outputs, parameters={})
     with pytest.raises(RangeError, match=r"table: .* at time [0-9.]+ s") as caught:
         simulate_record(long, model, accurate=accurate)
     assert "\n" not in str(caught.value)
