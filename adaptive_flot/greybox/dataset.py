@@ -14,7 +14,7 @@ import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.tables import FIRST_LINE, numeric_column, read_table
+from adaptive_flot.greybox.tables import line, numeric_column, read_table
 
 TIME_COLUMN = "time_s"
 UNIFORMITY = 1e-3
@@ -94,7 +94,7 @@ def read_dataset(path: Path | str, model: Model, *, required_outputs: Sequence[s
     table = read_table(file)
     columns = [str(c) for c in table.columns]
     time = numeric_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
-    dt = _interval(time, file)
+    dt = _interval(table, time, file)
 
     inputs = np.column_stack([_input(table, columns, q.name, q.column, q.unit, file) for q in model.inputs])
     model.check_inputs(inputs, time, where=str(file))
@@ -113,8 +113,8 @@ def read_dataset(path: Path | str, model: Model, *, required_outputs: Sequence[s
     }
     for name, values in parameters.items():
         if np.isnan(values).any():
-            line = int(np.flatnonzero(np.isnan(values))[0]) + FIRST_LINE
-            raise DataError(f"{file}: parameter {name!r} is empty in line {line}; give it in every row or in none")
+            empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
+            raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
     return Dataset(file.stem, time, dt, inputs, outputs, parameters, _first_state(table, columns, model, file))
 
 
@@ -144,28 +144,27 @@ def _input(table: pd.DataFrame, columns: Sequence[str], name: str, column: str, 
     values = numeric_column(table, _find(columns, name, column, unit, file), file)
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
-        line = int(bad[0]) + FIRST_LINE
         raise DataError(
-            f"{file}: input {column!r} has no value in line {line} ({bad.size} in all); inputs can not be missing: "
-            "fill in the value that was applied, or cut the record there"
+            f"{file}: input {column!r} has no value in line {line(table, int(bad[0]))} ({bad.size} in all); "
+            "inputs can not be missing: fill in the value that was applied, or cut the record there"
         )
     return values
 
 
-def _interval(time: FloatArray, file: Path) -> float:
+def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
     if len(time) < 2:
         raise DataError(f"{file}: {len(time)} row; a record needs at least 2")
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise DataError(
-            f"{file}: {TIME_COLUMN!r} is empty in line {int(bad[0]) + FIRST_LINE}; give the time of every row"
+            f"{file}: {TIME_COLUMN!r} is empty in line {line(table, int(bad[0]))}; give the time of every row"
         )
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if back.size:
         k = int(back[0]) + 1
         raise DataError(
-            f"{file}: time does not increase in line {k + FIRST_LINE} ({time[k - 1]:g} s, then {time[k]:g} s); "
+            f"{file}: time does not increase in line {line(table, k)} ({time[k - 1]:g} s, then {time[k]:g} s); "
             "sort the rows and remove repeated ones"
         )
     dt = float(np.median(steps))
@@ -173,7 +172,7 @@ def _interval(time: FloatArray, file: Path) -> float:
     if uneven.size:
         k = int(uneven[0]) + 1
         raise DataError(
-            f"{file}: time is not uniform: {steps[k - 1]:g} s before line {k + FIRST_LINE}, {dt:g} s elsewhere; "
+            f"{file}: time is not uniform: {steps[k - 1]:g} s before line {line(table, k)}, {dt:g} s elsewhere; "
             "resample the record or cut it at the gap"
         )
     return float((time[-1] - time[0]) / (len(time) - 1))

@@ -33,6 +33,8 @@ class FastCall:
     def __call__(self, *arguments: FloatArray | float) -> tuple[FloatArray, ...]:
         """Evaluate. Column vectors come and go as (n,), matrices as (n, m); a number fits a (1,) argument.
 
+        A function that fails (an integrator that gives up) returns NaN.
+
         Raises
         ------
         ModelError
@@ -46,7 +48,11 @@ class FastCall:
                 name = self.function.name_in([a is target for a in self._arguments].index(True))
                 raise ModelError(f"argument {name!r} has the shape {np.shape(value)}, the model takes {target.shape}")
             target[...] = value
-        self._evaluate()
+        try:
+            self._evaluate()
+        except RuntimeError:
+            for result in self._results:
+                result[...] = np.nan
         return tuple([result.copy() for result in self._results])
 
 

@@ -13,6 +13,12 @@ from scipy.optimize import root
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepper import Stepper
+
+CONVERGED = 1e-9
+"""Largest rate that may be left, in a state's scale a second."""
+SETTLING_STEPS = 3000
+"""Steps of simulation from the first guess when Newton's method does not converge from it."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +65,18 @@ def steady_state(
         scaled: FloatArray = slope(0.0, s * scale, u, p)[0] * scale[None, :] / scale[:, None]
         return scaled
 
-    solution = root(scaled_rate, start / scale, jac=scaled_slope, tol=1e-13)
-    state = cast(FloatArray, solution.x * scale)
-    residual = float(np.max(np.abs(solution.fun)))
+    def solve(start: FloatArray) -> tuple[FloatArray, float]:
+        solution = root(scaled_rate, start / scale, jac=scaled_slope, tol=1e-13)
+        return cast(FloatArray, solution.x * scale), float(np.max(np.abs(solution.fun)))
+
+    state, residual = solve(start)
+    if not residual < CONVERGED:  # let the process itself come near to where it settles, then try again
+        settled = Stepper(model, model.max_step_s).simulate(start, np.tile(u, (SETTLING_STEPS, 1)), p).states[-1]
+        if np.isfinite(settled).all():
+            state, residual = solve(settled)
     lower = np.array([q.lower for q in model.states])
     upper = np.array([q.upper for q in model.states])
-    if not (residual < 1e-9 and np.all(state >= lower) and np.all(state <= upper)):
+    if not (residual < CONVERGED and np.all(state >= lower) and np.all(state <= upper)):
         where = ", ".join(f"{q.name} = {v:g} {q.unit}" for q, v in zip(model.inputs, u, strict=True))
         raise RangeError(
             f"model '{model.name}' has no steady state within its physical range at {where} "

@@ -129,14 +129,28 @@ class Stepper:
             The N instants at the ends of the intervals. A state that leaves the model shows as NaN.
         """
         u, p, t = self._tables(inputs, parameters, t0)
-        x = np.asarray(x0, dtype=float)
+        x = self._initial(x0)
+        if self.accurate:
+            return self._simulate_by_rows(x, u, p, t)
         parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         for rows in _chunks(len(u)):
             accumulated = self._accumulated(self.step, (), rows.stop - rows.start, 1)
-            xs, y, s = accumulated(x, t[rows], u[rows].T, p if p.ndim == 1 else p[rows].T)
-            parts.append((np.array(xs).T, np.array(y).T, np.array(s).T))
+            found = accumulated(x, t[rows], u[rows].T, p if p.ndim == 1 else p[rows].T)
+            parts.append((np.array(found[0]).T, np.array(found[1]).T, np.array(found[2]).T))
             x = parts[-1][0][-1]
-        xs, ys, ss = (np.vstack([part[i] for part in parts]) for i in range(3))
+        widths = (len(q) for q in (self.model.states, self.model.outputs, self.model.signals))
+        xs, ys, ss = (np.vstack([np.empty((0, w)), *(part[i] for part in parts)]) for i, w in enumerate(widths))
+        return Trajectory(t + self.dt, xs, ys, ss)
+
+    def _simulate_by_rows(self, x: FloatArray, u: FloatArray, p: FloatArray, t: FloatArray) -> Trajectory:
+        """Row by row, so that a failed integration ends in NaN and not in an exception."""
+        widths = [len(q) for q in (self.model.states, self.model.outputs, self.model.signals)]
+        xs, ys, ss = (np.full((len(u), w), np.nan) for w in widths)
+        for k in range(len(u)):
+            if not np.isfinite(x).all():
+                break
+            xs[k], ys[k], ss[k] = self.call(x, t[k], u[k], p if p.ndim == 1 else p[k])
+            x = xs[k]
         return Trajectory(t + self.dt, xs, ys, ss)
 
     def simulate_sensitivities(
@@ -156,7 +170,7 @@ class Stepper:
         u, p, t = self._tables(inputs, parameters, t0)
         if p.ndim != 1:
             raise ModelError("sensitivities need one parameter vector for the whole record, got one a row")
-        x = np.asarray(x0, dtype=float)
+        x = self._initial(x0)
         gradient = np.asarray(x0_gradient, dtype=float).reshape(x.size, -1)
         q = gradient.shape[1]
         function = self._sensitivity_step(tuple(wrt), q)
@@ -206,6 +220,14 @@ class Stepper:
 
     def _parameter_seeds(self, wrt: Sequence[str]) -> ca.DM:
         return ca.DM.eye(len(self.model.parameters))[:, self.model.indices("parameters", wrt)]
+
+    def _initial(self, x0: FloatArray) -> FloatArray:
+        x = np.asarray(x0, dtype=float)
+        if x.shape != (len(self.model.states),):
+            raise ModelError(
+                f"initial state has shape {x.shape}, model '{self.model.name}' ({len(self.model.states)},)"
+            )
+        return x
 
     def _tables(
         self, inputs: FloatArray, parameters: FloatArray | None, t0: float

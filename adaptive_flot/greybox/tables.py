@@ -1,7 +1,8 @@
-"""Read and write tables (CSV or Parquet by suffix) with errors that name the file, the row and the column."""
+"""Read and write tables (CSV or Parquet by suffix) with errors that name the file, the line and the column."""
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,17 @@ from adaptive_flot.errors import DataError
 from adaptive_flot.files import replace_path
 from adaptive_flot.greybox.model import FloatArray
 
-HEADER_LINES = 1
-FIRST_LINE = HEADER_LINES + 1
+FIRST_LINE = 2
 """Line of a CSV file that holds row 0: messages count lines as an editor does."""
 
 
 def read_table(path: Path | str) -> pd.DataFrame:
-    """Read a table with a header line; empty columns and empty last lines are dropped.
+    """Read a table with a header line. Blank lines and empty last columns are dropped; the index keeps the row numbers.
 
     Raises
     ------
     DataError
-        No such file, empty, not a table, or no rows.
+        No such file, empty, not a table, rows longer than the header, or no rows.
     """
     file = Path(path)
     if not file.is_file():
@@ -30,18 +30,31 @@ def read_table(path: Path | str) -> pd.DataFrame:
     if file.stat().st_size == 0:
         raise DataError(f"{file}: the file is empty; give a table with a header line and rows")
     try:
-        if file.suffix == ".parquet":
-            table = pd.read_parquet(file)
-        else:
-            table = pd.read_csv(file, skipinitialspace=True, index_col=False)
+        table = pd.read_parquet(file) if file.suffix == ".parquet" else _read_csv(file)
+    except pd.errors.ParserWarning as error:
+        raise DataError(f"{file}: a row is longer than the header (a decimal comma?); correct it") from error
     except (ValueError, OSError, pd.errors.ParserError) as error:
         raise DataError(f"{file}: not a readable table ({str(error).splitlines()[0]}); give CSV or Parquet") from error
+    table = table.dropna(how="all")
     table = table.loc[:, [c for c in table.columns if not (str(c).startswith("Unnamed") and table[c].isna().all())]]
-    if not str(table.columns[0]).isprintable():
-        raise DataError(f"{file}: not a text table (unprintable header); give CSV or Parquet")
+    if len(table.columns) == 0 or not str(table.columns[0]).isprintable():
+        raise DataError(
+            f"{file}: not a text table (no readable header); give a CSV or Parquet table with named columns"
+        )
     if len(table) == 0:
         raise DataError(f"{file}: a header but no rows; give a table with rows")
     return table
+
+
+def _read_csv(file: Path) -> pd.DataFrame:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)  # else pandas cuts rows longer than the header
+        return pd.read_csv(file, skipinitialspace=True, index_col=False, skip_blank_lines=False)
+
+
+def line(table: pd.DataFrame, row: int) -> int:
+    """Line of the file that holds a row of the table."""
+    return int(table.index[row]) + FIRST_LINE
 
 
 def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatArray:
@@ -56,8 +69,8 @@ def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatA
     values = pd.to_numeric(raw, errors="coerce")
     bad = np.flatnonzero((values.isna() & raw.notna()).to_numpy())
     if bad.size:
-        line = int(bad[0]) + FIRST_LINE
-        raise DataError(f"{file}: column {column!r}, line {line}: {raw.iloc[bad[0]]!r} is not a number; correct it")
+        where = f"{file}: column {column!r}, line {line(table, int(bad[0]))}"
+        raise DataError(f"{where}: {raw.iloc[bad[0]]!r} is not a number; correct it")
     return np.asarray(values, dtype=float)
 
 

@@ -28,7 +28,7 @@ def check(result: Result, folder: Path, *says: str) -> None:
     assert left <= {"record.csv", "short.yaml", "cell.yaml"}
 
 
-def _set(column: str, row: int, value: object) -> Callable[[pd.DataFrame], pd.DataFrame]:
+def _set(column: str, row: int, value: float | str | None) -> Callable[[pd.DataFrame], pd.DataFrame]:
     def change(table: pd.DataFrame) -> pd.DataFrame:
         table[column] = table[column].astype(object)
         table.loc[row, column] = value
@@ -117,7 +117,7 @@ def test_a_parameter_column_outside_its_range(
     call: Call, table: WriteTable, tmp_path: Path, command: str, column: str, value: float | None, says: list[str]
 ) -> None:
     table(lambda t: _set(column, 5, value)(t.assign(**{column: 1.0 if column == "n" else 6e-4})))
-    check(call(*COMMANDS[command]), tmp_path, "record.csv", *says)
+    check(call(*COMMANDS[command]), tmp_path, "record", *says)
 
 
 @pytest.mark.parametrize("command", ["simulate", "accurate"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -91,8 +92,6 @@ def test_a_second_run_replaces_the_files_of_the_first(call: Call, scenario: Writ
 def test_an_own_estimator_beside_the_scenario(
     call: Call, scenario: WriteScenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import sys
-
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "cli_own_estimator.py").write_text(OWN)
     moved = scenario().rename(tmp_path / "elsewhere" / "short.yaml")
@@ -102,11 +101,3 @@ def test_an_own_estimator_beside_the_scenario(
     assert (tmp_path / "r" / "cli_own_estimator-Mine_schedule_seed1.csv").is_file()
     runs = json.loads((tmp_path / "r" / "summary.json").read_text())["runs"]
     assert [r["estimator"] for r in runs] == ["cli_own_estimator:Mine", "rpem"]
-
-
-def test_fits_that_can_not_be_computed_are_null(call: Call, scenario: WriteScenario, tmp_path: Path) -> None:
-    """Fits over a time in which there is no estimate yet: NaN, in JSON null, and the tables are written all the same."""
-    result = call("run", scenario({"fits_after_s": 0}), "--estimator", "rpem", "--out", "r")
-    assert result.code == 0, result.err
-    summary = json.loads((tmp_path / "r" / "summary.json").read_text(), parse_constant=lambda word: pytest.fail(word))
-    assert summary["runs"][0]["fit"] == {"n": None, "C": None, "concentrate_grade": None}

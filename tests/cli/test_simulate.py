@@ -35,7 +35,7 @@ def test_a_simulated_table_comes_back(call: Call, truth: pd.DataFrame, tmp_path:
     result = call("simulate", "truth.csv", "--out", f"new/again{suffix}")
     assert result.code == 0, result.err
     assert "150 rows" in result.out
-    read: Callable[[Path], pd.DataFrame] = pd.read_csv if suffix == ".csv" else pd.read_parquet  # type: ignore[assignment]
+    read: Callable[[Path], pd.DataFrame] = pd.read_csv if suffix == ".csv" else pd.read_parquet
     again = read(tmp_path / "new" / f"again{suffix}")
     assert set(again.columns) == set(truth.columns)
     for column in truth.columns:

@@ -21,7 +21,8 @@ from adaptive_flot.batch import Identifiability
 )
 def test_words_follow_the_relative_standard_deviation(std: float, word: str) -> None:
     judged = Identifiability.judge(["a"], np.array([[std**2]]), [False])
-    assert judged.parameters == (("a", pytest.approx(std), word),)
+    ((label, relative, judgement),) = judged.parameters
+    assert (label, judgement) == ("a", word) and relative == pytest.approx(std)
     assert judged.pairs == ()
     assert ("every fitted parameter is identified" in judged.verdict) == (word == "identified")
 

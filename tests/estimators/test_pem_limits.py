@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import DataError, RangeError
+from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.protocols import Setup, Status
 from estimators.pem import Pem
@@ -115,7 +116,7 @@ def test_a_group_of_parameters_is_fitted_as_its_members(model: Model, cell_case:
     names = model.expand_parameters(["floatability"])
     assert names == ("floatability.chalcopyrite", "floatability.quartz")
     outputs = np.vstack([s.outputs for s in cell_case.samples])
-    record = toys.measured_as(toys.Dataset("cell", np.arange(ROWS) + 1.0, 1.0, cell_case.inputs, outputs), outputs)
+    record = Dataset("cell", np.arange(1.0, ROWS + 1), 1.0, cell_case.inputs, outputs)
     found = Pem(Setup(model, 1.0, names, ("concentrate_grade",))).fit(record)
     assert tuple(e.name for e in found.estimates) == names
     assert [e.unit for e in found.estimates] == ["-", "-"]

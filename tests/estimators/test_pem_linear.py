@@ -34,9 +34,10 @@ def fit(model: Model, record: Dataset, **options: Any) -> BatchFit:
 
 def ordinary(X: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Estimates (q,), covariance (q, q) and residual standard deviation, from the textbook."""
-    theta, rss, _, _ = np.linalg.lstsq(X, y)
-    variance = float(rss[0]) / (len(y) - X.shape[1])
-    return theta, variance * np.linalg.inv(X.T @ X), float(np.sqrt(variance))
+    theta: FloatArray = np.asarray(np.linalg.lstsq(X, y)[0], dtype=float)
+    variance = float(np.sum((y - X @ theta) ** 2)) / (len(y) - X.shape[1])
+    covariance: FloatArray = np.asarray(variance * np.linalg.inv(X.T @ X), dtype=float)
+    return theta, covariance, float(np.sqrt(variance))
 
 
 @pytest.mark.parametrize("options", [{"initial_state": "given"}, {"initial_state": "steady"}, {"free": ()}], ids=str)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from adaptive_flot.greybox.model import Model, Parameter
-from adaptive_flot.protocols import Prior, Sample, Setup, Status
+from adaptive_flot.protocols import AnyEstimator, Prior, Sample, Setup, Status
 from benchmarks import scipy_reference
 from estimators.fixed import Fixed
 from estimators.rpem import Rpem
@@ -36,7 +37,7 @@ def test_estimates_are_those_of_the_scipy_reference(cell_case: CellCase, gradien
 def test_central_differences_and_exact_gradient_agree(cell_case: CellCase) -> None:
     exact, central = (
         replay(Rpem(cell_case.setup, gradient=g), cell_case.prior, cell_case.samples) for g in ("exact", "central")
-    )  # type: ignore[arg-type]
+    )
     for a, b in zip(exact, central, strict=True):
         np.testing.assert_allclose(a.parameters, b.parameters, rtol=1e-5)
         std = np.sqrt(np.diag(a.covariance))
@@ -98,7 +99,7 @@ def test_estimates_are_projected_onto_their_bounds_and_say_so(cell_case: CellCas
 
 @pytest.mark.parametrize("estimator", [Rpem, Fixed])
 def test_a_step_that_is_not_finite_is_skipped_and_the_next_goes_on(
-    cell_case: CellCase, estimator: type[Rpem] | type[Fixed]
+    cell_case: CellCase, estimator: Callable[[Setup], AnyEstimator]
 ) -> None:
     made = estimator(cell_case.setup)
     state, before = made.update(made.init(cell_case.prior), cell_case.samples[0])
@@ -113,7 +114,7 @@ def test_a_step_that_is_not_finite_is_skipped_and_the_next_goes_on(
 
 
 @pytest.mark.parametrize("estimator", [Rpem, Fixed])
-def test_a_prediction_that_is_not_finite_is_not_ok(estimator: type[Rpem] | type[Fixed]) -> None:
+def test_a_prediction_that_is_not_finite_is_not_ok(estimator: Callable[[Setup], AnyEstimator]) -> None:
     """The state of this model is finite, its output is not: the status of the sample must say so."""
     made = estimator(Setup(toys.root(), 1.0, ("th",), ("y",)))
     state = made.init(Prior(0.0, np.zeros(1), np.ones(1), np.eye(1), np.ones(1)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -35,8 +35,7 @@ def linear(q: int, m: int = 1, *, value: float = 0.0, **parameter: float) -> Mod
     )
 
 
-def _column(symbol: object, stem: str, count: int) -> ca.SX:
-    assert callable(symbol)
+def _column(symbol: Callable[[str], ca.SX], stem: str, count: int) -> ca.SX:
     return ca.vertcat(*(symbol(f"{stem}{i}") for i in range(count)))
 
 
@@ -117,7 +116,7 @@ def record(
     *,
     parameters: Mapping[str, float] | None = None,
     x0: Sequence[float] = (0.0,),
-    noise: ArrayLike = 0.0,
+    noise: FloatArray | float = 0.0,
     given: bool = True,
 ) -> Dataset:
     """Simulated record of a model with other parameters; row 0 is the initial instant, and measured too."""

@@ -235,20 +235,17 @@ def test_times_rounded_to_three_digits_count_as_uniform(
 # -- known faults ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.xfail(raises=IndexError, reason="every column is dropped, then the first is looked at", strict=True)
 def test_table_of_commas_only_is_refused(write: Write) -> None:
     with pytest.raises(DataError):
         read_dataset(write(",,", ",,"), TANK)
 
 
-@pytest.mark.xfail(raises=pd.errors.ParserWarning, reason="pandas warns and drops the fields", strict=True)
 def test_rows_longer_than_the_header_are_refused(write: Write) -> None:
     """A decimal comma, say: silently cutting the row would shift or lose values."""
     with pytest.raises(DataError):
         read_dataset(write(HEADER, *(f"{row},7" for row in ROWS)), TANK)
 
 
-@pytest.mark.xfail(reason="pandas skips blank lines, the line numbers do not count them", strict=True)
 def test_line_number_counts_blank_lines(write: Write) -> None:
     with pytest.raises(DataError, match="line 5"):
         read_dataset(write(HEADER, ROWS[0], "", ROWS[1], "4,0.3,high,0.3"), TANK)

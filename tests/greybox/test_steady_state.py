@@ -45,7 +45,6 @@ def test_default_parameters_are_those_of_the_model(model: Model) -> None:
     np.testing.assert_array_equal(steady_state(changed, NOMINAL).state, steady_state(model, NOMINAL, p).state)
 
 
-@pytest.mark.xfail(reason="the default guess does not converge for low levels and little air", strict=True)
 def test_default_guess_reaches_every_corner_of_the_operating_range(model: Model) -> None:
     """The limits of the paper: air 9.05e-4 to 2.17e-3 m3/s, level 0.33 to 0.42 m."""
     for air in (9.05e-4, 2.17e-3):

@@ -138,7 +138,6 @@ def test_state_that_leaves_the_model_shows_as_nan(fast: Stepper, start: FloatArr
     assert np.isnan(run.states[-1]).any()
 
 
-@pytest.mark.xfail(raises=RuntimeError, reason="IDAS raises where the documentation promises NaN", strict=True)
 def test_state_that_leaves_the_model_shows_as_nan_in_the_accurate_step(accurate: Stepper, start: FloatArray) -> None:
     run = accurate.simulate(start, np.tile([5e-6, 1.67e-4, 0.38], (20, 1)))
     assert np.isnan(run.states[-1]).any()
@@ -251,12 +250,10 @@ def test_wrong_shapes_are_named(fast: Stepper, start: FloatArray) -> None:
         fast.simulate_sensitivities(start, u, np.tile(p, (4, 1)), ["n"], np.zeros((9, 1)))
 
 
-@pytest.mark.xfail(reason="CasADi spreads a single element over the state", strict=True)
 def test_initial_state_of_one_element_is_refused(fast: Stepper) -> None:
     with pytest.raises(ModelError):
         fast.simulate(np.array([0.1]), random_inputs(3, seed=12))
 
 
-@pytest.mark.xfail(raises=ValueError, reason="np.vstack of nothing", strict=True)
 def test_record_without_rows_is_simulated(fast: Stepper, start: FloatArray) -> None:
     assert fast.simulate(start, np.empty((0, 3))).states.shape == (0, 9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +65,7 @@ WriteModule = Callable[[str, str], str]
 
 
 @pytest.fixture
-def write_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WriteModule:
+def write_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[WriteModule]:
     """Write a module into the temporary folder; it is forgotten after the test."""
 
     def write(name: str, text: str) -> str:
@@ -73,7 +73,7 @@ def write_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WriteModule
         (tmp_path / f"{name}.py").write_text(text)
         return name
 
-    yield write  # type: ignore[misc]
+    yield write
     for file in tmp_path.rglob("*.py"):
         sys.modules.pop(file.stem, None)
 

@@ -69,6 +69,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[str]]] = {
     "initial estimate after the end": ({"initial_estimate.until_s": 120}, ["initial_estimate.until_s", "120"]),
     "initial estimate that rounds to the end": ({"initial_estimate.until_s": 119.7}, ["initial_estimate.until_s"]),
     "initial estimate of less than an interval": ({"initial_estimate.until_s": 0.4}, ["initial_estimate.until_s"]),
+    "fits before there is an estimate": ({"fits_after_s": 10}, ["fits_after_s", "10"]),
     "fits after the end": ({"fits_after_s": 120}, ["fits_after_s"]),
     "duration that is no whole number of intervals": ({"duration_s": 120.5}, ["duration_s"]),
     "unknown estimator": ({"estimators.rpem.use": "rpm"}, ["'rpm'", "did you mean 'rpem'"]),

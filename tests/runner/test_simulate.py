@@ -26,7 +26,7 @@ def record(model: Model) -> Dataset:
     inputs[10:, 0] = 1.7e-3
     outputs = np.full((ROWS, len(model.outputs)), np.nan)
     drift = {"coalescence_rate": 6.38e-4 * np.linspace(1.0, 1.1, ROWS)}
-    return Dataset("table", 5.0 + np.arange(ROWS), 1.0, inputs, outputs, drift)
+    return Dataset("table", np.arange(5.0, 5.0 + ROWS), 1.0, inputs, outputs, drift)
 
 
 def test_it_is_the_stepper_from_the_steady_state_of_the_first_row(model: Model, record: Dataset) -> None:

@@ -9,6 +9,8 @@ Two of its printed equations are read in the only way that is consistent:
 
 from __future__ import annotations
 
+import casadi as ca
+
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.processes.flotation import froth, pulp
 from adaptive_flot.processes.flotation.cell_file import default_cell
@@ -70,7 +72,7 @@ def make_model(cell: Cell | None = None) -> Model:
             Quantity("valuable_solids", "kg/m3", "valuable mineral in the pulp", 0.0, scale=10.0),
         ),
         algebraic=(Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),),
-        max_step_s=1.0,
+        max_step_s=_max_step(cell),
         equations=lambda m: _equations(m, masses, ratios),
         initial_guess={
             "tails_flow": 1.6e-4,
@@ -79,6 +81,22 @@ def make_model(cell: Cell | None = None) -> Model:
             **dict.fromkeys(ratios, 0.1 / len(ratios)),
         },
     )
+
+
+FASTEST_DECAY = 2.0
+"""Largest decay rate times step at which the fast step keeps its accuracy (see `SERIES_TERMS` there)."""
+
+
+def _max_step(cell: Cell) -> float:
+    """Step [s] in which the largest bubbles leave a half full cell by at most `FASTEST_DECAY` e-folds; at most 1 s."""
+    value = {p.name: ca.SX(p.value) for p in cell.parameters}
+    phi = value["solids_fraction"]
+    rho_p = pulp.pulp_density(phi, value["solids_density"], value["water_density"])
+    mu_p = pulp.pulp_viscosity(phi, value["water_viscosity"])
+    used = [str(k + 1) for k in range(cell.bubble_classes) if cell.value(f"bubble_number.{k + 1}") > 0]
+    largest = ca.SX(max(cell.value(f"bubble_diameter.{k}") for k in used))
+    fastest = float(pulp.slip_velocity(largest, ca.SX(0.0), rho_p, mu_p, value["gravity"]))
+    return min(1.0, FASTEST_DECAY * 0.5 * cell.value("height") / fastest)
 
 
 def mass_names(minerals: tuple[str, ...]) -> list[str]:

@@ -65,13 +65,13 @@ def read_cell(path: Path | str) -> Cell:
             if spec.group == "bubble" and not sizes["bubble"]:
                 sizes["bubble"] = len(entry.values)
             count = sizes[spec.group] if spec.group else 1
-            if len(entry.values) != count:
-                raise CellError(
-                    f"{file}: {section}.{key} has {len(entry.values)} values; give {count}, one a {spec.group}"
-                )
+            if len(entry.values) != count or count == 0:
+                wanted = f"{count}, one a {spec.group}" if count > 1 else "one"
+                raise CellError(f"{file}: {section}.{key} has {len(entry.values)} values; give {wanted}")
             labels = minerals if spec.group == "mineral" else [str(i + 1) for i in range(count)]
             parameters += _parameters(file, section, key, spec, entry, labels)
     cell = Cell(file.stem, tuple(parameters), tuple(minerals), sizes["bubble"], _operation(file, content))
+    _check(file, cell)
     return replace(cell, operation={**cell.operation, "air_flow_valid": _air_range(file, cell)})
 
 
@@ -88,18 +88,28 @@ def save_cell(source: Path | str, values: Mapping[str, float], note: str, path: 
         Becomes the source of each replaced value, e.g. "calibrated on record.csv".
     path
         The file to write.
+
+    Raises
+    ------
+    CellError
+        The source can not be read, or a name is not in it.
     """
     content = _load(Path(source))
     minerals = _mineral_names(Path(source), content)
+    left = set(values)
     for section, specs in PARAMETERS.items():
         for key, spec in specs.items():
             entry = content[section][key]
-            old = entry["value"] if spec.group else [entry["value"]]
+            several = isinstance(entry["value"], list)
+            old = entry["value"] if several else [entry["value"]]
             labels = minerals if spec.group == "mineral" else [str(i + 1) for i in range(len(old))]
             names = [f"{spec.name}.{label}" if spec.group else spec.name for label in labels]
-            if any(name in values for name in names):
+            if left & set(names):
                 new = [float(values.get(name, v)) for name, v in zip(names, old, strict=True)]
-                entry["value"], entry["source"] = new if spec.group else new[0], note
+                entry["value"], entry["source"] = new if several else new[0], note
+                left -= set(names)
+    if left:
+        raise CellError(f"{source}: no parameter {sorted(left)[0]!r} in a cell file; save those of the cell only")
     with replace_file(Path(path)) as stream:
         yaml.safe_dump(content, stream, sort_keys=False, default_flow_style=None)
 
@@ -155,6 +165,10 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
     given = entry.bounds or (spec.lower, spec.upper)
     lower, upper = max(given[0], spec.lower), min(given[1], spec.upper)
     scales, priors = _each(entry.scale, labels), _each(entry.prior_std, labels)
+    if not len(scales) == len(priors) == len(labels):
+        raise CellError(
+            f"{file}: {section}.{key}: give scale and prior_std once, or one for each of {len(labels)} values"
+        )
     found = []
     for label, value, scale, prior in zip(labels, entry.values, scales, priors, strict=True):
         where = f"{file}: {section}.{key}"
@@ -184,7 +198,7 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
 
 def _each(value: float | list[float] | None, labels: list[str]) -> list[float | None]:
     """One value for each component: the list given, or the same value for all."""
-    return [*value, *[None] * (len(labels) - len(value))] if isinstance(value, list) else [value] * len(labels)
+    return [*value] if isinstance(value, list) else [value] * len(labels)
 
 
 def _mineral_names(file: Path, content: Mapping[str, Any]) -> list[str]:
@@ -207,21 +221,32 @@ def _operation(file: Path, content: Mapping[str, Any]) -> dict[str, tuple[float,
             continue
         values[key] = tuple(_entry(file, given, "operation", key, unit).values)
         low, high = values[key][0], values[key][-1]
-        if len(values[key]) != (2 if key.endswith(("limits", "valid")) else 1) or not 0 <= low <= high:
+        if len(values[key]) != (2 if key.endswith(("limits", "valid")) else 1) or not 0 <= low <= high < np.inf:
             raise CellError(f"{file}: operation.{key} = {list(values[key])}; give positive values, lower one first")
     return values
 
 
+def _check(file: Path, cell: Cell) -> None:
+    """Check entries against each other."""
+    if not sum(p.value for p in cell.parameters if p.name.startswith("bubble_number.")) > 0:
+        raise CellError(f"{file}: bubbles.number holds no bubbles; give at least one positive number")
+    height, limits = cell.value("height"), cell.operation["level_limits"]
+    if limits[1] >= height:
+        raise CellError(
+            f"{file}: operation.level_limits {list(limits)} m reach above the cell ({height:g} m); correct them"
+        )
+
+
 def _air_range(file: Path, cell: Cell) -> tuple[float, float]:
-    """Air flows [m3/s] in which the burst-rate line means anything, v_b >= 0, checked against the operating limits."""
+    """Air flows [m3/s] around the operating limits in which the burst-rate line means anything: v_b >= 0."""
     area, a, b, c = (cell.value(n) for n in ("cross_section_area", "burst_a", "burst_b", "burst_c"))
-    roots = np.roots([c, b, a]) if c else np.array([-a / b if b else 0.0])
-    positive = [float(r.real) for r in roots if abs(r.imag) < 1e-15 and r.real > 0]
-    lowest = area * min(positive, default=0.0)
     limits = cell.operation["air_flow_limits"]
-    low, high = cell.operation.get("air_flow_valid", (lowest, HIGHEST_GAS_VELOCITY * area))
-    low = max(low, lowest)
-    if not low <= limits[0] <= limits[1] <= high:
+    low, high = cell.operation.get("air_flow_valid", (0.0, HIGHEST_GAS_VELOCITY * area))
+    zeros = [area * float(r.real) for r in np.roots([c, b, a]) if abs(r.imag) < 1e-15]  # v_b changes its sign here
+    low = max([low, *(z for z in zeros if z <= limits[0])])
+    high = min([high, *(z for z in zeros if z > limits[0])])
+    jg = limits[0] / area
+    if a + b * jg + c * jg**2 < 0 or not low <= limits[0] <= limits[1] <= high:
         raise CellError(
             f"{file}: operation.air_flow_limits {list(limits)} m3/s leave the range [{low:g}, {high:g}] m3/s in which "
             "the bursting rate is positive and known; correct the limits or froth.burst_a/b/c"
