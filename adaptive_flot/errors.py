@@ -6,7 +6,8 @@ Numerical outcomes (a failed solve, a missing measurement) are never errors: the
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class AdaptiveFlotError(Exception):
@@ -35,6 +36,18 @@ class RangeError(AdaptiveFlotError):
 
 class PluginError(AdaptiveFlotError):
     """An estimator, controller or model named in a file or on the command line can not be loaded."""
+
+
+@contextmanager
+def located(where: object) -> Iterator[None]:
+    """Put the place (a file) in front of the message of every error raised inside, unless it is there already."""
+    try:
+        yield
+    except AdaptiveFlotError as error:
+        text = str(error)
+        if text.startswith(str(where)):
+            raise
+        raise type(error)(f"{where}: {text}") from error
 
 
 def near_match(name: str, known: Iterable[str]) -> str:

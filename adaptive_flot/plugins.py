@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from adaptive_flot.errors import PluginError, near_match
@@ -41,27 +43,53 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
     full = shipped.get(address, address)
     if ":" not in full:
         raise PluginError(f"unknown {what} {address!r}; {near_match(address, shipped)}, or your own as my_file:MyClass")
-    module_name, attribute = full.split(":", 1)
-    module_name = module_name.removesuffix(".py").replace("/", ".").strip(".")
-    for place in (folder, Path.cwd()):
-        if place is not None and str(place) not in sys.path:
-            sys.path.append(str(place))
+    module_name, attribute = full.rsplit(":", 1)
     try:
-        module = importlib.import_module(module_name)
+        module = _import(module_name, folder)
     except ModuleNotFoundError as error:
+        stem = Path(module_name).stem
         raise PluginError(
-            f"{what} {address!r}: no module {error.name!r}; put {module_name}.py beside the file that names it or here"
+            f"{what} {address!r}: no module {error.name!r}; put {stem}.py beside the file that names it or here"
         ) from error
     except Exception as error:
-        raise PluginError(
-            f"{what} {address!r}: importing {module_name!r} failed: {type(error).__name__}: {error}"
-        ) from error
+        reason = f"{type(error).__name__}: {error}"
+        raise PluginError(f"{what} {address!r}: importing {module_name!r} failed: {reason}; correct it") from error
     if not hasattr(module, attribute):
         names = [n for n in vars(module) if not n.startswith("_")]
         raise PluginError(
             f"{what} {address!r}: module {module_name!r} has no {attribute!r}; {near_match(attribute, names)}"
         )
     return getattr(module, attribute)
+
+
+def _import(name: str, folder: Path | None) -> ModuleType:
+    """Import a module by the path of its file, by name beside the file that names it, or as an installed one."""
+    stem = name.removesuffix(".py")
+    for place in (folder, Path.cwd()):
+        file = (place or Path()) / f"{stem}.py"
+        if place is not None and file.is_file():
+            return _import_file(file.resolve())
+    if name.endswith(".py") or "/" in name:
+        raise ModuleNotFoundError(name, name=name)
+    return importlib.import_module(stem)
+
+
+def _import_file(file: Path) -> ModuleType:
+    """Import a file under its own stem, so that its states can be pickled; another file of that name is replaced."""
+    known = sys.modules.get(file.stem)
+    if known is not None and getattr(known, "__file__", None) == str(file):
+        return known
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None:
+        raise ModuleNotFoundError(str(file), name=str(file))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[file.stem] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[file.stem]
+        raise
+    return module
 
 
 def construct(factory: Any, address: str, what: str, *arguments: Any, **options: Any) -> Any:

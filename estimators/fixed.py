@@ -50,7 +50,7 @@ class Fixed:
         p = full_parameters(model, self.setup.parameters, state.theta)
         x, y, _ = self._step(state.x, state.time, sample.inputs, p)
         status = Status.OK if np.isfinite(sample.outputs[self._columns]).any() else Status.MISSING
-        if not np.isfinite(x).all():
+        if not (np.isfinite(x).all() and np.isfinite(y[self._columns]).all()):
             x, status = state.x, Status.NOT_FINITE
         estimate = Estimate(
             time=sample.time,

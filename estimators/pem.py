@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from adaptive_flot.batch import BatchFit, Identifiability, ParameterEstimate
-from adaptive_flot.errors import DataError, ModelError, near_match
+from adaptive_flot.errors import DataError, ModelError, RangeError, near_match
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
@@ -95,22 +95,21 @@ class Pem:
                 f"{record.name}: {int(present.sum())} measurements of {', '.join(self.setup.outputs)} for "
                 f"{len(problem.centre)} unknowns; give a longer record or fit fewer parameters"
             )
+        samples = int(present.sum())
+        freedom = np.sqrt(samples / max(samples - len(problem.centre), 1))
         noise = self._first_noise(measured)
         unknowns = np.zeros(len(problem.centre))
-        solution = None
+        evaluations = 0
         for _ in range(WEIGHT_PASSES):
             solution = self._solve(record, problem, unknowns, noise, measured, present)
             if solution is None:
                 return self._failed(record, problem)
-            unknowns = cast(FloatArray, solution.x)
-            error = self._errors(record, problem, unknowns, measured)
-            used = noise
-            noise = np.array([np.sqrt(np.mean(e[p] ** 2)) for e, p in zip(error.T, present.T, strict=True)])
-            noise = np.maximum(noise, 1e-12 * np.array([self.setup.model.outputs[c].scale for c in self._columns]))
+            unknowns, used = cast(FloatArray, solution.x), noise
+            evaluations += int(solution.nfev)
+            noise = freedom * self._noise(self._errors(record, problem, unknowns, measured))
             if np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
                 break
-        assert solution is not None  # at least one pass
-        return self._result(record, problem, solution, noise, int(present.sum()))
+        return self._result(record, problem, unknowns, noise, present, evaluations)
 
     # -- the least-squares problem ---------------------------------------------------------------------------------
 
@@ -149,8 +148,24 @@ class Pem:
         x0[self._free] = values[q:]
         return p, x0
 
+    def _rows(
+        self, record: Dataset, problem: _Problem, unknowns: FloatArray, noise: FloatArray, present: FloatArray
+    ) -> FloatArray:
+        """Rows of the least-squares Jacobian: measurements over their noise, then priors."""
+        rows = (-self._jacobian(record, problem, unknowns) / noise[:, None])[present]
+        return np.vstack([rows, np.diag(1 / problem.prior_std)[np.isfinite(problem.prior_std)]])
+
+    def _noise(self, errors: FloatArray) -> FloatArray:
+        """Root mean square of each output's error (m,), kept off zero."""
+        scale = np.array([self.setup.model.outputs[c].scale for c in self._columns])
+        found = np.array([np.sqrt(np.nanmean(e**2)) for e in errors.T])
+        return cast(FloatArray, np.maximum(found, 1e-12 * scale))
+
     def _errors(self, record: Dataset, problem: _Problem, unknowns: FloatArray, measured: FloatArray) -> FloatArray:
-        p, x0 = self._unpack(record, problem, unknowns)
+        try:
+            p, x0 = self._unpack(record, problem, unknowns)
+        except RangeError:  # no steady state with these parameters: the search takes its step back
+            return np.full_like(measured, np.nan)
         return measured - self._simulator.outputs(record, x0, p)[:, self._columns]
 
     def _jacobian(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> FloatArray:
@@ -180,8 +195,7 @@ class Pem:
             return np.concatenate([error, (unknowns / problem.prior_std)[with_prior]])
 
         def jacobian(unknowns: FloatArray) -> FloatArray:
-            rows = (-self._jacobian(record, problem, unknowns) / noise[:, None])[present]
-            return np.vstack([rows, np.diag(1 / problem.prior_std)[with_prior]])
+            return self._rows(record, problem, unknowns, noise, present)
 
         if not np.isfinite(residuals(start)).all():
             return None
@@ -200,16 +214,20 @@ class Pem:
     # -- results ---------------------------------------------------------------------------------------------------
 
     def _result(
-        self, record: Dataset, problem: _Problem, solution: OptimizeResult, noise: FloatArray, samples: int
+        self,
+        record: Dataset,
+        problem: _Problem,
+        unknowns: FloatArray,
+        noise: FloatArray,
+        present: FloatArray,
+        evaluations: int,
     ) -> BatchFit:
         model, q = self.setup.model, len(self.setup.parameters)
-        freedom = max(samples - len(problem.centre), 1)
-        noise = noise * np.sqrt(samples / freedom)
-        scaled = _covariance(cast(FloatArray, solution.jac)) * samples / freedom
+        scaled = _covariance(self._rows(record, problem, unknowns, noise, present))
         covariance = (scaled * np.outer(problem.scale, problem.scale))[:q, :q]
-        p, x0 = self._unpack(record, problem, cast(FloatArray, solution.x))
-        values = problem.centre[:q] + problem.scale[:q] * solution.x[:q]
-        at_bound = np.minimum(solution.x - problem.lower, problem.upper - solution.x)[:q] < 1e-6
+        p, x0 = self._unpack(record, problem, unknowns)
+        values = problem.centre[:q] + problem.scale[:q] * unknowns[:q]
+        at_bound = np.minimum(unknowns - problem.lower, problem.upper - unknowns)[:q] < 1e-6
         estimates = tuple(
             ParameterEstimate(name, model.parameters[i].label, model.parameters[i].unit, float(v), float(s), bool(b))
             for name, i, v, s, b in zip(
@@ -229,7 +247,7 @@ class Pem:
             parameters=p,
             initial_state=x0,
             last_state=self._simulator.last_state(record, x0, p),
-            evaluations=int(solution.nfev),
+            evaluations=evaluations,
             status=Status.PROJECTED if at_bound.any() else Status.OK,
             identifiability=Identifiability.judge(
                 [e.label for e in estimates], scaled[:q, :q], [e.at_bound for e in estimates]

@@ -91,7 +91,9 @@ class Rpem:
         self.l0_scale = l0_scale
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
-        self._update = FastCall(_update_function(setup, forgetting, gradient))
+        self._update = FastCall(
+            _update_function(setup, forgetting, gradient), matrices=("covariance", "covariance_next")
+        )
 
     def init(self, prior: Prior) -> RpemState:
         """Start from a prior, L_0 from its covariance."""
@@ -157,14 +159,13 @@ def _update_function(setup: Setup, forgetting: float, gradient: Gradient) -> ca.
     residual = (measured - y[rows]) / noise
 
     # (lupdate) and (thetaupdate) one output at a time: the same as the block form, without a matrix inverse
-    updated = cov / ca.if_else(ca.sum1(present) > 0, forgetting, 1.0)
+    forgotten = cov / ca.if_else(ca.sum1(present) > 0, forgetting, 1.0)
+    expected = [noise[j] * ca.sqrt(1 + psi[j, :] @ forgotten @ psi[j, :].T) for j in range(m)]
+    updated = forgotten
     theta_next = theta
-    expected = []
     for j in range(m):
         row = psi[j, :]
-        spread = 1 + row @ updated @ row.T
-        expected.append(noise[j] * ca.sqrt(spread))
-        gain = present[j] * (updated @ row.T) / spread
+        gain = present[j] * (updated @ row.T) / (1 + row @ updated @ row.T)
         theta_next = theta_next + gain * (residual[j] - row @ (theta_next - theta))
         # Joseph's form of (lupdate): the same in exact arithmetic, and never indefinite in rounded one
         left = ca.SX.eye(q) - gain @ row
@@ -175,7 +176,7 @@ def _update_function(setup: Setup, forgetting: float, gradient: Gradient) -> ca.
     upper = ca.DM([model.parameters[i].upper for i in columns])
     inside = ca.fmin(ca.fmax(theta_next, lower), upper)
     # one number that is finite only if the whole new state is, and the number of parameters that were projected
-    size = ca.sumsqr(x_next) + ca.sumsqr(theta_next) + ca.sumsqr(updated)
+    size = ca.sumsqr(x_next) + ca.sumsqr(theta_next) + ca.sumsqr(updated) + ca.sumsqr(y[rows])
     flags = ca.vertcat(size, ca.sum1(inside != theta_next))
     return ca.Function(
         "rpem_update",

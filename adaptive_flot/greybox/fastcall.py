@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
 
@@ -14,9 +16,16 @@ class FastCall:
 
     Arguments and results are NumPy arrays; results are fresh copies, so nothing that the caller keeps can change.
     A `FastCall` holds working memory: use one in each thread.
+
+    Parameters
+    ----------
+    function
+        The function.
+    matrices
+        Names of arguments and results that are matrices (n, m) also where m is 1; a column is else a vector (n,).
     """
 
-    def __init__(self, function: ca.Function) -> None:
+    def __init__(self, function: ca.Function, matrices: Sequence[str] = ()) -> None:
         self.function = _dense(function)
         self._buffer, self._evaluate = self.function.buffer()
         arguments = [np.zeros(self.function.nnz_in(i)) for i in range(self.function.n_in())]
@@ -27,8 +36,13 @@ class FastCall:
         for i, result in enumerate(results):
             self._buffer.set_res(i, result.data)  # type: ignore[call-arg]
         # CasADi stores matrices by columns: these views have the shape that the caller sees
-        self._arguments = [a.reshape(_shape(self.function.size_in(i)), order="F") for i, a in enumerate(arguments)]
-        self._results = [r.reshape(_shape(self.function.size_out(i)), order="F") for i, r in enumerate(results)]
+        f, keep = self.function, set(matrices)
+        self._arguments = [
+            a.reshape(_shape(f.size_in(i), f.name_in(i) in keep), order="F") for i, a in enumerate(arguments)
+        ]
+        self._results = [
+            r.reshape(_shape(f.size_out(i), f.name_out(i) in keep), order="F") for i, r in enumerate(results)
+        ]
 
     def __call__(self, *arguments: FloatArray | float) -> tuple[FloatArray, ...]:
         """Evaluate. Column vectors come and go as (n,), matrices as (n, m); a number fits a (1,) argument.
@@ -44,7 +58,7 @@ class FastCall:
             raise ModelError(f"{self.function.name()}: {len(arguments)} arguments given, {len(self._arguments)} taken")
         for target, value in zip(self._arguments, arguments, strict=True):
             # NumPy would stretch a value of size 1 over a longer argument without a word
-            if target.size != 1 and np.shape(value) != target.shape:
+            if target.shape != (1,) and np.shape(value) != target.shape:
                 name = self.function.name_in([a is target for a in self._arguments].index(True))
                 raise ModelError(f"argument {name!r} has the shape {np.shape(value)}, the model takes {target.shape}")
             target[...] = value
@@ -56,8 +70,8 @@ class FastCall:
         return tuple([result.copy() for result in self._results])
 
 
-def _shape(size: tuple[int, int]) -> tuple[int, ...]:
-    return (size[0],) if size[1] == 1 else size
+def _shape(size: tuple[int, int], matrix: bool) -> tuple[int, ...]:
+    return (size[0],) if size[1] == 1 and not matrix else size
 
 
 def _dense(function: ca.Function) -> ca.Function:

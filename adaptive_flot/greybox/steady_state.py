@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Literal, cast
 
 import casadi as ca
 import numpy as np
@@ -55,7 +55,7 @@ def steady_state(
     scale = np.array([q.scale for q in model.states])
     start = guess if guess is not None else np.array([model.initial_guess.get(q.name, q.scale) for q in model.states])
     rate = FastCall(model.ode)
-    slope = FastCall(_state_jacobian(model))
+    slope = _jacobian(model, "x")
 
     def scaled_rate(s: FloatArray) -> FloatArray:
         scaled: FloatArray = rate(0.0, s * scale, u, p)[0] / scale
@@ -89,8 +89,8 @@ def steady_state_gradient(
     model: Model, state: FloatArray, inputs: FloatArray, parameters: FloatArray, wrt: Sequence[str]
 ) -> FloatArray:
     """d(steady state)/d(parameters) (nx, q) by the implicit function theorem, at a steady state."""
-    by_state = FastCall(_state_jacobian(model))(0.0, state, inputs, parameters)[0]
-    by_parameters = FastCall(_parameter_jacobian(model))(0.0, state, inputs, parameters)[0]
+    by_state = _jacobian(model, "x")(0.0, state, inputs, parameters)[0]
+    by_parameters = _jacobian(model, "p")(0.0, state, inputs, parameters)[0]
     columns = model.indices("parameters", wrt)
     scale = np.array([q.scale for q in model.states])
     scaled = by_state * scale[None, :] / scale[:, None]
@@ -98,11 +98,9 @@ def steady_state_gradient(
     return cast(FloatArray, -moved * scale[:, None])
 
 
-def _state_jacobian(model: Model) -> ca.Function:
+def _jacobian(model: Model, wrt: Literal["x", "p"]) -> FastCall:
+    """d(dx/dt)/d(x or p) as a function of (t, x, u, p)."""
     t, x, u, p = model.ode.sx_in()
-    return ca.Function("state_jacobian", [t, x, u, p], [ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], x))])
-
-
-def _parameter_jacobian(model: Model) -> ca.Function:
-    t, x, u, p = model.ode.sx_in()
-    return ca.Function("parameter_jacobian", [t, x, u, p], [ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], p))])
+    slope = ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], {"x": x, "p": p}[wrt]))
+    function = ca.Function("jacobian", [t, x, u, p], [slope], ["t", "x", "u", "p"], ["jacobian"])
+    return FastCall(function, matrices=("jacobian",))

@@ -203,12 +203,13 @@ def _replay(name: str, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Pa
     x_free = simulator.last_state(blocks.fit, batch.initial_state, p) if blocks.continues else batch.initial_state
     free_test = simulator.outputs(blocks.test, x_free, p)
 
+    known = batch.covariance if name in BATCH_ESTIMATORS else None  # held parameters keep what the fit knew of them
     tables = [
-        _table("fit", setup, blocks.fit, first, free_fit),
-        _table("test", setup, blocks.test, second, free_test, skip_first=blocks.continues),
+        _table("fit", setup, blocks.fit, first, free_fit, known),
+        _table("test", setup, blocks.test, second, free_test, known).iloc[1 if blocks.continues else 0 :],
     ]
     labels = [setup.model.parameters[i].label for i in setup.model.indices("parameters", setup.parameters)]
-    std = np.sqrt(np.diag(end.covariance))
+    std = np.sqrt(np.diag(end.covariance if known is None else known))
     return Replay(
         estimator=name,
         parameters={k: (float(v), float(s)) for k, v, s in zip(labels, end.parameters, std, strict=True)},
@@ -234,7 +235,7 @@ def _run(record: Dataset, estimator: AnyEstimator, setup: Setup, prior: Prior) -
 
 
 def _table(
-    block: str, setup: Setup, record: Dataset, steps: list[Step], free: FloatArray, *, skip_first: bool = False
+    block: str, setup: Setup, record: Dataset, steps: list[Step], free: FloatArray, known: FloatArray | None
 ) -> pd.DataFrame:
     model = setup.model
     estimates = [s.estimate for s in steps if s.estimate]
@@ -248,12 +249,13 @@ def _table(
             columns[f"{q.column}_innovation"] = record.outputs[:, j] - predicted[:, j]
             columns[f"{q.column}_free_run"] = free[:, j]
     theta = np.vstack([estimates[0].parameters, *(e.parameters for e in estimates)])
-    std = np.vstack([np.sqrt(np.diag(e.covariance)) for e in (estimates[0], *estimates)])
+    covariances = [e.covariance if known is None else known for e in (estimates[0], *estimates)]
+    std = np.vstack([np.sqrt(np.diag(c)) for c in covariances])
     for j, i in enumerate(model.indices("parameters", setup.parameters)):
         columns[f"{model.parameters[i].label}_estimate"] = theta[:, j]
         columns[f"{model.parameters[i].label}_std"] = std[:, j]
     columns["status"] = [estimates[0].status.name.lower(), *(e.status.name.lower() for e in estimates)]
-    return pd.DataFrame(columns).iloc[1 if skip_first else 0 :]
+    return pd.DataFrame(columns)
 
 
 def _errors(setup: Setup, table: pd.DataFrame) -> list[OutputError]:

@@ -11,7 +11,7 @@ from adaptive_flot.greybox.model import FloatArray
 
 
 class _Profile(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
 
 
 class Constant(_Profile):
@@ -48,8 +48,14 @@ class Random(_Profile):
     profile: Literal["random"]
     between: tuple[float, float]
     every_s: float = Field(gt=0)
-    seed: int | Literal["per_run"]
+    seed: Annotated[int, Field(ge=0)] | Literal["per_run"]
     """A number fixes the sequence for all runs; `per_run` draws another one for each run seed."""
+
+    @model_validator(mode="after")
+    def _order(self) -> Random:
+        if self.between[0] > self.between[1]:
+            raise ValueError("between must name the lower value first")
+        return self
 
     def values(self, time: FloatArray, seed: int) -> FloatArray:
         """Value held in the interval that starts at each time [s] (N,)."""

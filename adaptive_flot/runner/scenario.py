@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from adaptive_flot.errors import AdaptiveFlotError, ScenarioError, near_match
+from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import Setup
@@ -20,7 +20,7 @@ from adaptive_flot.runner.profiles import Change, InputProfile
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Measurement(_Part):
@@ -74,7 +74,7 @@ class ScenarioFile(_Part):
     cell: str | None = None
     duration_s: float = Field(gt=0)
     sampling_s: float = Field(default=1.0, gt=0)
-    seeds: list[int] = Field(default=[1], min_length=1)
+    seeds: list[Annotated[int, Field(ge=0)]] = Field(default=[1], min_length=1)
     inputs: dict[str, InputProfile]
     parameters: dict[str, Change] = Field(default_factory=dict)
     measurements: dict[str, Measurement]
@@ -171,7 +171,7 @@ def find_scenario(name: str) -> Path:
     if path.is_file():
         return path
     shipped = shipped_scenarios()
-    if path.stem in shipped and (path.suffix in ("", ".yaml")):
+    if name in (path.stem, f"{path.stem}.yaml") and path.stem in shipped:
         return shipped[path.stem]
     raise ScenarioError(f"{name}: no such scenario file; shipped: {near_match(path.stem, shipped)}")
 
@@ -197,14 +197,10 @@ def load_scenario(name: Path | str) -> Scenario:
         file = ScenarioFile.model_validate(content)
     except ValidationError as error:
         raise ScenarioError(f"{path}: {_first_problem(error, content)}") from error
-    try:
+    with located(path):
         model = make_model(file.model, cell=file.cell, folder=path.parent)
         scenario = Scenario(path.stem, path, file, model, _setup(file, model))
         _check(scenario)
-    except ScenarioError:
-        raise
-    except AdaptiveFlotError as error:
-        raise type(error)(f"{path}: {error}") from error
     return scenario
 
 
@@ -222,21 +218,28 @@ def _check(scenario: Scenario) -> None:
     columns = [q.column for q in model.inputs]
     for key in file.inputs:
         if key not in columns:
-            raise ScenarioError(f"{scenario.path}: inputs: unknown input {key!r}; {near_match(key, columns)}")
+            raise ScenarioError(f"inputs: unknown input {key!r}; {near_match(key, columns)}")
     for column in columns:
         if column not in file.inputs:
-            raise ScenarioError(f"{scenario.path}: inputs: {column!r} is missing; give its profile")
+            raise ScenarioError(f"inputs: {column!r} is missing; give its profile")
     model.indices("outputs", file.measurements)
-    for name in (*file.parameters, *file.initial_estimate.guess):
-        model.index("parameters", name)
+    with located("initial_estimate.guess"):
+        model.with_parameters(file.initial_estimate.guess)
+    with located("parameters"):
+        for name, value in zip(model.names("parameters"), scenario.true_parameters().T, strict=True):
+            for extreme in (value.min(), value.max()):
+                model.with_parameters({name: float(extreme)})
     intervals = file.duration_s / file.sampling_s
     if abs(intervals - round(intervals)) > 1e-9 or round(intervals) < 2:
-        raise ScenarioError(f"{scenario.path}: duration_s must be a whole number (2 or more) of sampling_s intervals")
-    if not file.initial_estimate.until_s < file.duration_s:
-        raise ScenarioError(f"{scenario.path}: initial_estimate.until_s must lie before the end, {file.duration_s:g} s")
+        raise ScenarioError("duration_s must be a whole number (2 or more) of sampling_s intervals")
+    if not 2 <= scenario.initial_rows < round(intervals):
+        raise ScenarioError(
+            f"initial_estimate.until_s = {file.initial_estimate.until_s:g} s must hold 2 intervals or more and lie "
+            f"before the end, {file.duration_s:g} s; correct it"
+        )
     if not file.initial_estimate.until_s <= scenario.fits_after < file.duration_s:
         raise ScenarioError(
-            f"{scenario.path}: fits_after_s = {scenario.fits_after:g} must lie between initial_estimate.until_s "
+            f"fits_after_s = {scenario.fits_after:g} must lie between initial_estimate.until_s "
             f"({file.initial_estimate.until_s:g} s) and the end ({file.duration_s:g} s); correct it"
         )
     for seed in file.seeds:

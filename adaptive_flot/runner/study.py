@@ -12,7 +12,7 @@ import pandas as pd
 
 from adaptive_flot import metrics
 from adaptive_flot.batch import BatchFit
-from adaptive_flot.errors import ScenarioError, near_match
+from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
@@ -91,14 +91,16 @@ def run_scenario(
     PluginError, ScenarioError
         An estimator or controller can not be loaded.
     """
-    chosen = {name: _estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
     runs: list[Run] = []
-    for seed in seeds or scenario.file.seeds:
-        for controller in scenario.file.controllers:
-            initial: dict[str, BatchFit] = {}  # before it starts, no estimator has touched the run: fit once
-            for name, plugin in chosen.items():
-                runs.append(_run(scenario, name, plugin, controller, seed, initial))
-                progress()
+    with located(scenario.path):
+        chosen = {name: _estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
+        for seed in seeds or scenario.file.seeds:
+            scenario.model.check_inputs(scenario.schedule(seed), scenario.starts, where=f"inputs of seed {seed}")
+            for controller in scenario.file.controllers:
+                initial: dict[str, BatchFit] = {}  # before it starts, no estimator has touched the run: fit once
+                for name, plugin in chosen.items():
+                    runs.append(_run(scenario, name, plugin, controller, seed, initial))
+                    progress()
     return runs
 
 
@@ -107,9 +109,7 @@ def _estimator_plugin(scenario: Scenario, name: str) -> Plugin:
         return scenario.file.estimators[name]
     if name in ESTIMATORS or ":" in name:
         return Plugin(use=name)
-    raise ScenarioError(
-        f"{scenario.path}: unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}"
-    )
+    raise ScenarioError(f"unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}")
 
 
 def _run(

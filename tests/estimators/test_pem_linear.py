@@ -107,7 +107,7 @@ def test_prior_std_pulls_as_the_bayesian_formula_says(prior_std: float) -> None:
     for _ in range(30):
         information = X.T @ X / sigma**2 + np.eye(2) / prior_std**2
         theta = np.linalg.solve(information, X.T @ y / sigma**2 + 0.5 / prior_std**2)
-        sigma = float(np.sqrt(np.mean((y - X @ theta) ** 2)))
+        sigma = float(np.sqrt(np.sum((y - X @ theta) ** 2) / (len(y) - 2)))
     np.testing.assert_allclose(found.values(), theta, atol=0.02 * np.sqrt(np.linalg.inv(information).max()))
     np.testing.assert_allclose(found.covariance, np.linalg.inv(information), rtol=0.06, atol=1e-3 * prior_std**2)
 
