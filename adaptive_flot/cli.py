@@ -100,7 +100,7 @@ def estimate(
     """Replay a measured record through fixed, recursive and batch estimation."""
     from adaptive_flot.console import print_estimate, progress_bar
     from adaptive_flot.errors import CellError
-    from adaptive_flot.processes.registry import make_model
+    from adaptive_flot.processes.registry import find_cell, make_model
     from adaptive_flot.runner.estimate import estimate_record, read_blocks
     from adaptive_flot.runner.results import write_json
     from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, write_replays
@@ -119,7 +119,7 @@ def estimate(
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, estimate_summary(data, result))
     if save_cell is not None:
-        save_fitted_cell(result, cell, save_cell)
+        save_fitted_cell(result, find_cell(cell, data.parent), save_cell)
     print_estimate(result)
     from adaptive_flot.report.estimate import write_estimate_report
 
@@ -144,9 +144,6 @@ def main() -> None:
         app()
     except AdaptiveFlotError as error:
         sys.stderr.write(f"adaptive-flot: {' '.join(str(error).split())}\n")
-        sys.exit(USER_ERROR)
-    except (PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError) as error:
-        sys.stderr.write(f"adaptive-flot: {error.filename}: {error.strerror}; give a path that can be written\n")
         sys.exit(USER_ERROR)
 
 

@@ -34,6 +34,10 @@ class RangeError(AdaptiveFlotError):
     """A quantity leaves the range in which the model means anything: level above the cell, negative flow."""
 
 
+class OutputError(AdaptiveFlotError):
+    """A result can not be written: folder missing, no permission, a folder where a file should be."""
+
+
 class PluginError(AdaptiveFlotError):
     """An estimator, controller or model named in a file or on the command line can not be loaded."""
 

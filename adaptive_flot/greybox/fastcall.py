@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 
 import casadi as ca
 import numpy as np
@@ -28,6 +30,7 @@ class FastCall:
     def __init__(self, function: ca.Function, matrices: Sequence[str] = ()) -> None:
         self.function = _dense(function)
         self._buffer, self._evaluate = self.function.buffer()
+        self._plain = bool(self.function.is_a("SXFunction"))
         arguments = [np.zeros(self.function.nnz_in(i)) for i in range(self.function.n_in())]
         results = [np.zeros(self.function.nnz_out(i)) for i in range(self.function.n_out())]
         # SWIG turns a memoryview into pointer and size; the stubs know only the C signature
@@ -62,12 +65,20 @@ class FastCall:
                 name = self.function.name_in([a is target for a in self._arguments].index(True))
                 raise ModelError(f"argument {name!r} has the shape {np.shape(value)}, the model takes {target.shape}")
             target[...] = value
-        try:
+        if self._plain:
             self._evaluate()
-        except RuntimeError:
-            for result in self._results:
-                result[...] = np.nan
+        else:
+            self._evaluate_quietly()
         return tuple([result.copy() for result in self._results])
+
+    def _evaluate_quietly(self) -> None:
+        """An integrator may give up: then the results are NaN, and what it prints of its troubles is not shown."""
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            try:
+                self._evaluate()
+            except RuntimeError:
+                for result in self._results:
+                    result[...] = np.nan
 
 
 def _shape(size: tuple[int, int], matrix: bool) -> tuple[int, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,6 +16,10 @@ from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import Setup
 from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.profiles import Change, InputProfile
+from adaptive_flot.runner.yaml_problems import first_problem
+
+MOST_INTERVALS = 1e7
+"""Longest run: its table still fits into memory."""
 
 
 class _Part(BaseModel):
@@ -196,7 +199,7 @@ def load_scenario(name: Path | str) -> Scenario:
     try:
         file = ScenarioFile.model_validate(content)
     except ValidationError as error:
-        raise ScenarioError(f"{path}: {_first_problem(error, content)}") from error
+        raise ScenarioError(f"{path}: {first_problem(error, ScenarioFile)}") from error
     with located(path):
         model = make_model(file.model, cell=file.cell, folder=path.parent)
         scenario = Scenario(path.stem, path, file, model, _setup(file, model))
@@ -214,6 +217,8 @@ def _setup(file: ScenarioFile, model: Model) -> Setup:
 
 
 def _check(scenario: Scenario) -> None:
+    """Check what one key alone does not show: times, names of the model, ranges."""
+    _check_times(scenario)
     file, model = scenario.file, scenario.model
     columns = [q.column for q in model.inputs]
     for key in file.inputs:
@@ -229,9 +234,17 @@ def _check(scenario: Scenario) -> None:
         for name, value in zip(model.names("parameters"), scenario.true_parameters().T, strict=True):
             for extreme in (value.min(), value.max()):
                 model.with_parameters({name: float(extreme)})
+    for seed in file.seeds:
+        model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
+
+
+def _check_times(scenario: Scenario) -> None:
+    file = scenario.file
     intervals = file.duration_s / file.sampling_s
-    if abs(intervals - round(intervals)) > 1e-9 or round(intervals) < 2:
-        raise ScenarioError("duration_s must be a whole number (2 or more) of sampling_s intervals")
+    if not 2 <= intervals <= MOST_INTERVALS or abs(intervals - round(intervals)) > 1e-9:
+        raise ScenarioError(
+            f"duration_s = {file.duration_s:g} must be a whole number (2 to {MOST_INTERVALS:g}) of sampling_s intervals"
+        )
     if not 2 <= scenario.initial_rows < round(intervals):
         raise ScenarioError(
             f"initial_estimate.until_s = {file.initial_estimate.until_s:g} s must hold 2 intervals or more and lie "
@@ -242,53 +255,3 @@ def _check(scenario: Scenario) -> None:
             f"fits_after_s = {scenario.fits_after:g} must lie between initial_estimate.until_s "
             f"({file.initial_estimate.until_s:g} s) and the end ({file.duration_s:g} s); correct it"
         )
-    for seed in file.seeds:
-        model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
-
-
-def _first_problem(error: ValidationError, content: Mapping[str, Any]) -> str:
-    """Turn the first problem into one line: key path, what is wrong, nearest known key."""
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        known = _known_keys(first["loc"][:-1], content)
-        hint = f"; {near_match(str(first['loc'][-1]), known)}" if known else ""
-        return f"unknown key {place!r}{hint}"
-    if first["type"] == "missing":
-        return f"key {place!r} is missing; add it"
-    got = first.get("input")
-    shown = f", got {got!r}" if not isinstance(got, dict) else ""
-    return f"{place}: {first['msg'].removeprefix('Value error, ')}{shown}; correct it"
-
-
-def _known_keys(where: tuple[int | str, ...], content: Mapping[str, Any]) -> list[str]:
-    """Keys that are allowed at a place of the file."""
-    model: Any = ScenarioFile
-    for part in where:
-        fields = getattr(model, "model_fields", {})
-        model = _nested(fields[part].annotation, part, where) if part in fields else model
-        if isinstance(model, dict):
-            model = model.get(str(where[-1]), ScenarioFile)
-    fields = getattr(model, "model_fields", {})
-    del content
-    return [f.alias or name.rstrip("_") for name, f in fields.items()]
-
-
-def _nested(annotation: Any, part: int | str, where: tuple[int | str, ...]) -> Any:
-    del part
-    candidates = _models(annotation)
-    by_profile = {
-        m.model_fields["profile"].annotation.__args__[0]: m for m in candidates if "profile" in m.model_fields
-    }
-    if len(by_profile) > 1:
-        return by_profile.get(str(where[-1]), candidates[0])
-    return candidates[0] if candidates else None
-
-
-def _models(annotation: Any) -> list[Any]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    found: list[Any] = []
-    for argument in getattr(annotation, "__args__", ()):
-        found += _models(argument)
-    return found

@@ -8,7 +8,6 @@ from typing import Any
 
 from adaptive_flot.greybox.tables import write_table
 from adaptive_flot.processes.flotation import save_cell
-from adaptive_flot.processes.registry import find_cell
 from adaptive_flot.runner.estimate import RecordEstimate
 
 
@@ -45,7 +44,7 @@ def write_replays(result: RecordEstimate, folder: Path) -> None:
         write_table(replay.table, folder / f"{replay.estimator.replace(':', '-').replace('/', '-')}.csv")
 
 
-def save_fitted_cell(result: RecordEstimate, cell: str | None, path: Path) -> None:
-    """Write the batch fit as a cell file that `run`, `simulate` and `estimate` accept."""
+def save_fitted_cell(result: RecordEstimate, cell: Path, path: Path) -> None:
+    """Write the batch fit as a copy of a cell file; `run`, `simulate` and `estimate` accept it."""
     values = {e.name: e.value for e in result.batch.estimates}
-    save_cell(find_cell(cell), values, f"calibrated on {result.blocks.name}", path)
+    save_cell(cell, values, f"calibrated on {result.blocks.name}", path)

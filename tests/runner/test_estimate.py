@@ -18,6 +18,7 @@ from adaptive_flot.processes.flotation import make_model as make_cell
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import full_parameters
+from adaptive_flot.resources import cell_file
 from adaptive_flot.runner.estimate import Blocks, OutputError, RecordEstimate, estimate_record, read_blocks
 from adaptive_flot.runner.results import plain
 from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, write_replays
@@ -218,7 +219,7 @@ def test_replays_are_written_by_estimator(result: RecordEstimate, tmp_path: Path
 
 def test_the_fitted_cell_is_the_model_of_the_fit(result: RecordEstimate, tmp_path: Path) -> None:
     file = tmp_path / "fitted.yaml"
-    save_fitted_cell(result, None, file)
+    save_fitted_cell(result, cell_file(), file)
     fitted = make_cell(read_cell(file))
     np.testing.assert_allclose(fitted.parameter_values, result.batch.parameters, rtol=1e-12)
     changed = [p for p in fitted.parameters if "calibrated on plant" in p.source]

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.errors import DataError
+from adaptive_flot.errors import DataError, OutputError
 from adaptive_flot.files import replace_file, replace_path, write_text
 from adaptive_flot.greybox.tables import read_table, write_table
 from adaptive_flot.protocols import Status
@@ -104,7 +104,7 @@ def test_an_interrupted_table_leaves_nothing(tmp_path: Path, monkeypatch: pytest
         raise OSError("disk full")
 
     monkeypatch.setattr(pd.DataFrame, "to_csv", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(OutputError, match=r"t\.csv: can not be written \(disk full\)"):
         write_table(pd.DataFrame({"a": [1.0]}), tmp_path / "t.csv")
     assert list(tmp_path.iterdir()) == []
 

@@ -39,6 +39,8 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[str]]] = {
     "number for a list": ({"seeds": 3}, ["seeds", "3"]),
     "negative duration": ({"duration_s": -5}, ["duration_s", "-5"]),
     "infinite duration": ({"duration_s": float("inf")}, ["duration_s"]),
+    "duration beyond all memory": ({"duration_s": 1e30}, ["duration_s"]),
+    "duration of no interval": ({"duration_s": 1e-3}, ["duration_s"]),
     "negative seed": ({"seeds": [1, -1]}, ["seeds", "-1"]),
     "negative seed of a profile": ({"inputs.level_setpoint_m.seed": -3}, ["level_setpoint_m", "-3"]),
     "limits of a random input turned round": ({"inputs.level_setpoint_m.between": [0.42, 0.33]}, ["level_setpoint"]),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pandas as pd
@@ -225,9 +227,9 @@ def test_the_truth_is_hidden_from_estimators_and_controllers(
 
     monkeypatch.setitem(vars(plugins)["ESTIMATORS"], "fixed", "spies:SpyEstimator")
     monkeypatch.setitem(vars(plugins)["CONTROLLERS"], "schedule", "spies:SpyController")
-    module = type(pytest)("spies")
+    module = ModuleType("spies")
     vars(module).update(SpyEstimator=SpyEstimator, SpyController=SpyController)
-    monkeypatch.setitem(__import__("sys").modules, "spies", module)
+    monkeypatch.setitem(sys.modules, "spies", module)
 
     changed = {"C": {"profile": "step", "change": 0.3, "from_s": 0, "to_s": 1}}
     loaded = load_scenario(write_scenario({"parameters": changed, "initial_estimate.guess": {}}))

@@ -220,8 +220,8 @@ def _operation(file: Path, content: Mapping[str, Any]) -> dict[str, tuple[float,
         if key == "air_flow_valid" and key not in given:
             continue
         values[key] = tuple(_entry(file, given, "operation", key, unit).values)
-        low, high = values[key][0], values[key][-1]
-        if len(values[key]) != (2 if key.endswith(("limits", "valid")) else 1) or not 0 <= low <= high < np.inf:
+        count = 2 if key.endswith(("limits", "valid")) else 1
+        if len(values[key]) != count or not 0 <= values[key][0] <= values[key][-1] < np.inf:
             raise CellError(f"{file}: operation.{key} = {list(values[key])}; give positive values, lower one first")
     return values
 
