@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
@@ -12,13 +11,13 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.quantities import Kind
 from adaptive_flot.greybox.scope import Scope
 
-if TYPE_CHECKING:
-    from adaptive_flot.greybox.model import Model
-
 NEWTON_STEPS = 3
 """Newton iterations that close the algebraic loop inside the explicit right-hand side. Convergence is quadratic from a
 physical guess: at a thick overflow (n 20 % below nominal, much air, high level) the second leaves 2e-5 of the gas
 velocity, the third 2e-10."""
+
+
+Names = Mapping[Kind, Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -41,8 +40,8 @@ def _collect(what: str, declared: Sequence[str], given: Mapping[str, ca.SX], mod
     return ca.vertcat(*(given[n] for n in declared)) if declared else ca.SX(0, 1)
 
 
-def build(model: Model) -> Built:
-    """Write the model's equations into a scope and make its functions.
+def build(model: str, names: Names, equations: Callable[[Scope], None]) -> Built:
+    """Write the equations of the model named `model` into a scope and make its functions; `names` by kind.
 
     Raises
     ------
@@ -50,17 +49,17 @@ def build(model: Model) -> Built:
         A derivative, output, signal or residual is missing, given twice or not declared.
     """
     kinds: tuple[Kind, ...] = ("states", "inputs", "parameters", "algebraic")
-    symbols: dict[Kind, dict[str, ca.SX]] = {k: {n: ca.SX.sym(n) for n in model.names(k)} for k in kinds}
+    symbols: dict[Kind, dict[str, ca.SX]] = {k: {n: ca.SX.sym(n) for n in names[k]} for k in kinds}
     t = ca.SX.sym("t")
     scope = Scope(symbols, t)
-    model.equations(scope)
+    equations(scope)
 
     x, u, p, z = (ca.vertcat(*symbols[k].values()) if symbols[k] else ca.SX(0, 1) for k in kinds)
-    rates = _collect("derivatives", model.names("states"), scope.derivatives, model.name)
-    outputs = _collect("outputs", model.names("outputs"), scope.outputs, model.name)
-    signals = _collect("signals", model.names("signals"), scope.signals, model.name)
+    rates = _collect("derivatives", names["states"], scope.derivatives, model)
+    outputs = _collect("outputs", names["outputs"], scope.outputs, model)
+    signals = _collect("signals", names["signals"], scope.signals, model)
     residuals = {n: r for n, (r, _) in scope.residuals.items()}
-    residual = _collect("residuals", model.names("algebraic"), residuals, model.name)
+    residual = _collect("residuals", names["algebraic"], residuals, model)
 
     options = {"cse": True}
     dae = ca.Function(
@@ -71,17 +70,17 @@ def build(model: Model) -> Built:
         ["xdot", "residual", "y", "s"],
         options,
     )
-    value = ca.vertcat(*(scope.residuals[n][1] for n in model.names("algebraic")))
-    if model.algebraic:
+    value = ca.vertcat(*(scope.residuals[n][1] for n in names["algebraic"]))
+    if names["algebraic"]:
         newton = ca.Function("newton", [t, x, u, p, z], [residual, ca.jacobian(residual, z)], options)
         for _ in range(NEWTON_STEPS):
             f, slope = newton(t, x, u, p, value)
-            value = value - (f / slope if len(model.algebraic) == 1 else ca.solve(slope, f))
+            value = value - (f / slope if len(names["algebraic"]) == 1 else ca.solve(slope, f))
     else:
         value = ca.SX(0, 1)
     xdot, _, y, s = dae(t, x, u, p, value)
     ode = ca.Function("ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options)
-    rates_of_decay = ca.vertcat(*(scope.decays.get(n, ca.SX(0)) for n in model.names("states")))
+    rates_of_decay = ca.vertcat(*(scope.decays.get(n, ca.SX(0)) for n in names["states"]))
     decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
     return Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites))
 

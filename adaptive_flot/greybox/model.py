@@ -177,4 +177,5 @@ class Model:
 
     @cached_property
     def _built(self) -> Built:
-        return build(self)
+        kinds: tuple[Kind, ...] = ("states", "inputs", "parameters", "outputs", "signals", "algebraic")
+        return build(self.name, {kind: self.names(kind) for kind in kinds}, self.equations)
