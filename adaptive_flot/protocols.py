@@ -27,6 +27,7 @@ class Status(Enum):
     MISSING = "measurement missing: predicted only"
     PROJECTED = "estimate projected onto its bounds"
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
+    NOT_CONVERGED = "search stopped before it converged: best values so far"
     INITIALISING = "collecting the record for the initial estimate"
 
 

@@ -7,7 +7,7 @@ Identification*, 1999, chapter 7; Gauss-Newton in a trust region with bounds, `s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 import numpy as np
@@ -25,6 +25,8 @@ InitialState = Literal["steady", "estimated", "given"]
 WEIGHT_PASSES = 5
 """Fits in turn, each weighted with the noise levels that the last one left, until these stand still."""
 NOISE_CONVERGED = 0.01
+MOST_EVALUATIONS = 1000
+"""Simulations of the record in one search."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ class Pem:
         -------
         BatchFit
             Estimates with covariance, noise level, initial and last state, identifiability verdict and a status:
-            `OK`, `PROJECTED` (a parameter ends on a bound) or `NOT_FINITE` (the model can not simulate the record).
+            `OK`, `PROJECTED` (a parameter ends on a bound), `NOT_CONVERGED` (the search ran out of evaluations) or
+            `NOT_FINITE` (the model can not simulate the record).
 
         Raises
         ------
@@ -107,9 +110,11 @@ class Pem:
             unknowns, used = cast(FloatArray, solution.x), noise
             evaluations += int(solution.nfev)
             noise = freedom * self._noise(self._errors(record, problem, unknowns, measured))
-            if np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
+            converged = solution.status > 0
+            if not converged or np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
                 break
-        return self._result(record, problem, unknowns, noise, present, evaluations)
+        found = self._result(record, problem, unknowns, noise, present, evaluations)
+        return found if converged else replace(found, status=Status.NOT_CONVERGED)
 
     # -- the least-squares problem ---------------------------------------------------------------------------------
 
@@ -201,7 +206,14 @@ class Pem:
             return None
         inside = np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9)
         return least_squares(
-            residuals, inside, jacobian, bounds=(problem.lower, problem.upper), method="trf", xtol=1e-10, ftol=1e-10
+            residuals,
+            inside,
+            jacobian,
+            bounds=(problem.lower, problem.upper),
+            method="trf",
+            xtol=1e-10,
+            ftol=1e-10,
+            max_nfev=MOST_EVALUATIONS,
         )
 
     def _first_noise(self, measured: FloatArray) -> FloatArray:

@@ -231,8 +231,9 @@ def _check(scenario: Scenario) -> None:
     with located("initial_estimate.guess"):
         model.with_parameters(file.initial_estimate.guess)
     with located("parameters"):
-        for name, value in zip(model.names("parameters"), scenario.true_parameters().T, strict=True):
-            for extreme in (value.min(), value.max()):
+        for name in file.parameters:
+            values = scenario.true_parameters()[:, model.index("parameters", name)]
+            for extreme in (values.min(), values.max()):
                 model.with_parameters({name: float(extreme)})
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")

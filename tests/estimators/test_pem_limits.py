@@ -120,3 +120,13 @@ def test_a_group_of_parameters_is_fitted_as_its_members(model: Model, cell_case:
     found = Pem(Setup(model, 1.0, names, ("concentrate_grade",))).fit(record)
     assert tuple(e.name for e in found.estimates) == names
     assert [e.unit for e in found.estimates] == ["-", "-"]
+
+
+def test_a_search_that_runs_out_of_evaluations_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best values so far come with a status of their own, not with OK."""
+    monkeypatch.setattr("estimators.pem.MOST_EVALUATIONS", 1)
+    model = toys.linear(2)
+    record = toys.record(model, np.random.default_rng(3).normal(size=(30, 2)), parameters={"th0": 3.0, "th1": -2.0})
+    setup = Setup(model, 1.0, model.names("parameters"), model.names("outputs"))
+    found = Pem(setup, initial_state="given").fit(record)
+    assert found.status is Status.NOT_CONVERGED and np.isfinite(found.values()).all()
