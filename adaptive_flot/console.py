@@ -39,7 +39,9 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
             own = [run for run in runs if run.estimator == name]
             cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
             table.add_row(scenario.name, name, str(len(own)), *cells)
-    Console(width=None if Console().is_terminal else 140).print(table)
+    console = Console(width=None if Console().is_terminal else 140)
+    console.print(table)
+    console.file.flush()  # a reader on a pipe sees the result before the report is drawn
 
 
 def _fit_cell(values: Sequence[float], published: float | None) -> str:

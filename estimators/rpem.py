@@ -90,6 +90,7 @@ class Rpem:
         self.gradient = gradient
         self.l0_scale = l0_scale
         self._columns = setup.model.indices("outputs", setup.outputs)
+        self._shape = (len(setup.model.outputs),)
         self._p = setup.model.parameter_values
         self._update = FastCall(
             _update_function(setup, forgetting, gradient), matrices=("covariance", "covariance_next")
@@ -108,10 +109,11 @@ class Rpem:
     def update(self, state: RpemState, sample: Sample) -> tuple[RpemState, Estimate]:
         """Predict, compare, correct; see `Estimator.update`."""
         measured = np.asarray(sample.outputs, dtype=float)
-        if measured.shape != (len(self.setup.model.outputs),):
-            raise ModelError(f"a sample has {measured.shape} outputs, the model ({len(self.setup.model.outputs)},)")
+        if measured.shape != self._shape:
+            raise ModelError(f"a sample has {measured.shape} outputs, the model {self._shape}")
         driving = measured[self._columns]
         present = np.isfinite(driving)
+        count = np.count_nonzero(present)
         x, theta, covariance, prediction, expected_std, flags = self._update(
             state.x,
             state.time,
@@ -120,10 +122,10 @@ class Rpem:
             state.theta,
             state.covariance,
             state.noise_std,
-            np.where(present, driving, 0.0),
+            driving if count == present.size else np.where(present, driving, 0.0),
             present,
         )
-        status = Status.OK if present.any() else Status.MISSING
+        status = Status.OK if count else Status.MISSING
         if not math.isfinite(flags[0]):
             x, theta, covariance, status = state.x, state.theta, state.covariance, Status.NOT_FINITE
         elif flags[1] > 0:

@@ -61,9 +61,10 @@ class FastCall:
             raise ModelError(f"{self.function.name()}: {len(arguments)} arguments given, {len(self._arguments)} taken")
         for target, value in zip(self._arguments, arguments, strict=True):
             # NumPy would stretch a value of size 1 over a longer argument without a word
-            if target.shape != (1,) and np.shape(value) != target.shape:
+            shape = value.shape if isinstance(value, np.ndarray) else ()
+            if shape != target.shape and target.shape != (1,):
                 name = self.function.name_in([a is target for a in self._arguments].index(True))
-                raise ModelError(f"argument {name!r} has the shape {np.shape(value)}, the model takes {target.shape}")
+                raise ModelError(f"argument {name!r} has the shape {shape}, the model takes {target.shape}")
             target[...] = value
         if self._plain:
             self._evaluate()
