@@ -38,13 +38,14 @@ def run(
     parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
-    from adaptive_flot.console import print_fits, progress_bar
+    from adaptive_flot.console import print_accounts, print_fits, progress_bar
     from adaptive_flot.runner.results import run_summary, write_json, write_runs
     from adaptive_flot.runner.scenario import load_scenario
     from adaptive_flot.runner.study import run_scenario
 
     loaded = load_scenario(scenario)
-    count = len(estimator or loaded.file.estimators) * len(seed or loaded.file.seeds) * len(loaded.file.controllers)
+    combinations = loaded.combinations(estimator or list(loaded.file.estimators))
+    count = len(combinations) * len(seed or loaded.file.seeds)
     with progress_bar(loaded.name, count) as advance:
         runs = run_scenario(loaded, estimator or (), seed or (), advance)
     folder = out or Path("results") / loaded.name
@@ -53,6 +54,7 @@ def run(
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, summary)
     print_fits([(loaded, runs)])
+    print_accounts(loaded, runs)
     from adaptive_flot.report.html import write_run_report
 
     write_run_report([(loaded, runs)], folder / "report.html", command=_command())

@@ -35,13 +35,45 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
         table.add_column(key, justify="right")
     for scenario, runs in results:
         published = scenario.file.published.fits if scenario.file.published else {}
-        for name in dict.fromkeys(run.estimator for run in runs):
-            own = [run for run in runs if run.estimator == name]
+        several = len({run.controller for run in runs}) > 1
+        for name, controller in dict.fromkeys((run.estimator, run.controller) for run in runs):
+            own = [run for run in runs if (run.estimator, run.controller) == (name, controller)]
             cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
-            table.add_row(scenario.name, name, str(len(own)), *cells)
+            shown = f"{name} ({controller})" if several else name
+            table.add_row(scenario.name, shown, str(len(own)), *cells)
     console = Console(width=None if Console().is_terminal else 140)
     console.print(table)
     console.file.flush()  # a reader on a pipe sees the result before the report is drawn
+
+
+def print_accounts(scenario: Scenario, runs: Sequence[Run]) -> None:
+    """Print recovery, grade and value of each controller and estimator where the scenario has economics."""
+    if not any(run.account for run in runs):
+        return
+    limit = scenario.limits.grade if scenario.limits else float("nan")
+    table = Table(title=f"{scenario.name}: account of the closed loop, medians over the seeds; grade limit {limit:g}")
+    for heading in (
+        "controller",
+        "estimator",
+        "recovery",
+        "mean grade",
+        "time below limit",
+        "value, cu/h",
+        "solve, ms",
+    ):
+        table.add_column(heading, justify="left" if heading in ("controller", "estimator") else "right")
+    for controller, estimator in dict.fromkeys((r.controller, r.estimator) for r in runs):
+        own = [r for r in runs if (r.controller, r.estimator) == (controller, estimator)]
+        recovery, grade, below, value = (
+            statistics.median(r.account[key] for r in own)
+            for key in ("recovery", "mean_grade", "below_limit", "value_cu_h")
+        )
+        solves = [1e3 * s for r in own if "solve_seconds" in r.table for s in r.table["solve_seconds"].dropna()]
+        cells = (f"{recovery:.4f}", f"{grade:.4f}", f"{below:.1%}", f"{value:.3f}")
+        table.add_row(controller, estimator, *cells, f"{statistics.median(solves):.0f}" if solves else "")
+    console = Console(width=None if Console().is_terminal else 140)
+    console.print(table)
+    console.file.flush()
 
 
 def _fit_cell(values: Sequence[float], published: float | None) -> str:

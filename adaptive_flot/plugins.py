@@ -15,10 +15,16 @@ from adaptive_flot.errors import PluginError, near_match
 # Addresses, not imports: the core never imports a plug-in.
 ESTIMATORS: Mapping[str, str] = {
     "fixed": "estimators.fixed:Fixed",
+    "oracle": "estimators.oracle:Oracle",
     "rpem": "estimators.rpem:Rpem",
 }
 BATCH_ESTIMATORS: Mapping[str, str] = {"pem": "estimators.pem:Pem"}
-CONTROLLERS: Mapping[str, str] = {"schedule": "controllers.schedule:Schedule"}
+CONTROLLERS: Mapping[str, str] = {
+    "economic_mpc": "controllers.economic_mpc:EconomicMpc",
+    "hold": "controllers.hold:Hold",
+    "pi": "controllers.pi:Pi",
+    "schedule": "controllers.schedule:Schedule",
+}
 
 
 def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | None = None) -> Any:

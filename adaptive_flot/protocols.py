@@ -10,11 +10,12 @@ Time convention: the inputs of a sample are those held during the interval that 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Protocol, TypeVar
 
+from adaptive_flot.economics import Prices
 from adaptive_flot.greybox.model import FloatArray, Model
 
 State = TypeVar("State")
@@ -28,6 +29,10 @@ class Status(Enum):
     PROJECTED = "estimate projected onto its bounds"
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
     NOT_CONVERGED = "search stopped before it converged: best values so far"
+    RETRIED = "solved at the second try, from a cold start"
+    SHIFTED_PLAN = "no valid solution: the plan of the step before goes on"
+    HELD = "no valid solution and no plan: the inputs are held"
+    SAFE_INPUT = "nothing else was valid: the safe inputs"
     INITIALISING = "collecting the record for the initial estimate"
 
 
@@ -54,12 +59,15 @@ class Setup:
         Names of the q adapted parameters.
     outputs
         Names of the measured outputs that drive the adaptation.
+    truth
+        True parameters (N, np), row k for the interval that starts at k dt: for the oracle only, None for all others.
     """
 
     model: Model
     dt: float
     parameters: tuple[str, ...] = ("growth_exponent", "coalescence_rate")
     outputs: tuple[str, ...] = ("concentrate_grade",)
+    truth: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -146,20 +154,75 @@ class Estimator(Protocol[State]):
 
 @dataclass(frozen=True)
 class Decision:
-    """Info record of one controller step: inputs (nu,) to hold until the next, a status and who decided."""
+    """Info record of one controller step.
+
+    Attributes
+    ----------
+    inputs
+        Inputs (nu,) to hold until the next decision.
+    status
+        What happened.
+    decided_by
+        Who took it: a controller, or the fallback that stepped in.
+    solve_seconds
+        Wall-clock time of the optimisation; NaN where none ran.
+    message
+        What was wrong, in words: the most violated constraints of a failed solve.
+    """
 
     inputs: FloatArray
     status: Status
     decided_by: str
+    solve_seconds: float = float("nan")
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where a cell may be run.
+
+    Attributes
+    ----------
+    grade
+        Lowest concentrate grade allowed [-].
+    level
+        Range of the pulp height [m] (2,).
+    inputs
+        Range of each moved input by name, in its unit.
+    moves
+        Largest move of each of them from one control move to the next.
+    """
+
+    grade: float
+    level: tuple[float, float]
+    inputs: Mapping[str, tuple[float, float]]
+    moves: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class ControllerSetup:
-    """What a controller is built for: the model, the sampling interval [s] and the planned inputs (N, nu)."""
+    """What a controller is built for.
+
+    Attributes
+    ----------
+    model
+        The grey-box model.
+    dt
+        Sampling interval [s].
+    schedule
+        Planned inputs (N, nu): what an open-loop run plays, and where a closed loop starts.
+    parameters
+        Names of the adapted parameters, in the order of `Estimate.parameters`.
+    limits, prices
+        For controllers that need them; a scenario without economics has none.
+    """
 
     model: Model
     dt: float
     schedule: FloatArray
+    parameters: tuple[str, ...] = ()
+    limits: Limits | None = None
+    prices: Prices | None = None
 
 
 class Controller(Protocol[State]):

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from adaptive_flot.economics import Prices
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
@@ -34,6 +35,7 @@ from adaptive_flot.protocols import (
     ControllerSetup,
     Decision,
     Estimate,
+    Limits,
     Prior,
     Sample,
     Setup,
@@ -55,17 +57,18 @@ class EstimatorCase:
 
 @dataclass(frozen=True)
 class ControllerCase:
-    """A controller, and samples and estimates to decide on."""
+    """A controller, and samples with the estimates to decide on (true state, nominal parameters)."""
 
     controller: AnyController
     setup: ControllerSetup
     samples: tuple[Sample, ...]
+    estimates: tuple[Estimate, ...]
 
 
 def estimator_case(factory: Callable[..., AnyEstimator], seed: int = 1, **options: Any) -> EstimatorCase:
     """Build a case for an estimator class or factory, called as `factory(setup, **options)`."""
     setup = Setup(flotation.make_model(), dt=1.0)
-    inputs, samples = _record(setup, seed)
+    inputs, samples, _ = _record(setup, seed)
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     prior = Prior(
         time=0.0,
@@ -80,12 +83,32 @@ def estimator_case(factory: Callable[..., AnyEstimator], seed: int = 1, **option
 def controller_case(factory: Callable[..., AnyController], seed: int = 1, **options: Any) -> ControllerCase:
     """Build a case for a controller class or factory, called as `factory(setup, **options)`."""
     setup = Setup(flotation.make_model(), dt=1.0)
-    inputs, samples = _record(setup, seed)
-    controller_setup = ControllerSetup(setup.model, setup.dt, inputs)
-    return ControllerCase(factory(controller_setup, **options), controller_setup, samples)
+    inputs, samples, states = _record(setup, seed)
+    nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
+    limits = Limits(
+        grade=0.20,
+        level=(0.33, 0.42),
+        inputs={"air_flow": (9.05e-4, 2.17e-3), "level_setpoint": (0.33, 0.42)},
+        moves={"air_flow": 2e-4, "level_setpoint": 0.01},
+    )
+    controller_setup = ControllerSetup(setup.model, setup.dt, inputs, setup.parameters, limits, Prices())
+    estimates = tuple(
+        Estimate(
+            time=sample.time,
+            prediction=sample.outputs,
+            innovation=np.zeros_like(sample.outputs),
+            innovation_std=np.full(len(setup.outputs), NOISE_STD),
+            parameters=nominal,
+            covariance=np.diag((0.02 * nominal) ** 2),
+            state=state,
+            status=Status.OK,
+        )
+        for sample, state in zip(samples, states, strict=True)
+    )
+    return ControllerCase(factory(controller_setup, **options), controller_setup, samples, estimates)
 
 
-def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...]]:
+def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...], FloatArray]:
     generator = np.random.default_rng(seed)
     model = setup.model
     inputs = np.tile([1.5e-3, 1.67e-4, 0.38], (ROWS, 1))
@@ -95,7 +118,7 @@ def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...]]:
     run = Stepper(model, setup.dt).simulate(steady_state(model, inputs[0]).state, inputs, p)
     outputs = run.outputs * (1 + 1e-3 * generator.standard_normal(run.outputs.shape))
     samples = (Sample(float(t), u, y) for t, u, y in zip(run.time, inputs, outputs, strict=True))
-    return inputs, tuple(samples)
+    return inputs, tuple(samples), run.states
 
 
 # -- estimators ----------------------------------------------------------------------------------------------------
@@ -235,11 +258,13 @@ ESTIMATOR_CHECKS: tuple[Callable[[EstimatorCase], None], ...] = (
 # -- controllers ---------------------------------------------------------------------------------------------------
 
 
-def run_controller(case: ControllerCase, state: Any, samples: Sequence[Sample | None]) -> tuple[Any, list[Decision]]:
-    """Ask for a decision on each sample; the last state and every decision."""
+def run_controller(
+    case: ControllerCase, state: Any, samples: Sequence[Sample | None], estimates: Sequence[Estimate | None]
+) -> tuple[Any, list[Decision]]:
+    """Ask for a decision on each sample with its estimate; the last state and every decision."""
     decisions = []
-    for sample in samples:
-        state, decision = case.controller.decide(state, sample, None)
+    for sample, estimate in zip(samples, estimates, strict=True):
+        state, decision = case.controller.decide(state, sample, estimate)
         decisions.append(decision)
     return state, decisions
 
@@ -251,8 +276,10 @@ def check_controller_state_is_frozen(case: ControllerCase) -> None:
 
 def check_controller_decides_within_bounds(case: ControllerCase) -> None:
     """Inputs are finite and within the model's range, from the first decision on, also without a measurement."""
-    lost = replace(case.samples[0], outputs=np.full_like(case.samples[0].outputs, np.nan))
-    _, decisions = run_controller(case, case.controller.init(0.0), [None, *case.samples, lost])
+    lost = replace(case.samples[-1], outputs=np.full_like(case.samples[-1].outputs, np.nan))
+    blind = replace(case.estimates[-1], innovation=lost.outputs, status=Status.MISSING)
+    samples, estimates = [None, *case.samples, lost], [None, *case.estimates, blind]
+    _, decisions = run_controller(case, case.controller.init(0.0), samples, estimates)
     for decision in decisions:
         case.setup.model.check_inputs(decision.inputs)
         assert decision.decided_by, "a decision says who took it"
@@ -260,20 +287,22 @@ def check_controller_decides_within_bounds(case: ControllerCase) -> None:
 
 def check_controller_is_deterministic_and_resumable(case: ControllerCase) -> None:
     """The same samples give the same inputs to the bit, also from a pickled state in the middle."""
-    samples = [None, *case.samples]
-    _, whole = run_controller(case, case.controller.init(0.0), samples)
-    middle, first = run_controller(case, case.controller.init(0.0), samples[:7])
-    _, rest = run_controller(case, pickle.loads(pickle.dumps(middle)), samples[7:])
+    samples, estimates = [None, *case.samples], [None, *case.estimates]
+    _, whole = run_controller(case, case.controller.init(0.0), samples, estimates)
+    middle, first = run_controller(case, case.controller.init(0.0), samples[:7], estimates[:7])
+    _, rest = run_controller(case, pickle.loads(pickle.dumps(middle)), samples[7:], estimates[7:])
     assert _same([d.inputs for d in whole], [d.inputs for d in (*first, *rest)]), "decisions differ after a resume"
 
 
 def check_controller_inputs_are_not_changed(case: ControllerCase) -> None:
     """Setup, state and sample are the same after a decision; the decision aliases none of them."""
     state = case.controller.init(0.0)
-    kept = copy.deepcopy((state, case.samples, case.setup.schedule))
-    _, decision = case.controller.decide(state, case.samples[0], None)
+    kept = copy.deepcopy((state, case.samples, case.estimates, case.setup.schedule))
+    after, decision = case.controller.decide(state, case.samples[0], case.estimates[0])
+    later = copy.deepcopy(after)
     decision.inputs[:] = 0.0
-    assert _same(kept, (state, case.samples, case.setup.schedule)), "a decision changed what it was given"
+    assert _same(kept, (state, case.samples, case.estimates, case.setup.schedule)), "a decision changed its arguments"
+    assert _same(later, after), "the decision aliases the state"
 
 
 CONTROLLER_CHECKS: tuple[Callable[[ControllerCase], None], ...] = (

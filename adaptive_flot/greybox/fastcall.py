@@ -61,7 +61,7 @@ class FastCall:
             raise ModelError(f"{self.function.name()}: {len(arguments)} arguments given, {len(self._arguments)} taken")
         for target, value in zip(self._arguments, arguments, strict=True):
             # NumPy would stretch a value of size 1 over a longer argument without a word
-            shape = value.shape if isinstance(value, np.ndarray) else ()
+            shape = value.shape if isinstance(value, np.ndarray) else np.shape(value)
             if shape != target.shape and target.shape != (1,):
                 name = self.function.name_in([a is target for a in self._arguments].index(True))
                 raise ModelError(f"argument {name!r} has the shape {shape}, the model takes {target.shape}")

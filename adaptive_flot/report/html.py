@@ -35,6 +35,7 @@ class Chapter:
     innovation_table: Table
     initial: Table
     statuses: Table
+    account: Table | None
 
 
 def write_run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], path: Path | str, command: str = "") -> None:
@@ -108,6 +109,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         innovation_table=tables.innovation_table(case),
         initial=tables.initial_table(case),
         statuses=tables.status_table(case),
+        account=tables.account_table(case),
     )
 
 

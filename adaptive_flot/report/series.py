@@ -95,10 +95,12 @@ def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[Case]:
 def input_panels(case: Case) -> tuple[list[Panel], list[str]]:
     """Panels of the inputs that move, and a phrase for each that does not ("feed flow 0.000167 m3/s")."""
     panels, still = [], []
-    for q in case.scenario.model.inputs:
+    inputs = case.scenario.model.inputs
+    resting = not any(_moves(v) for q in inputs for _, _, v in _distinct(case, q.column))  # then all are shown
+    for q in inputs:
         name = q.name.replace("_", " ")
         lines = _distinct(case, q.column)
-        if not any(_moves(values) for _, _, values in lines):
+        if not resting and not any(_moves(values) for _, _, values in lines):
             still.append(f"{name} {_amount(float(lines[0][2][0]), q.unit)}")
             continue
         traces = [

@@ -107,4 +107,23 @@ class Change(_Profile):
         return 1.0 + self.change * share
 
 
+class Factors(_Profile):
+    """A parameter at given multiples of its nominal value from given times on."""
+
+    profile: Literal["factors"]
+    at_s: list[float]
+    factors: list[float]
+
+    @model_validator(mode="after")
+    def _lengths(self) -> Factors:
+        if len(self.at_s) != len(self.factors) or self.at_s[:1] != [0.0] or self.at_s != sorted(set(self.at_s)):
+            raise ValueError("at_s must rise from 0 and have as many entries as factors")
+        return self
+
+    def factor(self, time: FloatArray) -> FloatArray:
+        """Factor on the nominal value in the interval that starts at each time [s] (N,)."""
+        return np.array(self.factors)[np.searchsorted(self.at_s, time + 1e-9, side="right") - 1]
+
+
 InputProfile = Annotated[Constant | Staircase | Random | Steps, Field(discriminator="profile")]
+ParameterProfile = Change | Factors

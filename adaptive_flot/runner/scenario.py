@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,12 +11,13 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from adaptive_flot.economics import Prices
 from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.protocols import Setup
+from adaptive_flot.protocols import Limits, Setup
 from adaptive_flot.resources import scenario_folder
-from adaptive_flot.runner.profiles import Change, InputProfile
+from adaptive_flot.runner.profiles import InputProfile, ParameterProfile
 from adaptive_flot.runner.yaml_problems import first_problem
 
 MOST_INTERVALS = 1e7
@@ -62,6 +64,31 @@ class Plugin(_Part):
     start: Literal["initial_estimate", "nominal"] = "initial_estimate"
 
 
+class LimitsPart(_Part):
+    """Limits of the closed loop; columns carry the units."""
+
+    concentrate_grade: float = Field(ge=0, le=1)
+    level_m: tuple[float, float]
+    inputs: dict[str, tuple[float, float]]
+    largest_move: dict[str, Annotated[float, Field(gt=0)]]
+
+
+class EconomicsPart(_Part):
+    """Prices in currency units: per kg of valuable mineral, per kg of concentrate, per m3 of air, per m3 of feed."""
+
+    metal_per_kg: float = Prices().metal
+    treatment_per_kg: float = Prices().treatment
+    air_per_m3: float = Prices().air
+    reagent_per_m3: float = Prices().reagent
+
+
+class Case(_Part):
+    """One combination to run."""
+
+    estimator: str
+    controller: str
+
+
 class Published(_Part):
     """Published fits by estimator name, and their source, for the report."""
 
@@ -79,13 +106,17 @@ class ScenarioFile(_Part):
     sampling_s: float = Field(default=1.0, gt=0)
     seeds: list[Annotated[int, Field(ge=0)]] = Field(default=[1], min_length=1)
     inputs: dict[str, InputProfile]
-    parameters: dict[str, Change] = Field(default_factory=dict)
+    parameters: dict[str, ParameterProfile] = Field(default_factory=dict)
     measurements: dict[str, Measurement]
     plant: PlantPart = PlantPart()
     adapt: Adapt
     initial_estimate: InitialEstimate
     estimators: dict[str, Plugin] = Field(min_length=1)
     controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
+    cases: list[Case] = Field(default_factory=list)
+    """Combinations of estimator and controller; default all."""
+    limits: LimitsPart | None = None
+    economics: EconomicsPart | None = None
     fits_after_s: float | None = None
     """Fits are taken over later times; default from the end of the initial record on."""
     published: Published | None = None
@@ -135,6 +166,34 @@ class Scenario:
     def initial_rows(self) -> int:
         """Number of intervals used for the initial estimate."""
         return round(self.file.initial_estimate.until_s / self.dt)
+
+    @property
+    def limits(self) -> Limits | None:
+        """Limits of the closed loop by input name, None in open loop."""
+        part = self.file.limits
+        if part is None:
+            return None
+        names = {q.column: q.name for q in self.model.inputs}
+        return Limits(
+            part.concentrate_grade,
+            part.level_m,
+            {names[column]: limits for column, limits in part.inputs.items()},
+            {names[column]: move for column, move in part.largest_move.items()},
+        )
+
+    @property
+    def prices(self) -> Prices | None:
+        """Prices, None where the scenario has no economics."""
+        part = self.file.economics
+        if part is None:
+            return None
+        return Prices(part.metal_per_kg, part.treatment_per_kg, part.air_per_m3, part.reagent_per_m3)
+
+    def combinations(self, estimators: Sequence[str]) -> list[tuple[str, str]]:
+        """(controller, estimator) to run: the cases of the scenario, or every controller with every estimator."""
+        if self.file.cases:
+            return [(c.controller, c.estimator) for c in self.file.cases if c.estimator in estimators]
+        return [(controller, name) for controller in self.file.controllers for name in estimators]
 
     def schedule(self, seed: int) -> FloatArray:
         """Planned inputs (N, nu) of a run."""
@@ -235,8 +294,25 @@ def _check(scenario: Scenario) -> None:
             values = scenario.true_parameters()[:, model.index("parameters", name)]
             for extreme in (values.min(), values.max()):
                 model.with_parameters({name: float(extreme)})
+    _check_closed_loop(scenario)
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
+
+
+def _check_closed_loop(scenario: Scenario) -> None:
+    file = scenario.file
+    columns = [q.column for q in scenario.model.inputs]
+    if file.limits is not None:
+        for key in (*file.limits.inputs, *file.limits.largest_move):
+            if key not in columns:
+                raise ScenarioError(f"limits: unknown input {key!r}; {near_match(key, columns)}")
+        for key, (low, high) in [("level_m", file.limits.level_m), *file.limits.inputs.items()]:
+            if not low < high:
+                raise ScenarioError(f"limits: {key} = [{low:g}, {high:g}]; give the lower value first")
+    for case in file.cases:
+        for name, known in ((case.estimator, file.estimators), (case.controller, file.controllers)):
+            if name not in known:
+                raise ScenarioError(f"cases: {name!r} is not defined; {near_match(name, known)}")
 
 
 def _check_times(scenario: Scenario) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -19,6 +19,7 @@ from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.protocols import ControllerSetup, PlantRecord, Prior, Setup, Status
+from adaptive_flot.runner.accounts import account
 from adaptive_flot.runner.loop import Step, run_loop
 from adaptive_flot.runner.plant import SimulatedPlant
 from adaptive_flot.runner.scenario import Plugin, Scenario
@@ -44,6 +45,8 @@ class Run:
         The batch fit that gave the initial estimate.
     seconds
         Wall-clock time of the run.
+    account
+        Recovery, grade and economic value over the same times (see `account`); empty without economics.
     """
 
     estimator: str
@@ -54,9 +57,11 @@ class Run:
     status_counts: dict[str, int]
     initial: BatchFit
     seconds: float
+    account: dict[str, float] = field(default_factory=dict)
 
     def summary(self) -> dict[str, object]:
-        """Entry of the JSON summary."""
+        """Entry of the JSON summary; `account` only where the scenario has economics."""
+        extra = {"account": self.account} if self.account else {}
         return {
             "estimator": self.estimator,
             "controller": self.controller,
@@ -64,6 +69,7 @@ class Run:
             "fit": self.fit,
             "status_counts": self.status_counts,
             "seconds": self.seconds,
+            **extra,
         }
 
 
@@ -96,11 +102,12 @@ def run_scenario(
         chosen = {name: _estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
         for seed in seeds or scenario.file.seeds:
             scenario.model.check_inputs(scenario.schedule(seed), scenario.starts, where=f"inputs of seed {seed}")
-            for controller in scenario.file.controllers:
-                initial: dict[str, BatchFit] = {}  # before it starts, no estimator has touched the run: fit once
-                for name, plugin in chosen.items():
-                    runs.append(_run(scenario, name, plugin, controller, seed, initial))
-                    progress()
+            # before it starts, no estimator has touched a run: one fit for all with the same controller
+            initial: dict[str, dict[str, BatchFit]] = {}
+            for controller, name in scenario.combinations(list(chosen)):
+                fitted = initial.setdefault(controller, {})
+                runs.append(_run(scenario, name, chosen[name], controller, seed, fitted))
+                progress()
     return runs
 
 
@@ -119,13 +126,16 @@ def _run(
     folder = scenario.path.parent
     schedule = scenario.schedule(seed)
     factory = load(plugin.use, ESTIMATORS, "estimator", folder)
-    estimator = construct(factory, plugin.use, "estimator", scenario.setup, **plugin.options)
+    setup = replace(scenario.setup, truth=scenario.true_parameters()) if plugin.use == "oracle" else scenario.setup
+    estimator = construct(factory, plugin.use, "estimator", setup, **plugin.options)
     chosen = scenario.file.controllers[controller_name]
     controller = construct(
         load(chosen.use, CONTROLLERS, "controller", folder),
         chosen.use,
         "controller",
-        ControllerSetup(scenario.model, scenario.dt, schedule),
+        ControllerSetup(
+            scenario.model, scenario.dt, schedule, scenario.setup.parameters, scenario.limits, scenario.prices
+        ),
         **chosen.options,
     )
 
@@ -147,8 +157,23 @@ def _run(
     counts = Counter((s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps)
     seconds = time.perf_counter() - begin
     return Run(
-        name, controller_name, seed, table, fits(scenario, table), dict(counts), initial["fit"], round(seconds, 4)
+        name,
+        controller_name,
+        seed,
+        table,
+        fits(scenario, table),
+        dict(counts),
+        initial["fit"],
+        round(seconds, 4),
+        _account(scenario, table),
     )
+
+
+def _account(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
+    if scenario.prices is None or scenario.limits is None:
+        return {}
+    late = table[table["time_s"] > scenario.fits_after + 1e-9]
+    return account(late, scenario.model, scenario.dt, scenario.prices, scenario.limits.grade)
 
 
 def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
@@ -244,6 +269,10 @@ def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
         columns |= {f"{label}_true": p_true[:, i], f"{label}_estimate": theta[:, j], f"{label}_std": std[:, j]}
     columns["status"] = [(e.status if e else Status.INITIALISING).name.lower() for e in estimates]
     columns["decided_by"] = [s.decision.decided_by for s in steps]
+    solve = np.array([s.decision.solve_seconds for s in steps])
+    if np.isfinite(solve).any():
+        columns["control_status"] = [s.decision.status.name.lower() for s in steps]
+        columns["solve_seconds"] = solve
     return pd.DataFrame(columns)
 
 

@@ -1,0 +1,58 @@
+"""What a run of a flotation cell earned: recovery, grade and its limit, economic value by term."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from adaptive_flot.economics import Prices, value_rates
+from adaptive_flot.greybox.model import Model
+
+TOLERATED_DEPTH = 0.002
+"""Depth below the grade limit from which a sample counts as a violation."""
+
+
+def account(table: pd.DataFrame, model: Model, dt: float, prices: Prices, grade_limit: float) -> dict[str, float]:
+    """Account of the rows of a run, from the plant's true outputs.
+
+    Parameters
+    ----------
+    table
+        Time series of a run (see `time_series`), the rows to account for.
+    model
+        The nominal model: feed concentration of the valuable mineral [kg/m3].
+    dt
+        Sampling interval [s].
+    prices
+        Prices [cu].
+    grade_limit
+        Lowest grade allowed [-].
+
+    Returns
+    -------
+    dict
+        `recovery` (valuable mass recovered / fed), `mean_grade` (by mass of concentrate), `below_limit` (share of time
+        more than 0.002 below the limit), `mean_depth` (mean depth below the limit in that time), `value_cu_h` (economic
+        value an hour) and each of its terms `value_<term>_cu_h`.
+    """
+    feed_name = next(p.name for p in model.parameters if p.name.startswith("feed_concentration."))
+    concentration = model.parameters[model.index("parameters", feed_name)].value
+    grade, recovery, air, feed = (
+        table[c].to_numpy(dtype=float)
+        for c in ("concentrate_grade_true", "recovery_true", "air_flow_m3_s", "feed_flow_m3_s")
+    )
+    fed = float(np.sum(concentration * feed) * dt)
+    recovered = float(np.sum(recovery * concentration * feed) * dt)
+    concentrate = float(np.sum(recovery * concentration * feed / grade) * dt)
+    depth = grade_limit - grade
+    below = depth > TOLERATED_DEPTH
+    rates = value_rates(grade, recovery, air, feed, concentration, prices.values())
+    terms = {f"value_{name}_cu_h": float(3600 * np.mean(rate)) for name, rate in rates.items()}
+    return {
+        "recovery": recovered / fed,
+        "mean_grade": recovered / concentrate,
+        "below_limit": float(np.mean(below)),
+        "mean_depth": float(np.mean(depth[below])) if below.any() else 0.0,
+        "value_cu_h": sum(terms.values()),
+        **terms,
+    }

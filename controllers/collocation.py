@@ -1,0 +1,221 @@
+"""Economic optimal control of a flotation cell as one parametric NLP: direct collocation, stage by stage.
+
+Radau collocation of degree 2 keeps the DAE exact at the collocation points: the interfacial gas velocity stays an
+algebraic variable with its own equation (Newton iterations inside the right-hand side would be half as fast). The order
+of variables and constraints is the one fatrop needs: x0, u0, x1, u1, ..., where u holds the moved inputs, the slack of
+the grade limit and the collocation points of its stage, and x the states and the inputs before; for each stage first
+the gap to the next, then its other constraints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.economics import value_rates
+from adaptive_flot.greybox.model import FloatArray, Model
+
+DEGREE = 2
+MOVED = ("air_flow", "level_setpoint")
+"""Inputs that the controller moves; the others are disturbances, held over the horizon."""
+SLACK_SCALE = 0.01
+MOVE_SCALE = {"air_flow": 1e-3, "level_setpoint": 0.1}
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """What may change from solve to solve without a rebuild.
+
+    Attributes
+    ----------
+    state
+        Model state now (nx,).
+    previous
+        Moved inputs of the last interval (2,).
+    parameters
+        Parameter vector (np,): the newest estimate inside.
+    disturbances
+        The other inputs (nu - 2,).
+    grade_limit
+        Lowest grade allowed.
+    grade_bias
+        Added to every predicted grade: what the model is off by now.
+    prices
+        Metal, treatment, air, reagent; then the cost of a squared scaled move and the penalty on a scaled slack second.
+    """
+
+    state: FloatArray
+    previous: FloatArray
+    parameters: FloatArray
+    disturbances: FloatArray
+    grade_limit: float
+    grade_bias: float
+    prices: FloatArray
+
+    def vector(self) -> FloatArray:
+        """All of it, in the order of the NLP's parameters."""
+        scalars = [self.grade_limit, self.grade_bias]
+        return np.concatenate(
+            [self.state, self.previous, self.parameters, self.disturbances, scalars, np.asarray(self.prices)]
+        )
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Ranges of the moved inputs (2, 2), their largest move an interval (2,), and of the level (2,), in SI units."""
+
+    inputs: FloatArray
+    moves: FloatArray
+    level: FloatArray
+
+
+class Problem:
+    """The NLP of one model, horizon and move length; built once.
+
+    Attributes
+    ----------
+    nlp
+        Expressions for `casadi.nlpsol`: x, f, g, p.
+    equality
+        Which constraints are equations, for fatrop.
+    names
+        A name for each constraint, for messages.
+    terms
+        CasADi function (x, p) -> the cost terms over the horizon, in the order of `term_names`.
+    """
+
+    term_names = ("metal", "treatment", "air", "reagent", "moves", "grade_slack")
+
+    def __init__(self, model: Model, horizon: int, move_s: float) -> None:
+        self.model = model
+        self.horizon = horizon
+        self.move_s = move_s
+        self.moved = model.indices("inputs", MOVED)
+        self.x_scale = np.array([q.scale for q in model.states])
+        self.z_scale = np.array([q.scale for q in model.algebraic])
+        self.u_scale = np.array([MOVE_SCALE[name] for name in MOVED])
+        self._build()
+
+    # -- layout ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def stage_sizes(self) -> tuple[int, int]:
+        """Lengths of x (states and previous inputs) and of u (inputs, slack, collocation points) of a stage."""
+        nx, nz, nu = len(self.model.states), len(self.model.algebraic), len(MOVED)
+        return nx + nu, nu + 1 + DEGREE * (nx + nz)
+
+    def inputs_of(self, solution: FloatArray) -> FloatArray:
+        """Moved inputs of the plan (horizon, 2) in SI units."""
+        nx, nu = self.stage_sizes
+        stages = solution[: self.horizon * (nx + nu)].reshape(self.horizon, nx + nu)
+        return np.asarray(stages[:, nx : nx + len(MOVED)] * self.u_scale)
+
+    def shifted(self, solution: FloatArray) -> FloatArray:
+        """The plan one move later, its last stage repeated: the next start."""
+        block = sum(self.stage_sizes)
+        moved = solution.copy()
+        moved[: block * (self.horizon - 1)] = solution[block : block * self.horizon]
+        return moved
+
+    def start(self, state: FloatArray, inputs: FloatArray, algebraic: FloatArray) -> FloatArray:
+        """Cold start: everything stays as it is. State (nx,), moved inputs (2,), algebraic variables (nz,)."""
+        x, u, z = state / self.x_scale, inputs / self.u_scale, algebraic / self.z_scale
+        points = np.concatenate([np.concatenate([x, z])] * DEGREE)
+        stage = np.concatenate([x, u, u, [0.0], points])
+        return np.concatenate([*[stage] * self.horizon, x, u])
+
+    def bounds(self, bounds: Bounds) -> dict[str, FloatArray]:
+        """Arguments lbx, ubx, lbg, ubg for a solver."""
+        states = np.array([[q.lower, q.upper] for q in self.model.states])
+        states = np.where(np.isfinite(states), states, np.array([[-1e3, 1e3]]))
+        states[self.model.index("states", "level")] = bounds.level
+        x = states / self.x_scale[:, None]
+        u = bounds.inputs / self.u_scale[:, None]
+        z = np.array([[max(q.lower, 1e-3 * q.scale), 10 * q.scale] for q in self.model.algebraic])
+        z = z / self.z_scale[:, None]
+        stage = np.vstack([x, u, u, [[0.0, 1e3]], *[x, z] * DEGREE])
+        everything = np.vstack([*[stage] * self.horizon, x, u])
+        first = len(x) + len(u)
+        everything[:first] = [-1e6, 1e6]  # the initial condition is an equation: a measured state may lie outside
+        moves = np.repeat(np.asarray(bounds.moves)[:, None] / self.u_scale[:, None], 2, axis=1) * [-1.0, 1.0]
+        g = np.vstack([self._constraint_bounds(k, moves) for k in range(self.horizon)])
+        return {"lbx": everything[:, 0], "ubx": everything[:, 1], "lbg": g[:, 0], "ubg": g[:, 1]}
+
+    def _constraint_bounds(self, stage: int, moves: FloatArray) -> FloatArray:
+        nx, nz, nu = len(self.model.states), len(self.model.algebraic), len(MOVED)
+        equations = (nx + nu) * (2 if stage == 0 else 1) + DEGREE * (nx + nz)
+        return np.vstack([np.zeros((equations, 2)), moves, [[0.0, 1e3]] * DEGREE])
+
+    # -- construction ----------------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        model = self.model
+        nx, nz, nu, npar = len(model.states), len(model.algebraic), len(MOVED), len(model.parameters)
+        others = len(model.inputs) - nu
+        sizes = [nx, nu, npar, others, 1, 1, 6]
+        p = ca.SX.sym("p", sum(sizes))
+        x_now, u_before, theta, disturbances, limit, bias, prices = ca.vertsplit(p, list(np.cumsum([0, *sizes])))
+        coefficients = ca.collocation_coeff(ca.collocation_points(DEGREE, "radau"))
+        slopes, weights = np.array(coefficients[0]), np.array(coefficients[2]).ravel()
+
+        variables: list[ca.SX] = []
+        constraints: list[ca.SX] = []
+        self.equality: list[bool] = []
+        self.names: list[str] = []
+        totals = {name: ca.SX(0.0) for name in self.term_names}
+
+        def constrain(expression: ca.SX, equation: bool, names: Sequence[str]) -> None:
+            constraints.append(expression)
+            self.equality += [equation] * len(names)
+            self.names += names
+
+        states, moves = model.names("states"), list(MOVED)
+        x = ca.SX.sym("x_0", nx + nu)
+        for k in range(self.horizon):
+            u, slack = ca.SX.sym(f"u_{k}", nu), ca.SX.sym(f"slack_{k}")
+            points = [(ca.SX.sym(f"x_{k}_{j}", nx), ca.SX.sym(f"z_{k}_{j}", nz)) for j in range(DEGREE)]
+            variables += [x, u, slack, *(v for point in points for v in point)]
+            after = ca.SX.sym(f"x_{k + 1}", nx + nu)
+            at = f"at {k * self.move_s:g} s"
+            constrain(after - ca.vertcat(points[-1][0], u), True, [f"{n} continues {at}" for n in (*states, *moves)])
+            if k == 0:
+                now = ca.vertcat(x_now / self.x_scale, u_before / self.u_scale)
+                constrain(x - now, True, [f"{n} now" for n in (*states, *moves)])
+            held = self._inputs(u * self.u_scale, disturbances)
+            grades = []
+            for j, (xj, zj) in enumerate(points):
+                rates, residual, y, _ = model.dae(0.0, xj * self.x_scale, held, theta, zj * self.z_scale)
+                slope = slopes[0, j] * x[:nx] + sum(slopes[r + 1, j] * points[r][0] for r in range(DEGREE))
+                constrain(slope - self.move_s * rates / self.x_scale, True, [f"d{n}/dt {at}" for n in states])
+                constrain(residual / self.z_scale, True, [f"{n} {at}" for n in model.names("algebraic")])
+                for name, rate in self._rates(y, held, theta, prices).items():
+                    totals[name] += weights[j] * self.move_s * rate
+                grades.append(y[model.index("outputs", "concentrate_grade")] + bias)
+            constrain(u - x[nx:], False, [f"move of {n} {at}" for n in moves])
+            for j, grade in enumerate(grades):  # a move acts on the grade at once and on the pulp later: both count
+                constrain((grade - limit) / SLACK_SCALE + slack, False, [f"grade limit {at}, point {j + 1}"])
+            totals["moves"] -= prices[4] * ca.sumsqr(u - x[nx:])
+            totals["grade_slack"] -= prices[5] * self.move_s * slack
+            x = after
+        variables.append(x)
+        terms = ca.vertcat(*(totals[name] for name in self.term_names))
+        self.nlp = {"x": ca.vertcat(*variables), "f": -ca.sum1(terms), "g": ca.vertcat(*constraints), "p": p}
+        self.terms = ca.Function("terms", [self.nlp["x"], p], [terms])
+        self.constraints = ca.Function("constraints", [self.nlp["x"], p], [self.nlp["g"]])
+
+    def _inputs(self, moved: ca.SX, disturbances: ca.SX) -> ca.SX:
+        held = ca.SX(len(self.model.inputs), 1)
+        held[self.moved] = moved
+        held[[i for i in range(len(self.model.inputs)) if i not in self.moved]] = disturbances
+        return held
+
+    def _rates(self, y: ca.SX, held: ca.SX, theta: ca.SX, prices: ca.SX) -> dict[str, ca.SX]:
+        model = self.model
+        grade, recovery = (y[model.index("outputs", n)] for n in ("concentrate_grade", "recovery"))
+        feed = next(i for i, q in enumerate(model.parameters) if q.name.startswith("feed_concentration."))
+        air, feed_flow = (held[model.index("inputs", n)] for n in ("air_flow", "feed_flow"))
+        return value_rates(grade, recovery, air, feed_flow, theta[feed], prices)

@@ -1,0 +1,180 @@
+"""Economic model predictive control that reads the newest estimate and never applies an input it has not checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.fastcall import FastCall
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status, full_parameters
+from controllers.collocation import MOVED, Arguments, Bounds, Problem
+from controllers.nlp_solvers import Solution, Solver, Verdict
+
+VALUE_SCALE = 1000.0
+"""Prices are scaled so that the objective is of order 1 to 100: solvers' tolerances then mean something."""
+
+
+@dataclass(frozen=True)
+class MpcState:
+    """What the next decision needs.
+
+    Attributes
+    ----------
+    row
+        Interval to come, counted from the start.
+    due
+        Time of the next optimisation [s].
+    inputs
+        Inputs held now (nu,); None before the first decision.
+    plan
+        Scaled solution of the last valid optimisation, and its multipliers; None before the first.
+    age
+        Moves of that plan that have been used.
+    bias
+        Filtered measured minus predicted grade: added to every prediction, so that a model that is off does not break
+        the limit for good.
+    """
+
+    row: int
+    due: float
+    inputs: FloatArray | None
+    plan: FloatArray | None
+    multipliers: tuple[FloatArray, FloatArray] | None
+    age: int
+    bias: float
+
+
+class EconomicMpc:
+    """Moves air flow and level set-point for the best economic value above a grade limit.
+
+    Every `move_s` seconds an optimal control problem over `horizon` moves is solved from the estimated state with the
+    newest parameter estimate (`collocation.py`). A solution is applied only if it is finite, within its bounds and
+    meets the constraints; else one cold start is tried, then the plan of the step before goes on, then the inputs are
+    held, then the first planned inputs are applied; `Decision` says which.
+
+    Parameters
+    ----------
+    setup
+        Model, schedule, adapted parameters, limits and prices.
+    horizon
+        Number of moves looked ahead.
+    move_s
+        Length of a move [s], a multiple of the sampling interval.
+    solver
+        `ipopt` or `fatrop`.
+    move_cost
+        Cost of a move by the whole scale of an input (1e-3 m3/s of air, 0.1 m of level), squared [cu].
+    grade_penalty
+        Cost of a second at one percentage point below the grade limit [cu]; large: the limit is soft, but exact.
+    backoff
+        Kept above the grade limit [-]: what changes between two moves, and what the estimate is off by.
+    bias_time_s
+        Time constant of the grade bias filter [s].
+    budget_s
+        Wall-clock time of a solve; there is no second try when the first took longer.
+
+    Raises
+    ------
+    ModelError
+        Limits or prices are missing, or an option is outside its range.
+    """
+
+    def __init__(
+        self,
+        setup: ControllerSetup,
+        *,
+        horizon: int = 20,
+        move_s: float = 30.0,
+        solver: str = "ipopt",
+        move_cost: float = 1e-3,
+        grade_penalty: float = 1e-3,
+        backoff: float = 0.001,
+        bias_time_s: float = 20.0,
+        budget_s: float = 5.0,
+    ) -> None:
+        if setup.limits is None or setup.prices is None:
+            raise ModelError("economic_mpc needs limits and prices; add 'limits' and 'economics' to the scenario")
+        if horizon < 1 or not move_s >= setup.dt or not budget_s > 0 or not bias_time_s > 0:
+            raise ModelError("economic_mpc: horizon, move_s, bias_time_s and budget_s must be positive, move_s >= dt")
+        self.setup = setup
+        self.problem = Problem(setup.model, horizon, move_s)
+        self.solver = Solver(self.problem, solver, budget_s)
+        self.budget_s = budget_s
+        self.grade_limit = setup.limits.grade + backoff
+        self._prices = VALUE_SCALE * np.array([*setup.prices.values(), move_cost, grade_penalty])
+        limits = setup.limits
+        self._bounds = Bounds(
+            inputs=np.array([limits.inputs[name] for name in MOVED]),
+            moves=np.array([limits.moves[name] for name in MOVED]),
+            level=np.array(limits.level),
+        )
+        self._solver_bounds = self.problem.bounds(self._bounds)
+        self._memory = float(np.exp(-setup.dt / bias_time_s))
+        self._grade = setup.model.index("outputs", "concentrate_grade")
+        self._ode = FastCall(setup.model.ode)
+
+    def init(self, time: float) -> MpcState:
+        """Nothing is planned yet."""
+        return MpcState(0, time, None, None, None, 0, 0.0)
+
+    def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
+        """Inputs of the next interval: the planned ones until there is an estimate, then the optimiser's."""
+        state = replace(state, row=state.row + 1, bias=self._bias(state, estimate))
+        if sample is None or estimate is None:
+            row = min(state.row, len(self.setup.schedule)) - 1
+            inputs = self.setup.schedule[row].copy()
+            return replace(state, inputs=inputs), Decision(inputs.copy(), Status.OK, "schedule")
+        held = state.inputs if state.inputs is not None else sample.inputs
+        if sample.time < state.due - 1e-9:
+            return replace(state, inputs=held.copy()), Decision(held.copy(), Status.OK, "economic_mpc")
+        state = replace(state, due=max(state.due, sample.time) + self.problem.move_s)
+        return self._optimise(state, held, estimate)
+
+    def _bias(self, state: MpcState, estimate: Estimate | None) -> float:
+        innovation = np.nan if estimate is None else float(estimate.innovation[self._grade])
+        if not np.isfinite(innovation):
+            return state.bias
+        return self._memory * state.bias + (1 - self._memory) * innovation
+
+    def _optimise(self, state: MpcState, held: FloatArray, estimate: Estimate) -> tuple[MpcState, Decision]:
+        model, moved = self.setup.model, self.problem.moved
+        theta = full_parameters(model, self.setup.parameters, estimate.parameters)
+        others = np.delete(held, moved)
+        now = Arguments(estimate.state, held[moved], theta, others, self.grade_limit, state.bias, self._prices).vector()
+        solution, status = self._solve(state, now, held, estimate, theta)
+        if solution.verdict is Verdict.VALID:
+            plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
+            return self._apply(plan, held, self.problem.inputs_of(solution.variables)[0], status, solution)
+        if state.plan is not None and state.age + 1 < self.problem.horizon:
+            older = replace(state, age=state.age + 1)
+            planned = self.problem.inputs_of(state.plan)[older.age]
+            return self._apply(older, held, planned, Status.SHIFTED_PLAN, solution)
+        if np.isfinite(held).all():
+            return self._apply(state, held, held[moved], Status.HELD, solution)
+        return self._apply(state, self.setup.schedule[0], self.setup.schedule[0][moved], Status.SAFE_INPUT, solution)
+
+    def _solve(
+        self, state: MpcState, now: FloatArray, held: FloatArray, estimate: Estimate, theta: FloatArray
+    ) -> tuple[Solution, Status]:
+        """Warm from the last plan, then once cold."""
+        z = self._ode(estimate.time, estimate.state, held, theta)[3]
+        cold = self.problem.start(estimate.state, held[self.problem.moved], z)
+        if state.plan is None:
+            return self.solver(now, self._solver_bounds, cold), Status.OK
+        solution = self.solver(now, self._solver_bounds, self.problem.shifted(state.plan), state.multipliers)
+        if solution.verdict is Verdict.VALID or solution.seconds > self.budget_s:
+            return solution, Status.OK
+        return self.solver(now, self._solver_bounds, cold), Status.RETRIED
+
+    def _apply(
+        self, state: MpcState, held: FloatArray, moved: FloatArray, status: Status, solution: Solution
+    ) -> tuple[MpcState, Decision]:
+        inputs = held.copy()
+        low, high = self._bounds.inputs.T
+        inputs[self.problem.moved] = np.clip(moved, low, high)  # a valid solution may miss a bound by its tolerance
+        who = {Status.OK: "economic_mpc", Status.RETRIED: "economic_mpc"}.get(status, status.name.lower())
+        decision = Decision(inputs.copy(), status, who, solution.seconds, solution.message)
+        return replace(state, inputs=inputs), decision

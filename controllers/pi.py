@@ -1,0 +1,119 @@
+"""PI control of the concentrate grade by the air flow: the baseline that an economic MPC has to beat.
+
+Designed with python-control on the cell linearised at the first planned inputs: the gain gives the crossover asked for,
+the integral time the phase margin. The level set-point stays where it is planned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import control
+import numpy as np
+
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.linear import linearise
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status
+
+MOST_LAG_DEG = 80.0
+"""Phase lag a PI controller gives at most in this design; with 90 degrees it would be a mere integrator."""
+
+
+@dataclass(frozen=True)
+class PiState:
+    """Row of the schedule to come, filtered grade error (NaN before the first), and inputs held now (nu,)."""
+
+    row: int
+    error: float
+    inputs: FloatArray | None
+
+
+class Pi:
+    """Holds the measured grade at the limit plus a margin by moving the air flow.
+
+    Parameters
+    ----------
+    setup
+        Model, schedule and limits.
+    margin
+        Set-point above the grade limit [-]: what noise and disturbances need.
+    crossover_rad_s, phase_margin_deg
+        What the design asks of the loop; where the cell leaves more phase than a PI controller can use up, the margin
+        is larger.
+    filter_s
+        Time constant of the first-order filter on the measured grade [s].
+
+    Raises
+    ------
+    ModelError
+        The setup has no limits, or an option is not positive.
+    RangeError
+        There is no steady state at the planned inputs.
+    """
+
+    def __init__(
+        self,
+        setup: ControllerSetup,
+        *,
+        margin: float = 0.004,
+        crossover_rad_s: float = 0.01,
+        phase_margin_deg: float = 60.0,
+        filter_s: float = 10.0,
+    ) -> None:
+        if setup.limits is None:
+            raise ModelError("pi needs limits; add 'limits' to the scenario")
+        if not (crossover_rad_s > 0 and filter_s > 0 and 0 < phase_margin_deg < 180):
+            raise ModelError("pi: crossover_rad_s and filter_s must be positive, phase_margin_deg between 0 and 180")
+        self.setup = setup
+        self.setpoint = setup.limits.grade + margin
+        self._air = setup.model.index("inputs", "air_flow")
+        self._grade = setup.model.index("outputs", "concentrate_grade")
+        self.gain, self.integral_time = design(
+            setup.model, setup.schedule[-1], filter_s, crossover_rad_s, np.deg2rad(phase_margin_deg)
+        )
+        self._memory = float(np.exp(-setup.dt / filter_s))
+
+    def init(self, time: float) -> PiState:
+        """Start before the first sample."""
+        del time
+        return PiState(0, float("nan"), None)
+
+    def decide(self, state: PiState, sample: Sample | None, estimate: Estimate | None) -> tuple[PiState, Decision]:
+        """Planned inputs until the estimator runs (as every controller here), then the PI law in velocity form."""
+        planned = self.setup.schedule[min(state.row, len(self.setup.schedule) - 1)]
+        row = state.row + 1
+        if sample is None or estimate is None or state.inputs is None:
+            return PiState(row, float("nan"), planned.copy()), Decision(planned.copy(), Status.OK, "schedule")
+        measured = float(sample.outputs[self._grade])
+        if not np.isfinite(measured):
+            return replace(state, row=row), Decision(state.inputs.copy(), Status.MISSING, "pi")
+        error = measured - self.setpoint
+        if np.isfinite(state.error):
+            error = self._memory * state.error + (1 - self._memory) * error
+        change = 0.0 if not np.isfinite(state.error) else error - state.error
+        inputs = planned.copy()
+        inputs[self._air] = self._limited(
+            state.inputs[self._air] + self.gain * (change + self.setup.dt / self.integral_time * error)
+        )
+        return PiState(row, error, inputs), Decision(inputs.copy(), Status.OK, "pi")
+
+    def _limited(self, air: float) -> float:
+        """Within the air limits: in velocity form a limit does not wind up the integral."""
+        assert self.setup.limits is not None  # checked by the constructor
+        low, high = self.setup.limits.inputs["air_flow"]
+        return float(np.clip(air, low, high))
+
+
+def design(
+    model: Model, inputs: FloatArray, filter_s: float, crossover_rad_s: float, phase_margin_rad: float
+) -> tuple[float, float]:
+    """Gain [m3/s per unit of grade] and integral time [s] of the grade loop at an operating point."""
+    cell = linearise(model, inputs)
+    loop = control.series(cell["concentrate_grade", "air_flow"], control.tf([1.0], [filter_s, 1.0]))
+    response = -complex(loop(1j * crossover_rad_s))  # more air lowers the grade
+    left = float(np.angle(response)) + np.pi - phase_margin_rad
+    lag = float(np.clip(left, np.deg2rad(1.0), np.deg2rad(MOST_LAG_DEG)))
+    integral_time = 1 / (crossover_rad_s * np.tan(lag))
+    controller = 1 + 1 / (1j * crossover_rad_s * integral_time)
+    return float(1 / abs(response * controller)), float(integral_time)

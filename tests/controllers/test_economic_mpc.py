@@ -1,0 +1,125 @@
+"""The controller applies only inputs it has checked, and says who decided."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adaptive_flot.errors import ModelError
+from adaptive_flot.protocols import ControllerSetup, Decision, Status
+from adaptive_flot.testing import ControllerCase, controller_case
+from controllers.economic_mpc import EconomicMpc, MpcState
+from controllers.nlp_solvers import Solution, Verdict
+
+
+@pytest.fixture(scope="module")
+def case() -> ControllerCase:
+    return controller_case(EconomicMpc, horizon=6, solver="fatrop")
+
+
+def run(case: ControllerCase, state: MpcState, rows: slice) -> tuple[MpcState, list[Decision]]:
+    decisions = []
+    for sample, estimate in zip(case.samples[rows], case.estimates[rows], strict=True):
+        state, decision = case.controller.decide(state, sample, estimate)
+        decisions.append(decision)
+    return state, decisions
+
+
+def start(case: ControllerCase) -> MpcState:
+    state: MpcState = case.controller.init(0.0)
+    state, decision = case.controller.decide(state, None, None)
+    assert decision.decided_by == "schedule"
+    return state
+
+
+def broken(message: str) -> Any:
+    def solve(arguments: Any, bounds: Any, first: Any, multipliers: Any = None) -> Solution:
+        bad = np.full(len(first), np.nan)
+        return Solution(bad, (bad, np.full(len(bounds["lbg"]), np.nan)), Verdict.NOT_FINITE, message, 0, 0.001)
+
+    return solve
+
+
+def test_it_optimises_every_move_and_holds_between(case: ControllerCase) -> None:
+    _, decisions = run(case, start(case), slice(0, 35))
+    solved = [k for k, d in enumerate(decisions) if np.isfinite(d.solve_seconds)]
+    assert solved == [0, 30]
+    assert all(d.status is Status.OK and d.decided_by == "economic_mpc" for d in decisions)
+    assert all(np.array_equal(d.inputs, decisions[0].inputs) for d in decisions[:30])
+
+
+def test_a_failed_solve_plays_the_plan_then_holds(case: ControllerCase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cold retry, then the shifted plan move by move, then hold; the loop never stops and says why."""
+    controller = case.controller
+    assert isinstance(controller, EconomicMpc)
+    state, _ = run(case, start(case), slice(0, 1))
+    assert state.plan is not None
+    planned = controller.problem.inputs_of(state.plan)
+    monkeypatch.setattr(controller, "solver", broken("no luck"))
+    low, high = controller._bounds.inputs.T
+    before = np.empty(3)
+    for k in range(1, 8):
+        sample = replace(case.samples[0], time=1.0 + 30.0 * k)
+        state, decision = controller.decide(state, sample, case.estimates[0])
+        assert decision.message == "no luck" and np.isfinite(decision.inputs).all()
+        if k < 6:
+            assert decision.status is Status.SHIFTED_PLAN
+            np.testing.assert_allclose(decision.inputs[controller.problem.moved], np.clip(planned[k], low, high))
+        else:
+            assert decision.status is Status.HELD
+            np.testing.assert_array_equal(decision.inputs, before)
+        before = decision.inputs
+    monkeypatch.undo()
+    sample = replace(case.samples[0], time=1.0 + 30.0 * 8)
+    _, decision = controller.decide(state, sample, case.estimates[0])
+    assert decision.status is Status.OK  # the first good solve takes over again
+
+
+def test_without_a_plan_it_holds_and_without_finite_inputs_it_is_safe(
+    case: ControllerCase, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller = case.controller
+    assert isinstance(controller, EconomicMpc)
+    monkeypatch.setattr(controller, "solver", broken("no luck"))
+    state = start(case)
+    _, decision = controller.decide(state, case.samples[0], case.estimates[0])
+    assert decision.status is Status.HELD
+    lost = replace(state, inputs=np.full(3, np.nan))
+    _, decision = controller.decide(lost, case.samples[0], case.estimates[0])
+    assert decision.status is Status.SAFE_INPUT and decision.decided_by == "safe_input"
+    np.testing.assert_array_equal(decision.inputs, case.setup.schedule[0])
+
+
+def test_a_state_that_is_not_finite_does_not_poison_the_next_step(case: ControllerCase) -> None:
+    """After one NaN estimate the controller decides as one that never saw it (from the same plan)."""
+    state, _ = run(case, start(case), slice(0, 1))
+    sick = replace(case.estimates[0], state=np.full(9, np.nan))
+    late = replace(case.samples[0], time=31.0)
+    after, decision = case.controller.decide(state, late, sick)
+    assert decision.status is Status.SHIFTED_PLAN and np.isfinite(decision.inputs).all()
+    _, recovered = case.controller.decide(after, replace(late, time=61.0), case.estimates[0])
+    assert recovered.status is Status.OK and np.isfinite(recovered.inputs).all()
+
+
+def test_a_biased_model_is_corrected(case: ControllerCase) -> None:
+    """Grade measured 0.02 below the prediction: the controller backs off with less air than without."""
+    estimates = [replace(e, innovation=np.full_like(e.innovation, -0.02)) for e in case.estimates]
+    _, plain = run(case, start(case), slice(0, 31))
+    state = start(case)
+    for sample, estimate in zip(case.samples[:31], estimates[:31], strict=True):
+        state, decision = case.controller.decide(state, sample, estimate)
+    assert state.bias == pytest.approx(-0.02, rel=0.25)
+    assert decision.inputs[0] < plain[-1].inputs[0]
+
+
+def test_it_wants_limits_and_prices(case: ControllerCase) -> None:
+    bare = ControllerSetup(case.setup.model, 1.0, case.setup.schedule)
+    with pytest.raises(ModelError, match="limits"):
+        EconomicMpc(bare)
+    with pytest.raises(ModelError, match="did you mean 'ipopt'"):
+        EconomicMpc(case.setup, solver="ipot")
+    with pytest.raises(ModelError, match="positive"):
+        EconomicMpc(case.setup, horizon=0)
