@@ -1,6 +1,6 @@
 """PI control of the concentrate grade by the air flow: the baseline that an economic MPC has to beat.
 
-Designed with python-control on the cell linearised at the first planned inputs: the gain gives the crossover asked for,
+Designed with python-control on the cell linearised at the last planned inputs: the gain gives the crossover asked for,
 the integral time the phase margin. The level set-point stays where it is planned.
 """
 
@@ -12,7 +12,7 @@ import control
 import numpy as np
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.linear import linearise
+from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status
 
@@ -114,6 +114,4 @@ def design(
     response = -complex(loop(1j * crossover_rad_s))  # more air lowers the grade
     left = float(np.angle(response)) + np.pi - phase_margin_rad
     lag = float(np.clip(left, np.deg2rad(1.0), np.deg2rad(MOST_LAG_DEG)))
-    integral_time = 1 / (crossover_rad_s * np.tan(lag))
-    controller = 1 + 1 / (1j * crossover_rad_s * integral_time)
-    return float(1 / abs(response * controller)), float(integral_time)
+    return pi_gains(response, lag, crossover_rad_s)

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import EllipsisType
-from typing import Any
 
 import casadi as ca
 import pytest
@@ -14,6 +12,7 @@ from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.processes import flotation
 from adaptive_flot.resources import cell_file
+from tests.edits import edit
 
 SHARED = Path(__file__).parents[1].parent / "shared"
 
@@ -65,16 +64,7 @@ def write_cell(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Mapping[st
     """Write the shipped cell with entries changed by dotted path; `...` deletes, a new path adds."""
 
     def write(changes: Mapping[str, object]) -> Path:
-        content: dict[str, Any] = yaml.safe_load(cell_file().read_text())
-        for path, value in changes.items():
-            *parents, last = path.split(".")
-            entry = content
-            for key in parents:
-                entry = entry[key]
-            if isinstance(value, EllipsisType):
-                del entry[last]
-            else:
-                entry[last] = value
+        content = edit(yaml.safe_load(cell_file().read_text()), changes)
         file = tmp_path_factory.mktemp("cell") / "cell.yaml"
         file.write_text(yaml.safe_dump(content))
         return file

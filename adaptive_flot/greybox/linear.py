@@ -61,3 +61,20 @@ def linearise(
         outputs=list(model.names("outputs")),
         name=model.name,
     )
+
+
+def pi_gains(response: complex, lag_rad: float, crossover_rad_s: float) -> tuple[float, float]:
+    """Gain and integral time [s] of a PI controller with a given phase lag and unit loop gain at the crossover.
+
+    Parameters
+    ----------
+    response
+        Response of what is controlled at the crossover frequency, in negative feedback.
+    lag_rad
+        Phase lag of the controller there, between 0 and pi/2 [rad].
+    crossover_rad_s
+        Crossover frequency [rad/s].
+    """
+    integral_time = 1 / (crossover_rad_s * np.tan(lag_rad))
+    controller = 1 + 1 / (1j * crossover_rad_s * integral_time)
+    return float(1 / abs(response * controller)), float(integral_time)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import EllipsisType
 from typing import Any
 
 import pytest
@@ -13,6 +12,7 @@ import yaml
 
 from adaptive_flot.runner.scenario import Scenario, load_scenario
 from adaptive_flot.runner.study import Run, run_scenario
+from tests.edits import edit
 
 DURATION, INITIAL = 120, 40
 CONTENT = f"""
@@ -41,17 +41,7 @@ WriteScenario = Callable[..., Path]
 
 def edited(changes: Mapping[str, Any]) -> dict[str, Any]:
     """The short scenario with entries changed by dotted path; `...` deletes, a new path adds."""
-    content: dict[str, Any] = yaml.safe_load(CONTENT)
-    for path, value in changes.items():
-        *parents, last = path.split(".")
-        entry = content
-        for key in parents:
-            entry = entry[key]
-        if isinstance(value, EllipsisType):
-            del entry[last]
-        else:
-            entry[last] = value
-    return content
+    return edit(yaml.safe_load(CONTENT), changes)
 
 
 @pytest.fixture

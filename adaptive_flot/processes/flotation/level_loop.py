@@ -12,7 +12,7 @@ import control
 import numpy as np
 
 from adaptive_flot.errors import RangeError
-from adaptive_flot.greybox.linear import linearise
+from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
 
 
@@ -109,9 +109,7 @@ def design_level_loop(
             f"level loop: a phase margin of {phase_margin_deg:g} degrees at {crossover_rad_s:g} rad/s asks the PI "
             f"controller for {np.rad2deg(-left):+.0f} degrees, it can give -90 to 0; change the crossover or the margin"
         )
-    integral_time = 1 / (crossover_rad_s * np.tan(left))
-    controller = 1 + 1 / (1j * crossover_rad_s * integral_time)
-    return float(1 / abs(response * controller)), float(integral_time)
+    return pi_gains(response, float(left), crossover_rad_s)
 
 
 def _open_loop(pulp: control.StateSpace, gain: float, integral_time: float) -> control.StateSpace:
