@@ -99,6 +99,9 @@ class EconomicMpc:
             raise ModelError("economic_mpc needs limits and prices; add 'limits' and 'economics' to the scenario")
         if horizon < 1 or not move_s >= setup.dt or not budget_s > 0 or not bias_time_s > 0:
             raise ModelError("economic_mpc: horizon, move_s, bias_time_s and budget_s must be positive, move_s >= dt")
+        for name in MOVED:
+            if name not in setup.limits.inputs or name not in setup.limits.moves:
+                raise ModelError(f"economic_mpc moves {name!r}; give its range and its largest move in 'limits'")
         self.setup = setup
         self.problem = Problem(setup.model, horizon, move_s)
         self.solver = Solver(self.problem, solver, budget_s)

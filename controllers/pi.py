@@ -63,6 +63,8 @@ class Pi:
     ) -> None:
         if setup.limits is None:
             raise ModelError("pi needs limits; add 'limits' to the scenario")
+        if "air_flow" not in setup.limits.inputs:
+            raise ModelError("pi moves 'air_flow'; give its range in 'limits'")
         if not (crossover_rad_s > 0 and filter_s > 0 and 0 < phase_margin_deg < 180):
             raise ModelError("pi: crossover_rad_s and filter_s must be positive, phase_margin_deg between 0 and 180")
         self.setup = setup

@@ -119,6 +119,14 @@ def test_it_wants_limits_and_prices(case: ControllerCase) -> None:
     bare = ControllerSetup(case.setup.model, 1.0, case.setup.schedule)
     with pytest.raises(ModelError, match="limits"):
         EconomicMpc(bare)
+    assert case.setup.limits is not None
+    limits = case.setup.limits
+    for lacking in (
+        replace(limits, inputs={"air_flow": limits.inputs["air_flow"]}),
+        replace(limits, moves={"air_flow": limits.moves["air_flow"]}),
+    ):
+        with pytest.raises(ModelError, match="moves 'level_setpoint'; give its range"):
+            EconomicMpc(replace(case.setup, limits=lacking))
     with pytest.raises(ModelError, match="did you mean 'ipopt'"):
         EconomicMpc(case.setup, solver="ipot")
     with pytest.raises(ModelError, match="positive"):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper, steady_state
 from adaptive_flot.protocols import Sample, Status
 from adaptive_flot.testing import controller_case
@@ -35,6 +38,15 @@ def test_a_missing_grade_holds_the_air() -> None:
     _, decision = case.controller.decide(state, blind, case.estimates[0])
     assert decision.status is Status.MISSING
     np.testing.assert_array_equal(decision.inputs, before.inputs)
+
+
+def test_it_wants_the_range_of_the_air() -> None:
+    setup = controller_case(Hold).setup
+    assert setup.limits is not None
+    with pytest.raises(ModelError, match="needs limits"):
+        Pi(replace(setup, limits=None))
+    with pytest.raises(ModelError, match="'air_flow'; give its range"):
+        Pi(replace(setup, limits=replace(setup.limits, inputs={})))
 
 
 def test_hold_holds() -> None:
