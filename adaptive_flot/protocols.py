@@ -153,6 +153,25 @@ class Estimator(Protocol[State]):
 
 
 @dataclass(frozen=True)
+class Plan:
+    """What a controller expects of the moves it looked ahead, H of them.
+
+    Attributes
+    ----------
+    time
+        End of each move [s] (H,).
+    inputs
+        Each moved input by name, in its unit: its value held during the move that ends at `time` (H,).
+    grade
+        Concentrate grade expected at `time` [-] (H,), with the controller's correction of the model.
+    """
+
+    time: FloatArray
+    inputs: Mapping[str, FloatArray]
+    grade: FloatArray
+
+
+@dataclass(frozen=True)
 class Decision:
     """Info record of one controller step.
 
@@ -168,6 +187,8 @@ class Decision:
         Wall-clock time of the optimisation; NaN where none ran.
     message
         What was wrong, in words: the most violated constraints of a failed solve.
+    plan
+        What the optimisation that this decision comes from expects; None where none ran or none was valid.
     """
 
     inputs: FloatArray
@@ -175,6 +196,7 @@ class Decision:
     decided_by: str
     solve_seconds: float = float("nan")
     message: str = ""
+    plan: Plan | None = None
 
 
 @dataclass(frozen=True)

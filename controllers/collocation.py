@@ -86,6 +86,8 @@ class Problem:
         A name for each constraint, for messages.
     terms
         CasADi function (x, p) -> the cost terms over the horizon, in the order of `term_names`.
+    grades
+        CasADi function (x, p) -> grade at the end of each move (horizon,), bias included.
     """
 
     term_names = ("metal", "treatment", "air", "reagent", "moves", "grade_slack")
@@ -167,6 +169,7 @@ class Problem:
         self.equality: list[bool] = []
         self.names: list[str] = []
         totals = {name: ca.SX(0.0) for name in self.term_names}
+        ends: list[ca.SX] = []
 
         def constrain(expression: ca.SX, equation: bool, names: Sequence[str]) -> None:
             constraints.append(expression)
@@ -198,6 +201,7 @@ class Problem:
             constrain(u - x[nx:], False, [f"move of {n} {at}" for n in moves])
             for j, grade in enumerate(grades):  # a move acts on the grade at once and on the pulp later: both count
                 constrain((grade - limit) / SLACK_SCALE + slack, False, [f"grade limit {at}, point {j + 1}"])
+            ends.append(grades[-1])
             totals["moves"] -= prices[4] * ca.sumsqr(u - x[nx:])
             totals["grade_slack"] -= prices[5] * self.move_s * slack
             x = after
@@ -205,6 +209,7 @@ class Problem:
         terms = ca.vertcat(*(totals[name] for name in self.term_names))
         self.nlp = {"x": ca.vertcat(*variables), "f": -ca.sum1(terms), "g": ca.vertcat(*constraints), "p": p}
         self.terms = ca.Function("terms", [self.nlp["x"], p], [terms])
+        self.grades = ca.Function("grades", [self.nlp["x"], p], [ca.vertcat(*ends)])
         self.constraints = ca.Function("constraints", [self.nlp["x"], p], [self.nlp["g"]])
 
     def _inputs(self, moved: ca.SX, disturbances: ca.SX) -> ca.SX:

@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status, full_parameters
+from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Plan, Sample, Status, full_parameters
 from controllers.collocation import MOVED, Arguments, Bounds, Problem
 from controllers.nlp_solvers import Solution, Solver, Verdict
 
@@ -118,6 +118,7 @@ class EconomicMpc:
         self._memory = float(np.exp(-setup.dt / bias_time_s))
         self._grade = setup.model.index("outputs", "concentrate_grade")
         self._ode = FastCall(setup.model.ode)
+        self._grades = FastCall(self.problem.grades)
 
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
@@ -150,7 +151,9 @@ class EconomicMpc:
         solution, status = self._solve(state, now, held, estimate, theta)
         if solution.verdict is Verdict.VALID:
             plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
-            return self._apply(plan, held, self.problem.inputs_of(solution.variables)[0], status, solution)
+            expected = self._plan(estimate.time, solution, now)
+            first = self.problem.inputs_of(solution.variables)[0]
+            return self._apply(plan, held, first, status, solution, expected)
         if state.plan is not None and state.age + 1 < self.problem.horizon:
             older = replace(state, age=state.age + 1)
             planned = self.problem.inputs_of(state.plan)[older.age]
@@ -172,12 +175,24 @@ class EconomicMpc:
             return solution, Status.OK
         return self.solver(now, self._solver_bounds, cold), Status.RETRIED
 
+    def _plan(self, time: float, solution: Solution, now: FloatArray) -> Plan:
+        inputs = self.problem.inputs_of(solution.variables)
+        ends = time + self.problem.move_s * np.arange(1.0, self.problem.horizon + 1)
+        (grade,) = self._grades(solution.variables, now)
+        return Plan(ends, {name: inputs[:, i] for i, name in enumerate(MOVED)}, grade)
+
     def _apply(
-        self, state: MpcState, held: FloatArray, moved: FloatArray, status: Status, solution: Solution
+        self,
+        state: MpcState,
+        held: FloatArray,
+        moved: FloatArray,
+        status: Status,
+        solution: Solution,
+        plan: Plan | None = None,
     ) -> tuple[MpcState, Decision]:
         inputs = held.copy()
         low, high = self._bounds.inputs.T
         inputs[self.problem.moved] = np.clip(moved, low, high)  # a valid solution may miss a bound by its tolerance
         who = {Status.OK: "economic_mpc", Status.RETRIED: "economic_mpc"}.get(status, status.name.lower())
-        decision = Decision(inputs.copy(), status, who, solution.seconds, solution.message)
+        decision = Decision(inputs.copy(), status, who, solution.seconds, solution.message, plan)
         return replace(state, inputs=inputs), decision

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.protocols import ControllerSetup, Decision, Status
+from adaptive_flot.greybox import Stepper
+from adaptive_flot.protocols import ControllerSetup, Decision, Status, full_parameters
 from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc import EconomicMpc, MpcState
 from controllers.nlp_solvers import Solution, Verdict
@@ -49,6 +50,22 @@ def test_it_optimises_every_move_and_holds_between(case: ControllerCase) -> None
     assert solved == [0, 30]
     assert all(d.status is Status.OK and d.decided_by == "economic_mpc" for d in decisions)
     assert all(np.array_equal(d.inputs, decisions[0].inputs) for d in decisions[:30])
+
+
+def test_a_decision_tells_its_plan(case: ControllerCase) -> None:
+    """Ends of the moves, inputs of which the first is applied, and the grade that the model gives for them."""
+    _, (decision, between) = run(case, start(case), slice(0, 2))
+    plan, model = decision.plan, case.setup.model
+    assert plan is not None and between.plan is None
+    assert plan.time.tolist() == [case.samples[0].time + 30.0 * k for k in range(1, 7)]
+    held = np.tile(decision.inputs, (6, 1))
+    held[:, model.index("inputs", "air_flow")] = plan.inputs["air_flow"]
+    held[:, model.index("inputs", "level_setpoint")] = plan.inputs["level_setpoint"]
+    np.testing.assert_allclose(held[0], decision.inputs, rtol=1e-3)
+    estimate = case.estimates[0]
+    theta = full_parameters(model, case.setup.parameters, estimate.parameters)
+    run_ahead = Stepper(model, 1.0).simulate(estimate.state, np.repeat(held, 30, axis=0), theta)
+    np.testing.assert_allclose(plan.grade, run_ahead.outputs[29::30, 0], rtol=3e-3)
 
 
 def test_a_failed_solve_plays_the_plan_then_holds(case: ControllerCase, monkeypatch: pytest.MonkeyPatch) -> None:
