@@ -26,6 +26,8 @@ class Status(Enum):
 
     OK = "ok"
     MISSING = "measurement missing: predicted only"
+    LATE = "late value put in its place, the samples since then taken again"
+    TOO_OLD = "late value without a sample of its time among those kept: not used"
     PROJECTED = "estimate projected onto its bounds"
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
     NOT_CONVERGED = "search stopped before it converged: best values so far"
@@ -37,12 +39,36 @@ class Status(Enum):
 
 
 @dataclass(frozen=True)
+class LateValue:
+    """A measurement that arrives after its time: output by name, time it was taken [s], value in the output's unit."""
+
+    output: str
+    time: float
+    value: float
+
+
+@dataclass(frozen=True)
 class Sample:
-    """One sampling instant: time [s], inputs held until then (nu,), measured outputs (ny,) with NaN where missing."""
+    """One sampling instant.
+
+    Outputs may be measured at different rates: at any instant some are NaN, and only the others correct the estimate.
+
+    Attributes
+    ----------
+    time
+        Time [s].
+    inputs
+        Inputs held during the interval until then (nu,).
+    outputs
+        Outputs measured at this time (ny,), NaN where there is no measurement.
+    late
+        Values that arrive with this sample and were taken earlier (a laboratory assay, an analyser with dead time).
+    """
 
     time: float
     inputs: FloatArray
     outputs: FloatArray
+    late: tuple[LateValue, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,6 +143,8 @@ class Estimate:
         Model state (nx,) at the time of the sample.
     status
         What happened.
+    late
+        Innovations of the late values that were used: output, time taken, measured minus predicted then.
     """
 
     time: float
@@ -127,12 +155,17 @@ class Estimate:
     covariance: FloatArray
     state: FloatArray
     status: Status
+    late: tuple[LateValue, ...] = ()
 
 
 class Estimator(Protocol[State]):
     """Tracks parameters (and the state) from one sample to the next.
 
     Made by `Name(setup, **options)`. `setup` is kept as an attribute; nothing else may change after construction.
+
+    Late values: after one, the estimate is what the same value in time would have given. An estimator need not see to
+    that: `adaptive_flot.late.LateValues`, put around it by the loop wherever a measurement has a dead time, does. One
+    that keeps a window of samples anyway may take `Sample.late` itself; it then has `takes_late_values = True`.
     """
 
     setup: Setup
@@ -142,7 +175,9 @@ class Estimator(Protocol[State]):
         ...
 
     def update(self, state: State, sample: Sample) -> tuple[State, Estimate]:
-        """Take one sample, one interval after the last. Missing outputs are NaN and give a status, not an error.
+        """Take one sample, one interval after the last.
+
+        Missing outputs are NaN; a sample in which all driving outputs are missing gives a status, not an error.
 
         Raises
         ------

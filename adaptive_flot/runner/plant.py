@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,15 +10,16 @@ import numpy as np
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import PlantRecord, Sample
+from adaptive_flot.protocols import LateValue, PlantRecord, Sample
 
 
 @dataclass(frozen=True)
 class SimulatedState:
-    """Interval to come and the true state (nx,) at its start."""
+    """Interval to come, the true state (nx,) at its start, and what was measured and is not known yet."""
 
     row: int
     x: FloatArray
+    pending: tuple[LateValue, ...] = ()
 
 
 class SimulatedPlant:
@@ -37,6 +39,8 @@ class SimulatedPlant:
         Noise added to each output (N, ny); NaN where an output is not measured.
     accurate
         Integrate with IDAS.
+    dead_time
+        Time from taking a measurement to knowing it, by output name [s].
     """
 
     def __init__(
@@ -48,7 +52,9 @@ class SimulatedPlant:
         noise: FloatArray,
         *,
         accurate: bool = False,
+        dead_time: Mapping[str, float] | None = None,
     ) -> None:
+        self._late = {model.index("outputs", name): (name, d) for name, d in (dead_time or {}).items() if d > 0}
         self._dt = dt
         self._x0 = x0
         self._parameters = parameters
@@ -64,8 +70,20 @@ class SimulatedPlant:
         k = state.row
         p = self._parameters[k]
         x, y, _ = self._step(state.x, k * self._dt, inputs, p)
-        sample = Sample((k + 1) * self._dt, inputs, y + self._noise[k])
-        return SimulatedState(k + 1, x), PlantRecord(sample, y, p)
+        now, measured = (k + 1) * self._dt, y + self._noise[k]
+        taken = tuple(LateValue(name, now, float(measured[j])) for j, (name, _) in self._late.items())
+        measured[list(self._late)] = np.nan
+        known, pending = self._arrived((*state.pending, *taken), now)
+        return SimulatedState(k + 1, x, pending), PlantRecord(Sample(now, inputs, measured, known), y, p)
+
+    def _arrived(
+        self, values: tuple[LateValue, ...], now: float
+    ) -> tuple[tuple[LateValue, ...], tuple[LateValue, ...]]:
+        """Cut the values into those known by now and those still to come; a value that is NaN never was."""
+        wait = dict(self._late.values())
+        due = [v.time + wait[v.output] <= now + 1e-9 for v in values]
+        known = tuple(v for v, d in zip(values, due, strict=True) if d)
+        return known, tuple(v for v, d in zip(values, due, strict=True) if not d and np.isfinite(v.value))
 
 
 @dataclass(frozen=True)

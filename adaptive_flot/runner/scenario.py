@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -29,9 +30,13 @@ class _Part(BaseModel):
 
 
 class Measurement(_Part):
-    """Noise of one measured output: standard deviation in the output's unit."""
+    """One measured output: noise in the output's unit, how often it is measured, and when the value is known."""
 
     noise_std: float = Field(ge=0)
+    every_s: float | None = Field(default=None, gt=0)
+    """Time between two measurements; default every sampling interval."""
+    dead_time_s: float = Field(default=0.0, ge=0)
+    """Time from taking a measurement to knowing it."""
 
 
 class PlantPart(_Part):
@@ -206,6 +211,21 @@ class Scenario:
         for name, change in self.file.parameters.items():
             p[:, self.model.index("parameters", name)] *= change.factor(self.starts)
         return p
+
+    @property
+    def dead_times(self) -> dict[str, float]:
+        """Dead time of each output that is known late [s]."""
+        return {name: m.dead_time_s for name, m in self.file.measurements.items() if m.dead_time_s > 0}
+
+    def measured_at(self) -> npt.NDArray[np.bool_]:
+        """Whether each output is measured at the end of each interval (N, ny)."""
+        ends = self.starts + self.dt
+        measured = np.zeros((len(ends), len(self.model.outputs)), dtype=bool)
+        for name, m in self.file.measurements.items():
+            # the first sampling instant at or after each multiple of the period
+            counted = np.floor(np.concatenate([[0.0], ends]) / (m.every_s or self.dt) + 1e-9)
+            measured[:, self.model.index("outputs", name)] = np.diff(counted) > 0
+        return measured
 
     def noise_std(self) -> FloatArray:
         """Noise of each output (ny,), NaN where it is not measured."""

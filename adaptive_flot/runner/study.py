@@ -17,8 +17,9 @@ from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.late import in_time, taking_late_values
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
-from adaptive_flot.protocols import ControllerSetup, PlantRecord, Prior, Setup, Status
+from adaptive_flot.protocols import ControllerSetup, PlantRecord, Prior, Sample, Setup, Status
 from adaptive_flot.runner.accounts import account
 from adaptive_flot.runner.loop import Step, run_loop
 from adaptive_flot.runner.plant import SimulatedPlant
@@ -127,7 +128,10 @@ def _run(
     schedule = scenario.schedule(seed)
     factory = load(plugin.use, ESTIMATORS, "estimator", folder)
     setup = replace(scenario.setup, truth=scenario.true_parameters()) if plugin.use == "oracle" else scenario.setup
-    estimator = construct(factory, plugin.use, "estimator", setup, **plugin.options)
+    estimator = taking_late_values(
+        construct(factory, plugin.use, "estimator", setup, **plugin.options),
+        max(scenario.dead_times.values(), default=0.0),
+    )
     chosen = scenario.file.controllers[controller_name]
     controller = construct(
         load(chosen.use, CONTROLLERS, "controller", folder),
@@ -182,7 +186,9 @@ def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
     x0 = steady_state(scenario.model, scenario.schedule(seed)[0], parameters[0]).state
     noise = measurement_noise(scenario, seed)
     accurate = scenario.file.plant.integrator == "accurate"
-    return SimulatedPlant(scenario.model, scenario.dt, x0, parameters, noise, accurate=accurate)
+    return SimulatedPlant(
+        scenario.model, scenario.dt, x0, parameters, noise, accurate=accurate, dead_time=scenario.dead_times
+    )
 
 
 def simulate_plant(scenario: Scenario, seed: int) -> list[PlantRecord]:
@@ -199,7 +205,8 @@ def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
     """White Gaussian noise of a run (N, ny), the same for every estimator; NaN where nothing is measured."""
     generator = np.random.default_rng([seed, 0])
     std = scenario.noise_std()
-    return std * generator.standard_normal((len(scenario.starts), std.size))
+    noise = std * generator.standard_normal((len(scenario.starts), std.size))
+    return np.where(scenario.measured_at(), noise, np.nan)
 
 
 def initial_fit(scenario: Scenario, steps: list[Step]) -> BatchFit:
@@ -209,13 +216,15 @@ def initial_fit(scenario: Scenario, steps: list[Step]) -> BatchFit:
         scenario.model.with_parameters(part.guess), scenario.dt, scenario.setup.parameters, scenario.setup.outputs
     )
     factory = load(part.method, BATCH_ESTIMATORS, "batch estimator", scenario.path.parent)
-    fitted: BatchFit = construct(factory, part.method, "batch estimator", guess, **part.options).fit(record_of(steps))
+    fitted: BatchFit = construct(factory, part.method, "batch estimator", guess, **part.options).fit(
+        record_of(steps, scenario.setup)
+    )
     return fitted
 
 
-def record_of(steps: list[Step]) -> Dataset:
-    """What was measured, as a record that starts one interval before the first step, at the initial instant."""
-    samples = [s.plant.sample for s in steps]
+def record_of(steps: list[Step], setup: Setup) -> Dataset:
+    """What is known by the last step, as a record that starts one interval before the first, at the initial instant."""
+    samples = in_time([s.plant.sample for s in steps], setup)
     dt = samples[1].time - samples[0].time
     return Dataset(
         name="initial record",
@@ -228,7 +237,7 @@ def record_of(steps: list[Step]) -> Dataset:
 
 def _nominal(scenario: Scenario, steps: list[Step], prior: Prior) -> Prior:
     """Nominal parameters and their own free run from the steady state of the first inputs."""
-    model, record = scenario.model, record_of(steps)
+    model, record = scenario.model, record_of(steps, scenario.setup)
     x0 = steady_state(model, record.inputs[0]).state
     state = RecordSimulator(model, scenario.dt).last_state(record, x0, model.parameter_values)
     values = model.parameter_values[model.indices("parameters", scenario.setup.parameters)]
@@ -247,10 +256,11 @@ def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
     inputs = np.vstack([s.plant.sample.inputs for s in steps])
     columns |= {q.column: inputs[:, j] for j, q in enumerate(model.inputs)}
     true = np.vstack([s.plant.outputs for s in steps])
-    measured = np.vstack([s.plant.sample.outputs for s in steps])
+    samples = in_time([s.plant.sample for s in steps], setup)
+    measured = np.vstack([s.outputs for s in samples])
     unknown = np.full(len(model.outputs), np.nan)
     predicted = np.vstack([e.prediction if e else unknown for e in estimates])
-    innovation = np.vstack([e.innovation if e else unknown for e in estimates])
+    innovation = np.vstack([s.outputs for s in in_time(_innovations(steps, unknown), setup)])
     expected = np.vstack([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
     for j, q in enumerate(model.outputs):
         columns[f"{q.column}_true"] = true[:, j]
@@ -274,6 +284,16 @@ def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
         columns["control_status"] = [s.decision.status.name.lower() for s in steps]
         columns["solve_seconds"] = solve
     return pd.DataFrame(columns)
+
+
+def _innovations(steps: list[Step], unknown: FloatArray) -> list[Sample]:
+    """Innovations in place of the measurements, those of late values with the sample that they arrived with."""
+    return [
+        replace(s.plant.sample, outputs=s.estimate.innovation, late=s.estimate.late)
+        if s.estimate
+        else replace(s.plant.sample, outputs=unknown, late=())
+        for s in steps
+    ]
 
 
 def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:

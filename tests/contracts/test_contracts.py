@@ -51,6 +51,7 @@ class _Bad(Fixed):
         super().__init__(setup)
         self.fault = fault
         self.calls = 0
+        self.takes_late_values = fault == "deaf"
 
     def init(self, prior: Prior) -> FixedState:
         return _Thawed(0.0) if self.fault == "thawed" else super().init(prior)  # type: ignore[return-value]
@@ -73,7 +74,7 @@ class _Bad(Fixed):
         return new, estimate
 
 
-@pytest.mark.parametrize("fault", ["thawed", "mutates", "forgetful", "aliases", "lopsided", "wild", "peeks"])
+@pytest.mark.parametrize("fault", ["thawed", "mutates", "forgetful", "aliases", "lopsided", "wild", "peeks", "deaf"])
 def test_the_kit_catches(fault: str) -> None:
     failures = 0
     for check in ESTIMATOR_CHECKS:

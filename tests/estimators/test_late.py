@@ -1,0 +1,111 @@
+"""Late values: whatever arrives within the window, the estimate is that of a record with everything in time."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.late import LateValues, in_time
+from adaptive_flot.protocols import Estimate, LateValue, Prior, Sample, Setup, Status
+from estimators.rpem import Rpem
+from tests.estimators import toys
+
+ROWS = 40
+
+
+def linear_setup() -> Setup:
+    model = toys.linear(2, 2)
+    return Setup(model, 1.0, model.names("parameters"), model.names("outputs"))
+
+
+def make_samples(seed: int) -> list[Sample]:
+    generator = np.random.default_rng(seed)
+    inputs = generator.normal(size=(ROWS, 4))
+    outputs = inputs.reshape(ROWS, 2, 2) @ np.array([1.0, -0.5]) + 0.1 * generator.normal(size=(ROWS, 2))
+    return [Sample(k + 1.0, u, y) for k, (u, y) in enumerate(zip(inputs, outputs, strict=True))]
+
+
+def delayed(samples: list[Sample], delays: FloatArray) -> list[Sample]:
+    """The same record in which the value of y1 at sample k is known delays[k] samples later; 0: in time."""
+    late: dict[int, list[LateValue]] = {}
+    shown = list(samples)
+    for k, delay in enumerate(delays):
+        if delay > 0:
+            shown[k] = replace(samples[k], outputs=np.array([samples[k].outputs[0], np.nan]))
+            late.setdefault(k + int(delay), []).append(LateValue("y1", k + 1.0, samples[k].outputs[1]))
+    return [replace(s, late=tuple(late.get(k, ()))) for k, s in enumerate(shown)]
+
+
+def run(estimator: LateValues | Rpem, samples: list[Sample]) -> list[Estimate]:
+    state = estimator.init(Prior(0.0, np.zeros(1), np.zeros(2), np.eye(2), np.full(2, 0.1)))
+    found = []
+    for sample in samples:
+        state, estimate = estimator.update(state, sample)  # type: ignore[arg-type]
+        found.append(estimate)
+    return found
+
+
+@given(seed=st.integers(0, 10**6), delays=st.lists(st.integers(0, 8), min_size=ROWS - 9, max_size=ROWS - 9))
+def test_in_whatever_order_values_arrive_the_last_estimate_is_that_of_the_whole_record(
+    seed: int, delays: list[int]
+) -> None:
+    samples = make_samples(seed)
+    shown = delayed(samples, np.array(delays + [0] * 9))
+    estimator = LateValues(Rpem(linear_setup(), forgetting=0.95), 10.0)
+    found, expected = run(estimator, shown)[-1], run(Rpem(linear_setup(), forgetting=0.95), samples)[-1]
+    np.testing.assert_array_equal(found.parameters, expected.parameters)
+    np.testing.assert_array_equal(found.covariance, expected.covariance)
+    np.testing.assert_array_equal([s.outputs for s in in_time(shown, linear_setup())], [s.outputs for s in samples])
+
+
+def test_a_value_older_than_the_window_is_refused_and_one_just_inside_is_used() -> None:
+    samples = make_samples(1)
+    for age, status in ((5, Status.LATE), (6, Status.TOO_OLD)):
+        shown = list(samples)
+        shown[20] = replace(samples[20], late=(LateValue("y1", samples[20].time - age, 9.0),))
+        assert run(LateValues(Rpem(linear_setup()), 5.0), shown)[20].status is status
+
+
+def test_a_late_value_of_the_sample_itself_is_a_plain_measurement() -> None:
+    samples = make_samples(2)
+    shown = list(samples)
+    alone = np.array([samples[7].outputs[0], np.nan])
+    value = LateValue("y1", samples[7].time, samples[7].outputs[1])
+    shown[7] = replace(samples[7], outputs=alone, late=(value,))
+    found, expected = run(LateValues(Rpem(linear_setup()), 5.0), shown), run(Rpem(linear_setup()), samples)
+    for a, b in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(a.parameters, b.parameters)
+        assert a.status is b.status
+
+
+def test_a_late_value_that_is_not_a_number_is_a_missing_one() -> None:
+    samples = make_samples(3)
+    shown = list(samples)
+    shown[9] = replace(samples[9], late=(LateValue("y0", 5.0, np.nan),))
+    for a, b in zip(run(LateValues(Rpem(linear_setup()), 9.0), shown), run(Rpem(linear_setup()), samples), strict=True):
+        np.testing.assert_array_equal(a.parameters, b.parameters)
+        assert a.status is b.status
+
+
+def test_a_late_value_of_an_unknown_output_is_a_named_error() -> None:
+    samples = make_samples(4)
+    samples[5] = replace(samples[5], late=(LateValue("y7", 3.0, 1.0),))
+    with pytest.raises(ModelError, match="y7"):
+        run(LateValues(Rpem(linear_setup()), 9.0), samples)
+
+
+def test_memory_stays_within_the_window() -> None:
+    estimator = LateValues(Rpem(linear_setup()), 8.0)
+    state = estimator.init(Prior(0.0, np.zeros(1), np.zeros(2), np.eye(2), np.full(2, 0.1)))
+    sizes = []
+    for sample in make_samples(5):
+        state, _ = estimator.update(state, sample)
+        sizes.append(len(pickle.dumps(state)))
+    assert max(sizes[8:]) <= sizes[8] + 64
