@@ -6,9 +6,9 @@ Identification*, 1999, chapter 7; Gauss-Newton in a trust region with bounds, `s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal, cast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -27,6 +27,10 @@ WEIGHT_PASSES = 5
 NOISE_CONVERGED = 0.01
 MOST_EVALUATIONS = 1000
 """Simulations of the record in one search."""
+KEPT_EVALUATIONS = 6
+"""Start, outputs and derivatives at the last two points of a search."""
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,18 @@ class _Problem:
     upper: FloatArray
     prior_std: FloatArray
     steady: FloatArray
+    seen: dict[tuple[str, bytes], Any] = field(default_factory=dict, repr=False)
+    """What was evaluated last, by unknowns."""
+
+    def once(self, what: str, unknowns: FloatArray, evaluate: Callable[[], _T]) -> _T:
+        """Evaluate once for the same unknowns: each search starts, and is judged, where the one before ended."""
+        key = (what, unknowns.tobytes())
+        if key not in self.seen:
+            value = evaluate()
+            if len(self.seen) == KEPT_EVALUATIONS:
+                del self.seen[next(iter(self.seen))]
+            self.seen[key] = value
+        return cast(_T, self.seen[key])
 
 
 class Pem:
@@ -167,15 +183,24 @@ class Pem:
         return cast(FloatArray, np.maximum(found, 1e-12 * scale))
 
     def _errors(self, record: Dataset, problem: _Problem, unknowns: FloatArray, measured: FloatArray) -> FloatArray:
-        try:
-            p, x0 = self._unpack(record, problem, unknowns)
-        except RangeError:  # no steady state with these parameters: the search takes its step back
-            return np.full_like(measured, np.nan)
-        return measured - self._simulator.outputs(record, x0, p)[:, self._columns]
+        def simulate() -> FloatArray:
+            try:
+                p, x0 = self._start_of(record, problem, unknowns)
+            except RangeError:  # no steady state with these parameters: the search takes its step back
+                return np.full_like(measured, np.nan)
+            return self._simulator.outputs(record, x0, p)[:, self._columns]
+
+        return measured - problem.once("outputs", unknowns, simulate)
+
+    def _start_of(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return problem.once("start", unknowns, lambda: self._unpack(record, problem, unknowns))
 
     def _jacobian(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> FloatArray:
         """d(prediction)/d(unknowns) (N, m, q + free)."""
-        p, x0 = self._unpack(record, problem, unknowns)
+        return problem.once("gradient", unknowns, lambda: self._gradient(record, problem, unknowns))
+
+    def _gradient(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> FloatArray:
+        p, x0 = self._start_of(record, problem, unknowns)
         names, q = self.setup.parameters, len(self.setup.parameters)
         x0_gradient = np.zeros((x0.size, len(problem.centre)))
         if self.initial_state == "steady":
@@ -237,7 +262,7 @@ class Pem:
         model, q = self.setup.model, len(self.setup.parameters)
         scaled = _covariance(self._rows(record, problem, unknowns, noise, present))
         covariance = (scaled * np.outer(problem.scale, problem.scale))[:q, :q]
-        p, x0 = self._unpack(record, problem, unknowns)
+        p, x0 = self._start_of(record, problem, unknowns)
         values = problem.centre[:q] + problem.scale[:q] * unknowns[:q]
         at_bound = np.minimum(unknowns - problem.lower, problem.upper - unknowns)[:q] < 1e-6
         estimates = tuple(

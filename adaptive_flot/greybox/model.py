@@ -15,7 +15,7 @@ it is the place where an effect can be attached without touching the equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -174,6 +174,11 @@ class Model:
     def sites(self) -> tuple[str, ...]:
         """Names of the sites that the equations pass through."""
         return self._built.sites
+
+    @cached_property
+    def kept(self) -> dict[Hashable, ca.Function]:
+        """Functions derived from this model, by what they are: made at first use, shared by all that use the model."""
+        return {}
 
     @cached_property
     def _built(self) -> Built:

@@ -44,6 +44,8 @@ class RecordSimulator:
 
 
 def _first_row(model: Model) -> ca.Function:
-    t, x, u, p = model.ode.sx_in()
-    y = model.ode(t, x, u, p)[1]
-    return ca.Function("first_row", [x, t, u, p], [y, ca.jacobian(y, x), ca.jacobian(y, p)])
+    if "first_row" not in model.kept:
+        t, x, u, p = model.ode.sx_in()
+        y = model.ode(t, x, u, p)[1]
+        model.kept["first_row"] = ca.Function("first_row", [x, t, u, p], [y, ca.jacobian(y, x), ca.jacobian(y, p)])
+    return model.kept["first_row"]

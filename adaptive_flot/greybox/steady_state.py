@@ -100,7 +100,9 @@ def steady_state_gradient(
 
 def _jacobian(model: Model, wrt: Literal["x", "p"]) -> FastCall:
     """d(dx/dt)/d(x or p) as a function of (t, x, u, p)."""
-    t, x, u, p = model.ode.sx_in()
-    slope = ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], {"x": x, "p": p}[wrt]))
-    function = ca.Function("jacobian", [t, x, u, p], [slope], ["t", "x", "u", "p"], ["jacobian"])
-    return FastCall(function, matrices=("jacobian",))
+    key = ("jacobian", wrt)
+    if key not in model.kept:
+        t, x, u, p = model.ode.sx_in()
+        slope = ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], {"x": x, "p": p}[wrt]))
+        model.kept[key] = ca.Function("jacobian", [t, x, u, p], [slope], ["t", "x", "u", "p"], ["jacobian"])
+    return FastCall(model.kept[key], matrices=("jacobian",))

@@ -11,7 +11,7 @@ outputs and signals are those at that time.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -70,9 +70,16 @@ class Stepper:
         self.dt = float(dt)
         self.substeps = substeps or max(1, math.ceil(dt / model.max_step_s - 1e-9))
         self.accurate = accurate
-        self._compiled: dict[tuple[str, tuple[str, ...], int], ca.Function] = {}
-        self.step: ca.Function = _idas_step(model, self.dt) if accurate else fast_step(model, self.dt, self.substeps)
+        self._key = ("stepper", self.dt, self.substeps, accurate)
+
+    @property
+    def step(self) -> ca.Function:
         """`(x, t, u, p) -> (x_next, y, s)`: t [s] at the start of the interval, y and s at its end."""
+
+        def make() -> ca.Function:
+            return _idas_step(self.model, self.dt) if self.accurate else fast_step(self.model, self.dt, self.substeps)
+
+        return self._kept(("step",), make)
 
     @cached_property
     def call(self) -> FastCall:
@@ -187,27 +194,29 @@ class Stepper:
         return Sensitivities(np.vstack(ys), np.concatenate(dys), x, gradient)
 
     def _sensitivity_step(self, wrt: tuple[str, ...], q: int) -> ca.Function:
-        key = ("sensitivity", wrt, q)
-        if key in self._compiled:
-            return self._compiled[key]
-        x, t, u, p = self._symbols()
-        sensitivity = ca.SX.sym("S", x.numel(), q)
-        seeds = ca.horzcat(self._parameter_seeds(wrt), ca.DM(p.numel(), q - len(wrt)))
-        end, y = self._along(sensitivity, seeds)
-        results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
-        names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
-        self._compiled[key] = ca.Function(
-            f"sensitivity_step_{q}", [x, sensitivity, t, u, p], results, *names, {"cse": True}
-        )
-        return self._compiled[key]
+        def make() -> ca.Function:
+            x, t, u, p = self._symbols()
+            sensitivity = ca.SX.sym("S", x.numel(), q)
+            seeds = ca.horzcat(self._parameter_seeds(wrt), ca.DM(p.numel(), q - len(wrt)))
+            end, y = self._along(sensitivity, seeds)
+            results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
+            names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
+            return ca.Function(f"sensitivity_step_{q}", [x, sensitivity, t, u, p], results, *names, {"cse": True})
+
+        return self._kept(("sensitivity", wrt, q), make)
 
     def _accumulated(self, function: ca.Function, wrt: tuple[str, ...], rows: int, carried: int) -> ca.Function:
         # mapaccum carries only the first argument unless told how many: with a state and its sensitivity it must be
         # 2, else the sensitivity silently forgets the past.
-        key = (function.name(), wrt, rows)
-        if key not in self._compiled:
-            self._compiled[key] = function.mapaccum(f"{function.name()}_x{rows}", rows, carried)
-        return self._compiled[key]
+        name = function.name()
+        return self._kept((name, wrt, rows), lambda: function.mapaccum(f"{name}_x{rows}", rows, carried))
+
+    def _kept(self, key: tuple[Hashable, ...], make: Callable[[], ca.Function]) -> ca.Function:
+        """Function made once for all steppers of the model with the same interval and method."""
+        full = (*self._key, *key)
+        if full not in self.model.kept:
+            self.model.kept[full] = make()
+        return self.model.kept[full]
 
     def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         if self.accurate:

@@ -12,18 +12,18 @@ import pandas as pd
 
 from adaptive_flot import metrics
 from adaptive_flot.batch import BatchFit
-from adaptive_flot.errors import ScenarioError, located, near_match
+from adaptive_flot.errors import located
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.late import in_time, taking_late_values
-from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
-from adaptive_flot.protocols import ControllerSetup, PlantRecord, Prior, Sample, Setup, Status
+from adaptive_flot.late import in_time
+from adaptive_flot.protocols import PlantRecord, Prior, Sample, Setup, Status
 from adaptive_flot.runner.accounts import account
 from adaptive_flot.runner.loop import Step, run_loop
 from adaptive_flot.runner.plant import SimulatedPlant
-from adaptive_flot.runner.scenario import Plugin, Scenario
+from adaptive_flot.runner.prepared import Prepared
+from adaptive_flot.runner.scenario import Scenario
 
 Progress = Callable[[], None]
 
@@ -100,52 +100,38 @@ def run_scenario(
     """
     runs: list[Run] = []
     with located(scenario.path):
-        chosen = {name: _estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
+        prepared = Prepared.of(scenario, estimators)
         for seed in seeds or scenario.file.seeds:
-            scenario.model.check_inputs(scenario.schedule(seed), scenario.starts, where=f"inputs of seed {seed}")
             # before it starts, no estimator has touched a run: one fit for all with the same controller
             initial: dict[str, dict[str, BatchFit]] = {}
-            for controller, name in scenario.combinations(list(chosen)):
-                fitted = initial.setdefault(controller, {})
-                runs.append(_run(scenario, name, chosen[name], controller, seed, fitted))
+            for controller, name in scenario.combinations(list(prepared.estimators)):
+                runs.append(run_one(prepared, name, controller, seed, initial.setdefault(controller, {})))
                 progress()
     return runs
 
 
-def _estimator_plugin(scenario: Scenario, name: str) -> Plugin:
-    if name in scenario.file.estimators:
-        return scenario.file.estimators[name]
-    if name in ESTIMATORS or ":" in name:
-        return Plugin(use=name)
-    raise ScenarioError(f"unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}")
-
-
-def _run(
-    scenario: Scenario, name: str, plugin: Plugin, controller_name: str, seed: int, initial: dict[str, BatchFit]
+def run_one(
+    prepared: Prepared, estimator_name: str, controller_name: str, seed: int, initial: dict[str, BatchFit]
 ) -> Run:
+    """Run one combination; `initial` holds the batch fit under "fit" where it is known, and receives it where not.
+
+    Raises
+    ------
+    PluginError, ScenarioError
+        The estimator or controller can not be loaded.
+    RangeError
+        An input of this seed, or the steady state it starts from, leaves the model's range.
+    """
     begin = time.perf_counter()
-    folder = scenario.path.parent
+    scenario, plugin = prepared.scenario, prepared.estimators[estimator_name]
     schedule = scenario.schedule(seed)
-    factory = load(plugin.use, ESTIMATORS, "estimator", folder)
-    setup = replace(scenario.setup, truth=scenario.true_parameters()) if plugin.use == "oracle" else scenario.setup
-    estimator = taking_late_values(
-        construct(factory, plugin.use, "estimator", setup, **plugin.options),
-        max(scenario.dead_times.values(), default=0.0),
-    )
-    chosen = scenario.file.controllers[controller_name]
-    controller = construct(
-        load(chosen.use, CONTROLLERS, "controller", folder),
-        chosen.use,
-        "controller",
-        ControllerSetup(
-            scenario.model, scenario.dt, schedule, scenario.setup.parameters, scenario.limits, scenario.prices
-        ),
-        **chosen.options,
-    )
+    scenario.model.check_inputs(schedule, scenario.starts, where=f"inputs of seed {seed}")
+    estimator = prepared.estimator(estimator_name)
+    controller = prepared.controller(controller_name, schedule)
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
-            initial["fit"] = initial_fit(scenario, steps)
+            initial["fit"] = prepared.batch.fit(record_of(steps, scenario.setup))
         prior = initial["fit"].prior(steps[-1].plant.sample.time)
         return prior if plugin.start == "initial_estimate" else _nominal(scenario, steps, prior)
 
@@ -161,7 +147,7 @@ def _run(
     counts = Counter((s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps)
     seconds = time.perf_counter() - begin
     return Run(
-        name,
+        estimator_name,
         controller_name,
         seed,
         table,
@@ -207,19 +193,6 @@ def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
     std = scenario.noise_std()
     noise = std * generator.standard_normal((len(scenario.starts), std.size))
     return np.where(scenario.measured_at(), noise, np.nan)
-
-
-def initial_fit(scenario: Scenario, steps: list[Step]) -> BatchFit:
-    """Batch fit of the first steps, from the scenario's guess."""
-    part = scenario.file.initial_estimate
-    guess = Setup(
-        scenario.model.with_parameters(part.guess), scenario.dt, scenario.setup.parameters, scenario.setup.outputs
-    )
-    factory = load(part.method, BATCH_ESTIMATORS, "batch estimator", scenario.path.parent)
-    fitted: BatchFit = construct(factory, part.method, "batch estimator", guess, **part.options).fit(
-        record_of(steps, scenario.setup)
-    )
-    return fitted
 
 
 def record_of(steps: list[Step], setup: Setup) -> Dataset:

@@ -1,13 +1,15 @@
 """The map over one interval and over records: known solutions, exact sensitivities, time convention."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.fastcall import FastCall
-from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.model import FloatArray, Model, Scope
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepper import CHUNK, Stepper
 
@@ -223,6 +225,22 @@ def test_two_sets_of_unknowns_do_not_share_compiled_functions(fast: Stepper, sta
     for j, name in enumerate(("n", "C")):
         alone = fast.simulate_sensitivities(start, u, p, [name], np.zeros((9, 1))).gradient
         np.testing.assert_allclose(alone[..., 0], both[..., j], rtol=1e-10, atol=1e-14)
+
+
+def test_steppers_of_one_model_share_functions_and_those_of_others_do_not(clock: Model) -> None:
+    """Shared by interval, substeps and method only; a copy of the model with other equations starts with none."""
+    one = Stepper(clock, 0.5)
+    assert one.step is Stepper(clock, 0.5).step
+    others = (Stepper(clock, 0.25), Stepper(clock, 0.5, substeps=3), Stepper(clock, 0.5, accurate=True))
+    assert all(one.step is not other.step for other in others)
+
+    def doubled(m: Scope) -> None:
+        m.derivative("x", 2 * m.parameter("k") * ca.cos(m.time) + m.input("u"))
+        m.output("y", m.state("x") + m.time)
+
+    arguments = np.array([1.0]), 0.0, np.array([0.0]), np.array([2.0])
+    (first, *_), (second, *_) = one.call(*arguments), Stepper(replace(clock, equations=doubled), 0.5).call(*arguments)
+    np.testing.assert_allclose([first[0] - 1, second[0] - 1], [2 * np.sin(0.5), 4 * np.sin(0.5)], rtol=1e-4)
 
 
 # -- misuse ------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,94 @@
+"""A scenario with all that its runs have in common: estimators and batch fit are built once, for every seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from adaptive_flot.batch import BatchEstimator
+from adaptive_flot.errors import ScenarioError, near_match
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.late import taking_late_values
+from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
+from adaptive_flot.protocols import AnyController, AnyEstimator, ControllerSetup, Setup
+from adaptive_flot.runner.scenario import Plugin, Scenario
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scenario and its plug-ins.
+
+    An estimator is a frozen configuration (`Estimator`), so all seeds can share one; a controller is built for the
+    schedule of its run.
+
+    Attributes
+    ----------
+    scenario
+        The scenario.
+    estimators, controllers
+        Plug-ins by the name under which they run.
+    """
+
+    scenario: Scenario
+    estimators: Mapping[str, Plugin]
+    controllers: Mapping[str, Plugin]
+    _built: dict[str, AnyEstimator] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, scenario: Scenario, estimators: Sequence[str] = ()) -> Prepared:
+        """The estimators named (default all of the scenario) and the scenario's controllers.
+
+        Raises
+        ------
+        ScenarioError
+            Unknown estimator.
+        """
+        chosen = {name: estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
+        return cls(scenario, chosen, scenario.file.controllers)
+
+    def estimator(self, name: str) -> AnyEstimator:
+        """The estimator of that name; only the oracle is shown the truth."""
+        if name not in self._built:
+            use, options = self.estimators[name].use, self.estimators[name].options
+            setup = self.scenario.setup
+            if use == "oracle":
+                setup = replace(setup, truth=self.scenario.true_parameters())
+            factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
+            made = construct(factory, use, "estimator", setup, **options)
+            self._built[name] = taking_late_values(made, max(self.scenario.dead_times.values(), default=0.0))
+        return self._built[name]
+
+    def controller(self, name: str, schedule: FloatArray) -> AnyController:
+        """A controller of that name for a run with planned inputs (N, nu)."""
+        use, options = self.controllers[name].use, self.controllers[name].options
+        s = self.scenario
+        setup = ControllerSetup(s.model, s.dt, schedule, s.setup.parameters, s.limits, s.prices)
+        made: AnyController = construct(
+            load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options
+        )
+        return made
+
+    @cached_property
+    def batch(self) -> BatchEstimator:
+        """The batch fit that gives the initial estimate, from the scenario's guess."""
+        part, s = self.scenario.file.initial_estimate, self.scenario
+        guess = Setup(s.model.with_parameters(part.guess), s.dt, s.setup.parameters, s.setup.outputs)
+        factory = load(part.method, BATCH_ESTIMATORS, "batch estimator", s.path.parent)
+        made: BatchEstimator = construct(factory, part.method, "batch estimator", guess, **part.options)
+        return made
+
+
+def estimator_plugin(scenario: Scenario, name: str) -> Plugin:
+    """Plug-in behind a name: of the scenario, a shipped one or `my_file:MyEstimator`.
+
+    Raises
+    ------
+    ScenarioError
+        None of these; the message holds the nearest name.
+    """
+    if name in scenario.file.estimators:
+        return scenario.file.estimators[name]
+    if name in ESTIMATORS or ":" in name:
+        return Plugin(use=name)
+    raise ScenarioError(f"unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}")
