@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from adaptive_flot.errors import ModelError
+from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.quantities import Kind
-from adaptive_flot.greybox.scope import Scope
+from adaptive_flot.greybox.scope import Scope, Site
 
 NEWTON_STEPS = 3
 """Newton iterations that close the algebraic loop inside the explicit right-hand side. Convergence is quadratic from a
@@ -28,7 +29,7 @@ class Built:
     ode: ca.Function
     tangent: ca.Function
     decay: ca.Function
-    sites: tuple[str, ...]
+    sites: tuple[Site, ...]
 
 
 def _collect(what: str, declared: Sequence[str], given: Mapping[str, ca.SX], model: str) -> ca.SX:
@@ -40,7 +41,7 @@ def _collect(what: str, declared: Sequence[str], given: Mapping[str, ca.SX], mod
     return ca.vertcat(*(given[n] for n in declared)) if declared else ca.SX(0, 1)
 
 
-def build(model: str, names: Names, equations: Callable[[Scope], None]) -> Built:
+def build(model: str, names: Names, equations: Callable[[Scope], None], effects: Sequence[Effect] = ()) -> Built:
     """Write the equations of the model named `model` into a scope and make its functions; `names` by kind.
 
     Raises
@@ -51,8 +52,11 @@ def build(model: str, names: Names, equations: Callable[[Scope], None]) -> Built
     kinds: tuple[Kind, ...] = ("states", "inputs", "parameters", "algebraic")
     symbols: dict[Kind, dict[str, ca.SX]] = {k: {n: ca.SX.sym(n) for n in names[k]} for k in kinds}
     t = ca.SX.sym("t")
-    scope = Scope(symbols, t)
+    scope = Scope(symbols, t, effects)
     equations(scope)
+    for effect in effects:
+        if effect.site not in scope.sites:
+            raise ModelError(f"model '{model}' has no site {effect.site!r}; {near_match(effect.site, scope.sites)}")
 
     x, u, p, z = (ca.vertcat(*symbols[k].values()) if symbols[k] else ca.SX(0, 1) for k in kinds)
     rates = _collect("derivatives", names["states"], scope.derivatives, model)
@@ -82,7 +86,7 @@ def build(model: str, names: Names, equations: Callable[[Scope], None]) -> Built
     ode = ca.Function("ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options)
     rates_of_decay = ca.vertcat(*(scope.decays.get(n, ca.SX(0)) for n in names["states"]))
     decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
-    return Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites))
+    return Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites.values()))
 
 
 def _tangent(dae: ca.Function, decay: ca.Function) -> ca.Function:

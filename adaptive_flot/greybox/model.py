@@ -10,7 +10,8 @@ writes the equations into a `Scope`::
         m.output("level", m.site("level_sensor", level))
 
 Every quantity in which physics may be missing passes through a named *site*. A site returns its value unchanged;
-it is the place where an effect can be attached without touching the equations.
+`Model.with_effects` attaches an
+`Effect` there without touching the equations.
 """
 
 from __future__ import annotations
@@ -24,10 +25,11 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError, RangeError, near_match
 from adaptive_flot.greybox.build import Built, build
+from adaptive_flot.greybox.effects import Effect, check_distinct
 from adaptive_flot.greybox.quantities import FloatArray, Kind, Parameter, Quantity
-from adaptive_flot.greybox.scope import Scope
+from adaptive_flot.greybox.scope import Scope, Site
 
-__all__ = ["FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
+__all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,10 @@ class Model:
     """Largest step [s] at which the fast integration of this model is accurate (about 1e-5 of each state)."""
     starts_steady: bool = True
     """A record without further knowledge is taken to start near a steady state; else near `initial_guess`."""
+    drivers: tuple[str, ...] = ()
+    """Quantities that effects may depend on, in the order of a search; default all inputs and states."""
+    effects: tuple[Effect, ...] = ()
+    """Effects attached by `with_effects`; their parameters and states follow those of the model."""
 
     def __post_init__(self) -> None:
         _ = self._built  # equations are checked when the model is made, not when it is first used
@@ -127,6 +133,23 @@ class Model:
             new[i] = replace(p, value=float(value))
         return replace(self, parameters=tuple(new))
 
+    def with_effects(self, effects: Iterable[Effect]) -> Model:
+        """Return this model with further effects; coefficients become parameters, filters become states.
+
+        Raises
+        ------
+        ModelError
+            Unknown site or driver, a driver that is not known where the site is passed, or two effects of one name.
+        """
+        added = tuple(effects)
+        check_distinct((*self.effects, *added))
+        return replace(
+            self,
+            states=self.states + tuple(s for e in added for s in e.states()),
+            parameters=self.parameters + tuple(p for e in added for p in e.parameters()),
+            effects=self.effects + added,
+        )
+
     def check_inputs(self, inputs: FloatArray, time: FloatArray | None = None, where: str = "inputs") -> None:
         """Check an input table (N, nu) against the physical range of each input.
 
@@ -171,9 +194,16 @@ class Model:
         return self._built.decay
 
     @property
-    def sites(self) -> tuple[str, ...]:
-        """Names of the sites that the equations pass through."""
+    def sites(self) -> tuple[Site, ...]:
+        """Sites that the equations pass through, in their order."""
         return self._built.sites
+
+    def fitted_effects(self) -> tuple[Effect, ...]:
+        """Effects with the present parameter values as their coefficients."""
+        values = {p.name: p.value for p in self.parameters}
+        return tuple(
+            replace(e, coefficients={c.name: values[e.parameter(c.name)] for c in e.terms}) for e in self.effects
+        )
 
     @cached_property
     def kept(self) -> dict[Hashable, ca.Function]:
@@ -183,4 +213,4 @@ class Model:
     @cached_property
     def _built(self) -> Built:
         kinds: tuple[Kind, ...] = ("states", "inputs", "parameters", "outputs", "signals", "algebraic")
-        return build(self.name, {kind: self.names(kind) for kind in kinds}, self.equations)
+        return build(self.name, {kind: self.names(kind) for kind in kinds}, self.equations, self.effects)

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 
 from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply
 from adaptive_flot.greybox.quantities import Kind
+
+
+@dataclass(frozen=True)
+class Site:
+    """A quantity that effects may act on: how they act by default, and how often the equations pass it."""
+
+    name: str
+    mode: Mode
+    passed: int
 
 
 class Scope:
     """The symbols of one model while its equations are written. Values are scalar `casadi.SX`."""
 
-    def __init__(self, symbols: Mapping[Kind, Mapping[str, ca.SX]], time: ca.SX) -> None:
+    def __init__(
+        self, symbols: Mapping[Kind, Mapping[str, ca.SX]], time: ca.SX, effects: Sequence[Effect] = ()
+    ) -> None:
         self.time = time
         self._symbols = symbols
+        self._effects = effects
         self.derivatives: dict[str, ca.SX] = {}
         self.decays: dict[str, ca.SX] = {}
         self.outputs: dict[str, ca.SX] = {}
         self.signals: dict[str, ca.SX] = {}
         self.residuals: dict[str, tuple[ca.SX, ca.SX]] = {}
-        self.sites: dict[str, ca.SX] = {}
+        self.sites: dict[str, Site] = {}
 
     def _symbol(self, kind: Kind, name: str) -> ca.SX:
         table = self._symbols[kind]
@@ -49,10 +63,33 @@ class Scope:
         """Symbol of an algebraic variable; give its equation with `residual`."""
         return self._symbol("algebraic", name)
 
-    def site(self, name: str, value: ca.SX) -> ca.SX:
-        """Pass a physical quantity through a named site, once or once per component of the same quantity."""
-        self.sites.setdefault(name, value)
+    def site(self, name: str, value: ca.SX, mode: Mode = "factor") -> ca.SX:
+        """Pass a physical quantity through a named site, once or once per component of the same quantity.
+
+        `mode` says how an effect acts here unless it says so itself: it multiplies the quantity by exp(g), or adds g
+        in the quantity's unit (sensors).
+        """
+        before = self.sites.get(name, Site(name, mode, 0))
+        self.sites[name] = Site(name, mode, before.passed + 1)
+        for effect in self._effects:
+            if effect.site == name:
+                if before.passed and effect.states():
+                    raise ModelError(f"{effect.label}: form {effect.form!r} has states, but the site has components")
+                value = apply(effect, self, value, self._driver(effect), effect.mode or mode)
         return value
+
+    def _driver(self, effect: Effect) -> ca.SX:
+        if effect.driver == "time":
+            return self.time
+        if effect.driver in STATELESS_DRIVERS:
+            return ca.SX(0)
+        known = {**self._symbols["inputs"], **self._symbols["states"], **self.signals}
+        if effect.driver not in known:
+            raise ModelError(
+                f"effect at site {effect.site!r}: driver {effect.driver!r} is not known where the site is passed; "
+                f"{near_match(effect.driver, (*known, *STATELESS_DRIVERS))}"
+            )
+        return known[effect.driver]
 
     def signal(self, name: str, value: ca.SX) -> ca.SX:
         """Name an internal quantity that tables, plots and effects may use."""

@@ -62,7 +62,7 @@ def _equations(m: Scope) -> None:
     away = m.site("lower_outflow", m.parameter("lower_outflow") * ca.sqrt(ca.fmax(lower, _DRY)))
     m.derivative("upper_level", pumped - out)
     m.derivative("lower_level", into - away)
-    m.output("level", m.site("level_sensor", lower))
+    m.output("level", m.site("level_sensor", lower, "offset"))
 
 
 def read_benchmark(path: Path | str) -> tuple[Dataset, Dataset]:

@@ -221,7 +221,7 @@ def test_names_of_the_vectors(cell: Model, model: Model) -> None:
 
 def test_every_site_of_the_specification_is_there(model: Model) -> None:
     """The table of sites in the shared model description; effects attach to these names."""
-    assert set(model.sites) == {
+    assert {s.name for s in model.sites} == {
         "air_flow", "feed_flow", "feed_grade", "bubble_size", "gas_slip", "burst_rate", "coalescence",
         "growth_exponent", "froth_recovery", "entrainment", "settling", "floatability_valuable",
         "floatability_gangue", "concentrate_flow", "tails_valve", "grade_sensor", "level_sensor", "tails_sensor",

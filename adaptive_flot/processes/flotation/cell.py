@@ -70,8 +70,10 @@ def make_model(cell: Cell | None = None) -> Model:
             Quantity("froth_depth", "m", "froth depth", 0.0, height, 0.1),
             Quantity("solids", "kg/m3", "minerals in the pulp", 0.0, scale=100.0),
             Quantity("valuable_solids", "kg/m3", "valuable mineral in the pulp", 0.0, scale=10.0),
+            Quantity("grade", "-", "valuable mineral in the solids of the pulp by mass", 0.0, 1.0, 0.01),
         ),
         algebraic=(Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),),
+        drivers=("air_flow", "feed_flow", "level", "froth_depth", "grade", "solids", "valuable_solids"),
         max_step_s=_max_step(cell),
         equations=lambda m: _equations(m, masses, ratios),
         initial_guess={
@@ -83,6 +85,8 @@ def make_model(cell: Cell | None = None) -> Model:
     )
 
 
+TRACE = 1e-12
+"""Mass [kg] that keeps the grade of an empty pulp finite."""
 FASTEST_DECAY = 2.0
 """Largest decay rate times step at which the fast step keeps its accuracy (see `SERIES_TERMS` there)."""
 
@@ -117,6 +121,7 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     h_f = m.signal("froth_depth", height - h_p)
     m.signal("solids", total_mass / v_pulp)
     m.signal("valuable_solids", mass[0] / v_pulp)
+    m.signal("grade", mass[0] / (total_mass + TRACE))
 
     q_air = m.site("air_flow", m.input("air_flow"))
     q_feed = m.site("feed_flow", m.input("feed_flow"))
@@ -185,13 +190,13 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
         m.derivative(name, (1 + gas) / v_pulp * balance, decay=-vk / h_p)
 
     # Level loop on the measured level (paper, Qtails, with the stable sign)
-    level = m.site("level_sensor", h_p)
+    level = m.site("level_sensor", h_p, "offset")
     gain = m.parameter("proportional_gain")
     error = level - m.input("level_setpoint")
     m.derivative("tails_flow", gain * m.time_derivative(level) + gain / m.parameter("integral_time") * error)
 
     grade = to_concentrate[0] / sum(to_concentrate[1:], to_concentrate[0])  # paper, grade
-    m.output("concentrate_grade", m.site("grade_sensor", grade))
+    m.output("concentrate_grade", m.site("grade_sensor", grade, "offset"))
     m.output("recovery", to_concentrate[0] / (feed[0] * q_feed))
     m.output("tails_flow", m.site("tails_sensor", q_tails))
     m.output("level", level)

@@ -1,0 +1,174 @@
+"""An effect: a physical term attached to a site of a model, driven by one of the model's own quantities.
+
+`Model.with_effects` returns a model whose equations carry the term; its coefficients are parameters, its filters are
+states. Plant, estimators and controllers use the extended model like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.forms import FORMS, Coefficient, Form, Settings
+from adaptive_flot.greybox.quantities import Parameter, Quantity
+
+Mode = Literal["factor", "offset"]
+STATELESS_DRIVERS = ("constant", "time", "lag", "delay", "saturation")
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A term at a site.
+
+    Attributes
+    ----------
+    site
+        Name of the site where it acts.
+    driver
+        What it depends on: an input, a state or a signal of the model that is known where the site is passed;
+        "constant" or "time"; "lag", "delay" or "saturation" for the forms of that kind.
+    form
+        Name of a family in `FORMS`.
+    coefficients
+        Values by name; those left out do nothing.
+    settings
+        Fixed numbers of the form: reference of the driver, knots, number of stages.
+    mode
+        "factor" multiplies the value by exp(g), "offset" adds g in the site's unit; default the site's own way.
+
+    Raises
+    ------
+    ModelError
+        Unknown form, coefficient or setting, a coefficient outside its range, or a setting that is missing.
+    """
+
+    site: str
+    driver: str
+    form: str
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
+    mode: Mode | None = None
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise ModelError(f"effect at {self.site!r}: unknown form {self.form!r}; {near_match(self.form, FORMS)}")
+        shape = self.shape
+        for name in self.settings:
+            if name not in shape.settings:
+                raise ModelError(f"{self.label}: unknown setting {name!r}; {near_match(name, shape.settings)}")
+        missing = [n for n, default in shape.settings.items() if default is None and n not in self.settings]
+        if missing:
+            raise ModelError(f"{self.label}: setting {missing[0]!r} is missing; give it")
+        known = {c.name: c for c in self.terms}
+        for name, value in self.coefficients.items():
+            if name not in known:
+                raise ModelError(f"{self.label}: unknown coefficient {name!r}; {near_match(name, known)}")
+            c = known[name]
+            if not (np.isfinite(value) and c.lower <= value <= c.upper):
+                raise ModelError(f"{self.label}: {name} = {value:g} is outside [{c.lower:g}, {c.upper:g}] {c.unit}")
+
+    @property
+    def shape(self) -> Form:
+        """The family it belongs to."""
+        return FORMS[self.form]
+
+    @property
+    def full_settings(self) -> Settings:
+        """Settings with the defaults of the form filled in."""
+        defaults = {k: v for k, v in self.shape.settings.items() if v is not None}
+        return {**defaults, **self.settings}
+
+    @property
+    def terms(self) -> tuple[Coefficient, ...]:
+        """Coefficients of the form with these settings."""
+        return self.shape.coefficients(self.full_settings)
+
+    @property
+    def label(self) -> str:
+        """Name in messages and of the parameters: `bubble_size_by_air_flow`."""
+        return f"{self.site}_by_{self.driver}"
+
+    def parameter(self, coefficient: str) -> str:
+        """Full parameter name of a coefficient."""
+        return f"{self.label}.{coefficient}"
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients as model parameters."""
+        source = f"effect: {self.shape.description}"
+        return tuple(
+            Parameter(
+                self.parameter(c.name),
+                float(self.coefficients.get(c.name, c.default)),
+                c.unit,
+                source,
+                None,
+                c.lower,
+                c.upper,
+                c.scale,
+            )
+            for c in self.terms
+        )
+
+    def states(self) -> tuple[Quantity, ...]:
+        """Its own states, scaled by the setting `scale`."""
+        return tuple(
+            Quantity(f"{self.label}.{n}", "-", f"{self.shape.description} at {self.site}")
+            for n in self.shape.states(self.full_settings)
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for YAML and JSON."""
+        settings = {k: list(v) if isinstance(v, tuple) else float(v) for k, v in self.settings.items()}
+        found: dict[str, Any] = {"site": self.site, "driver": self.driver, "form": self.form}
+        found["coefficients"] = {k: float(v) for k, v in self.coefficients.items()}
+        if settings:
+            found["settings"] = settings
+        if self.mode:
+            found["mode"] = self.mode
+        return found
+
+
+def check_distinct(effects: Iterable[Effect]) -> None:
+    """Two effects with one name would share their parameters.
+
+    Raises
+    ------
+    ModelError
+        Two effects at one site with one driver.
+    """
+    seen: set[str] = set()
+    for effect in effects:
+        if effect.label in seen:
+            raise ModelError(f"two effects at site {effect.site!r} with driver {effect.driver!r}; give one of them")
+        seen.add(effect.label)
+
+
+def apply(effect: Effect, scope: Any, value: ca.SX, driver: ca.SX, mode: Mode) -> ca.SX:
+    """Value of the site with the effect; `scope` gives parameter symbols and the effect's own states."""
+    coefficients = {c.name: scope.parameter(effect.parameter(c.name)) for c in effect.terms}
+    shape, settings = effect.shape, effect.full_settings
+    if shape.direct is not None:
+        return shape.direct(_Own(scope, effect.label), value, driver, coefficients, settings)
+    assert shape.static is not None  # a form has one law or the other
+    g = shape.static(driver, coefficients, settings)
+    return value + g if mode == "offset" else value * ca.exp(g)
+
+
+@dataclass(frozen=True)
+class _Own:
+    """The states of one effect in the scope of its model."""
+
+    scope: Any
+    label: str
+
+    def own_state(self, name: str) -> ca.SX:
+        symbol: ca.SX = self.scope.state(f"{self.label}.{name}")
+        return symbol
+
+    def own_derivative(self, name: str, value: ca.SX, decay: ca.SX | None = None) -> None:
+        self.scope.derivative(f"{self.label}.{name}", value, decay)
