@@ -38,6 +38,10 @@ class OutputError(AdaptiveFlotError):
     """A result can not be written: folder missing, no permission, a folder where a file should be."""
 
 
+class ResultError(AdaptiveFlotError):
+    """Results can not be compared: none there, not written by this program, or of scenarios that differ."""
+
+
 class PluginError(AdaptiveFlotError):
     """An estimator, controller or model named in a file or on the command line can not be loaded."""
 

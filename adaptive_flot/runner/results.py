@@ -13,6 +13,7 @@ import numpy as np
 
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.tables import write_table
+from adaptive_flot.runner.conditions import conditions
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
 
@@ -42,8 +43,11 @@ def plain(value: Any) -> Any:
 
 
 def run_summary(scenario: Scenario, runs: Sequence[Run]) -> dict[str, Any]:
-    """JSON summary of a scenario."""
-    return {"scenario": scenario.name, "runs": [run.summary() for run in runs]}
+    """JSON summary of a scenario; with economics also what `compare` must know to compare like with like."""
+    head: dict[str, Any] = {"scenario": scenario.name}
+    if scenario.limits is not None and scenario.prices is not None:
+        head |= {"conditions": conditions(scenario), "grade_limit": scenario.limits.grade}
+    return {**head, "runs": [run.summary() for run in runs]}
 
 
 def write_runs(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[Path]:

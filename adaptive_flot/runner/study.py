@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,7 +20,7 @@ from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.late import in_time
 from adaptive_flot.protocols import PlantRecord, Prior, Sample, Setup, Status
-from adaptive_flot.runner.accounts import account
+from adaptive_flot.runner.accounts import account, control_account
 from adaptive_flot.runner.loop import Step, run_loop
 from adaptive_flot.runner.plant import SimulatedPlant
 from adaptive_flot.runner.prepared import Prepared
@@ -48,6 +49,8 @@ class Run:
         Wall-clock time of the run.
     account
         Recovery, grade and economic value over the same times (see `account`); empty without economics.
+    control
+        Solve times, statuses and who decided over the same times (see `control_account`); empty without economics.
     """
 
     estimator: str
@@ -59,10 +62,11 @@ class Run:
     initial: BatchFit
     seconds: float
     account: dict[str, float] = field(default_factory=dict)
+    control: dict[str, Any] = field(default_factory=dict)
 
     def summary(self) -> dict[str, object]:
-        """Entry of the JSON summary; `account` only where the scenario has economics."""
-        extra = {"account": self.account} if self.account else {}
+        """Entry of the JSON summary; `account` and `control` only where the scenario has economics."""
+        extra = {"account": self.account, "control": self.control} if self.account else {}
         return {
             "estimator": self.estimator,
             "controller": self.controller,
@@ -155,15 +159,16 @@ def run_one(
         dict(counts),
         initial["fit"],
         round(seconds, 4),
-        _account(scenario, table),
+        *_accounts(scenario, table),
     )
 
 
-def _account(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
+def _accounts(scenario: Scenario, table: pd.DataFrame) -> tuple[dict[str, float], dict[str, Any]]:
     if scenario.prices is None or scenario.limits is None:
-        return {}
+        return {}, {}
     late = table[table["time_s"] > scenario.fits_after + 1e-9]
-    return account(late, scenario.model, scenario.dt, scenario.prices, scenario.limits.grade)
+    earned = account(late, scenario.model, scenario.dt, scenario.prices, scenario.limits.grade)
+    return earned, control_account(late)
 
 
 def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
@@ -221,7 +226,8 @@ def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
     """Table of a run: `time_s`, inputs, and with suffixes.
 
     For outputs `_true`, `_measured`, `_predicted`, `_innovation`, `_innovation_std`; for adapted parameters `_true`,
-    `_estimate`, `_std`; then `status` and `decided_by`.
+    `_estimate`, `_std`; then `status` of the estimator, `control_status`, `decided_by`, and `solve_seconds` where an
+    optimisation ran.
     """
     model, setup = scenario.model, scenario.setup
     estimates = [s.estimate for s in steps]
@@ -251,10 +257,10 @@ def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
         label = model.parameters[i].label
         columns |= {f"{label}_true": p_true[:, i], f"{label}_estimate": theta[:, j], f"{label}_std": std[:, j]}
     columns["status"] = [(e.status if e else Status.INITIALISING).name.lower() for e in estimates]
+    columns["control_status"] = [s.decision.status.name.lower() for s in steps]
     columns["decided_by"] = [s.decision.decided_by for s in steps]
     solve = np.array([s.decision.solve_seconds for s in steps])
     if np.isfinite(solve).any():
-        columns["control_status"] = [s.decision.status.name.lower() for s in steps]
         columns["solve_seconds"] = solve
     return pd.DataFrame(columns)
 

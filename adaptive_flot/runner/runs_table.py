@@ -1,0 +1,152 @@
+"""The table of runs, one row a run: what `compare` reads, from the summary of `run` or the Parquet parts of a study."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow
+import pyarrow.parquet
+
+from adaptive_flot.errors import ResultError
+
+KEYS = ("scenario", "controller", "estimator", "seed")
+"""Columns that name a run; every table of runs has them."""
+SUMMARY = "summary.json"
+
+
+def run_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the runs in a summary as `run_summary` makes it.
+
+    Parameters
+    ----------
+    summary
+        Summary of one scenario; read back from JSON or not.
+
+    Returns
+    -------
+    list of dict
+        For each run `scenario`, `controller`, `estimator`, `seed`, `seconds`, `fit_<quantity>` [%] and
+        `status_<name>` (samples by status of the estimator); where the scenario has economics also `conditions`,
+        `grade_limit`, the entries of `account`, `solves`, `solve_median_s`, `solve_p99_s`, `control_<status>`
+        (decisions by status) and `decided_<who>` (intervals by who decided).
+
+    Raises
+    ------
+    ResultError
+        The summary lacks a key.
+    """
+    head = {key: summary[key] for key in ("conditions", "grade_limit") if key in summary}
+    rows = []
+    for run in summary["runs"]:
+        row: dict[str, Any] = {"scenario": summary["scenario"], **{key: run[key] for key in KEYS[1:]}, **head}
+        row["seconds"] = run.get("seconds")
+        control = run.get("control", {})
+        row |= {f"fit_{key}": value for key, value in run.get("fit", {}).items()} | run.get("account", {})
+        row |= {key: control[key] for key in ("solves", "solve_median_s", "solve_p99_s") if key in control}
+        for prefix, counts in (
+            ("status", run.get("status_counts", {})),
+            ("control", control.get("status_counts", {})),
+            ("decided", control.get("decided_by", {})),
+        ):
+            row |= {f"{prefix}_{key}": count for key, count in counts.items()}
+        rows.append(row)
+    return rows
+
+
+def read_runs(results: Sequence[Path]) -> pd.DataFrame:
+    """Table of the runs of several results.
+
+    Parameters
+    ----------
+    results
+        Each a folder that `run` wrote, a folder with Parquet parts of a study, a summary (JSON) or a table of runs
+        (Parquet).
+
+    Returns
+    -------
+    DataFrame
+        One row a run; see `run_rows`, and `result`: the path as it was given.
+
+    Raises
+    ------
+    ResultError
+        No such file or folder, no results in it, a result given twice, results of two scenarios of the same name.
+    """
+    seen: dict[Path, Path] = {}
+    tables = []
+    for path in results:
+        found = _file_or_folder(path)
+        if found in seen:
+            raise ResultError(f"{path}: the same result as {seen[found]}; give each once")
+        seen[found] = path
+        tables.append(_read(found, path).assign(result=str(path)))
+    table = pd.concat(tables, ignore_index=True)
+    if table.empty:
+        raise ResultError(f"{', '.join(map(str, results))}: no run has finished; run it first")
+    _check_conditions(table)
+    return table
+
+
+def _file_or_folder(path: Path) -> Path:
+    """Where the runs are: a summary, a Parquet file, or a folder of parts."""
+    if not path.exists():
+        raise ResultError(f"{path}: no such file or folder; give what `adaptive-flot run` wrote, as results/NAME")
+    return (path / SUMMARY if path.is_dir() and (path / SUMMARY).is_file() else path).resolve()
+
+
+def _read(found: Path, path: Path) -> pd.DataFrame:
+    if found.is_dir():
+        return _read_parts(found, path)
+    if found.suffix == ".parquet":
+        if not _is_table_of_runs(found):
+            raise ResultError(f"{path}: not a table of runs (no columns {', '.join(KEYS)}); give the folder it lies in")
+        return pd.read_parquet(found)
+    return _read_summary(found, path)
+
+
+def _read_summary(file: Path, path: Path) -> pd.DataFrame:
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ResultError(f"{path}: not a JSON summary ({error}); give what `adaptive-flot run` wrote") from error
+    summaries = content if isinstance(content, list) else [content]
+    if any(isinstance(s, dict) and "estimators" in s and "fit" in s for s in summaries):
+        raise ResultError(f"{path}: a result of `estimate`; `compare` takes results of `run`")
+    try:
+        return pd.DataFrame([row for summary in summaries for row in run_rows(summary)])
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ResultError(f"{path}: not a summary of runs ({error!r}); give what `adaptive-flot run` wrote") from error
+
+
+def _read_parts(folder: Path, path: Path) -> pd.DataFrame:
+    parts = [f for f in sorted(folder.rglob("*.parquet")) if not f.name.startswith(".") and _is_table_of_runs(f)]
+    if not parts:
+        inside = sorted(f.parent.name for f in folder.glob(f"*/{SUMMARY}"))
+        hint = f"its folders {', '.join(inside)} have: give those" if inside else "give what `adaptive-flot run` wrote"
+        raise ResultError(f"{path}: no results in this folder (no {SUMMARY}, no Parquet table of runs); {hint}")
+    return pd.concat([pd.read_parquet(part) for part in parts], ignore_index=True)
+
+
+def _is_table_of_runs(file: Path) -> bool:
+    try:
+        return set(KEYS) <= set(pyarrow.parquet.read_schema(file).names)
+    except (OSError, pyarrow.ArrowException) as error:
+        raise ResultError(f"{file}: not a Parquet file ({' '.join(str(error).split())}); remove it") from error
+
+
+def _check_conditions(table: pd.DataFrame) -> None:
+    """Runs of one scenario name must have been asked the same."""
+    if "conditions" not in table:
+        return
+    for name, rows in table.groupby("scenario", sort=False):
+        distinct = rows.drop_duplicates("conditions")
+        if len(distinct) > 1:
+            a, b = distinct["result"].iloc[0], distinct["result"].iloc[1]
+            raise ResultError(
+                f"{b}: scenario {name!r} differs from that of {a} (plant, inputs, drift, noise, limits, prices or "
+                "accounted time), so the runs do not compare; run both again with one scenario file"
+            )
