@@ -49,7 +49,7 @@ class LateValue:
 
 @dataclass(frozen=True)
 class Sample:
-    """One sampling instant.
+    """What the instruments show at one sampling instant.
 
     Outputs may be measured at different rates: at any instant some are NaN, and only the others correct the estimate.
 
@@ -58,17 +58,21 @@ class Sample:
     time
         Time [s].
     inputs
-        Inputs held during the interval until then (nu,).
+        Inputs held during the interval until then (nu,), as far as they are known: commands, and disturbances as they
+        are measured or assumed.
     outputs
         Outputs measured at this time (ny,), NaN where there is no measurement.
     late
         Values that arrive with this sample and were taken earlier (a laboratory assay, an analyser with dead time).
+    parameters
+        Parameter vector (np,): the nominal one with what is measured in it (the feed grade); None where nothing is.
     """
 
     time: float
     inputs: FloatArray
     outputs: FloatArray
     late: tuple[LateValue, ...] = ()
+    parameters: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -267,7 +271,8 @@ class ControllerSetup:
     dt
         Sampling interval [s].
     schedule
-        Planned inputs (N, nu): what an open-loop run plays, and where a closed loop starts.
+        Planned inputs (N, nu): what an open-loop run plays, and where a closed loop starts. What a closed loop does not
+        move is a disturbance: the plan holds its first value, and `Sample.inputs` what is known of it later.
     parameters
         Names of the adapted parameters, in the order of `Estimate.parameters`.
     limits, prices
@@ -306,11 +311,14 @@ class PlantRecord:
         True outputs (ny,), NaN in a replayed record.
     parameters
         True parameter vector (np,) during the interval, NaN in a replayed record.
+    inputs
+        Inputs (nu,) that really acted; `sample.inputs` is what is known of them.
     """
 
     sample: Sample
     outputs: FloatArray
     parameters: FloatArray
+    inputs: FloatArray
 
 
 class Plant(Protocol[State]):
@@ -321,7 +329,7 @@ class Plant(Protocol[State]):
         ...
 
     def apply(self, state: State, inputs: FloatArray) -> tuple[State, PlantRecord]:
-        """Hold the inputs (nu,) for one interval."""
+        """Hold the inputs (nu,) for one interval; disturbances among them are the plant's own."""
         ...
 
 
@@ -330,8 +338,10 @@ AnyController = Controller[Any]
 AnyPlant = Plant[Any]
 
 
-def full_parameters(model: Model, names: Sequence[str], values: FloatArray) -> FloatArray:
-    """Parameter vector (np,) of the model with some entries replaced."""
-    p = model.parameter_values
+def full_parameters(
+    model: Model, names: Sequence[str], values: FloatArray, known: FloatArray | None = None
+) -> FloatArray:
+    """Parameter vector (np,) with some entries replaced: of `known` (`Sample.parameters`), else of the model."""
+    p = model.parameter_values if known is None else known.copy()
     p[model.indices("parameters", names)] = values
     return p

@@ -18,7 +18,8 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import Prior, full_parameters
 from adaptive_flot.runner.scenario import Measurement, Plugin, Scenario, load_scenario
-from adaptive_flot.runner.study import run_scenario, simulate_plant
+from adaptive_flot.runner.scenario_plant import simulate_plant
+from adaptive_flot.runner.study import run_scenario
 from estimators.rpem import Rpem
 
 SEEDS = tuple(range(1, 11))

@@ -21,7 +21,7 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import Prior, Sample
 from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import simulate_plant
+from adaptive_flot.runner.scenario_plant import simulate_plant
 from benchmarks import scipy_reference
 from estimators.rpem import Rpem
 

@@ -131,11 +131,13 @@ class EconomicMpc:
             row = min(state.row, len(self.setup.schedule)) - 1
             inputs = self.setup.schedule[row].copy()
             return replace(state, inputs=inputs), Decision(inputs.copy(), Status.OK, "schedule")
-        held = state.inputs if state.inputs is not None else sample.inputs
+        held = sample.inputs.copy()  # the newest of the disturbances
+        if state.inputs is not None:
+            held[self.problem.moved] = state.inputs[self.problem.moved]
         if sample.time < state.due - 1e-9:
             return replace(state, inputs=held.copy()), Decision(held.copy(), Status.OK, "economic_mpc")
         state = replace(state, due=max(state.due, sample.time) + self.problem.move_s)
-        return self._optimise(state, held, estimate)
+        return self._optimise(state, held, sample, estimate)
 
     def _bias(self, state: MpcState, estimate: Estimate | None) -> float:
         innovation = np.nan if estimate is None else float(estimate.innovation[self._grade])
@@ -143,9 +145,11 @@ class EconomicMpc:
             return state.bias
         return self._memory * state.bias + (1 - self._memory) * innovation
 
-    def _optimise(self, state: MpcState, held: FloatArray, estimate: Estimate) -> tuple[MpcState, Decision]:
+    def _optimise(
+        self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
+    ) -> tuple[MpcState, Decision]:
         model, moved = self.setup.model, self.problem.moved
-        theta = full_parameters(model, self.setup.parameters, estimate.parameters)
+        theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
         others = np.delete(held, moved)
         now = Arguments(estimate.state, held[moved], theta, others, self.grade_limit, state.bias, self._prices).vector()
         solution, status = self._solve(state, now, held, estimate, theta)

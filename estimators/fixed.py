@@ -47,7 +47,7 @@ class Fixed:
         model = self.setup.model
         if np.shape(sample.outputs) != (len(model.outputs),):
             raise ModelError(f"a sample has {np.shape(sample.outputs)} outputs, the model ({len(model.outputs)},)")
-        p = full_parameters(model, self.setup.parameters, state.theta)
+        p = full_parameters(model, self.setup.parameters, state.theta, sample.parameters)
         x, y, _ = self._step(state.x, state.time, sample.inputs, p)
         status = Status.OK if np.isfinite(sample.outputs[self._columns]).any() else Status.MISSING
         if not (np.isfinite(x).all() and np.isfinite(y[self._columns]).all()):

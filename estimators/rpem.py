@@ -118,7 +118,7 @@ class Rpem:
             state.x,
             state.time,
             sample.inputs,
-            self._p,
+            self._p if sample.parameters is None else sample.parameters,
             state.theta,
             state.covariance,
             state.noise_std,

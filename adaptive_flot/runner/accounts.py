@@ -22,7 +22,7 @@ def account(table: pd.DataFrame, model: Model, dt: float, prices: Prices, grade_
     table
         Time series of a run (see `time_series`), the rows to account for.
     model
-        The nominal model: feed concentration of the valuable mineral [kg/m3].
+        The nominal model: feed concentration of the valuable mineral [kg/m3], where the table does not hold its own.
     dt
         Sampling interval [s].
     prices
@@ -37,11 +37,13 @@ def account(table: pd.DataFrame, model: Model, dt: float, prices: Prices, grade_
         more than 0.002 below the limit), `mean_depth` (mean depth below the limit in that time), `value_cu_h` (economic
         value an hour) and each of its terms `value_<term>_cu_h`.
     """
-    feed_name = next(p.name for p in model.parameters if p.name.startswith("feed_concentration."))
-    concentration = model.parameters[model.index("parameters", feed_name)].value
-    grade, recovery, air, feed = (
-        table[c].to_numpy(dtype=float)
-        for c in ("concentrate_grade_true", "recovery_true", "air_flow_m3_s", "feed_flow_m3_s")
+    valuable = next(p for p in model.parameters if p.name.startswith("feed_concentration."))
+    moved = f"{valuable.label}_true"
+    concentration = table[moved].to_numpy(dtype=float) if moved in table else np.full(len(table), valuable.value)
+    grade, recovery = (table[c].to_numpy(dtype=float) for c in ("concentrate_grade_true", "recovery_true"))
+    air, feed = (
+        table[f"{c}_true" if f"{c}_true" in table else c].to_numpy(dtype=float)
+        for c in ("air_flow_m3_s", "feed_flow_m3_s")
     )
     fed = float(np.sum(concentration * feed) * dt)
     recovered = float(np.sum(recovery * concentration * feed) * dt)

@@ -14,6 +14,25 @@ from adaptive_flot.protocols import LateValue, PlantRecord, Sample
 
 
 @dataclass(frozen=True)
+class Disturbances:
+    """What acts on a plant beside the controller, and what its instruments show of it, a row an interval.
+
+    Attributes
+    ----------
+    inputs
+        Inputs (N, nu) that are not the controller's to choose, NaN where they are.
+    shown
+        The same as measured or assumed, for `Sample.inputs`.
+    parameters
+        Known parameter vectors (N, np), for `Sample.parameters`; None where no parameter is measured.
+    """
+
+    inputs: FloatArray
+    shown: FloatArray
+    parameters: FloatArray | None = None
+
+
+@dataclass(frozen=True)
 class SimulatedState:
     """Interval to come, the true state (nx,) at its start, and what was measured and is not known yet."""
 
@@ -37,6 +56,8 @@ class SimulatedPlant:
         True parameters in each interval (N, np).
     noise
         Noise added to each output (N, ny); NaN where an output is not measured.
+    disturbances
+        Inputs that the plant imposes whatever is applied, and what is known of them; default none.
     accurate
         Integrate with IDAS.
     dead_time
@@ -51,6 +72,7 @@ class SimulatedPlant:
         parameters: FloatArray,
         noise: FloatArray,
         *,
+        disturbances: Disturbances | None = None,
         accurate: bool = False,
         dead_time: Mapping[str, float] | None = None,
     ) -> None:
@@ -59,6 +81,7 @@ class SimulatedPlant:
         self._x0 = x0
         self._parameters = parameters
         self._noise = noise
+        self._disturbances = disturbances
         self._step = Stepper(model, dt, accurate=accurate).call
 
     def init(self) -> SimulatedState:
@@ -68,13 +91,24 @@ class SimulatedPlant:
     def apply(self, state: SimulatedState, inputs: FloatArray) -> tuple[SimulatedState, PlantRecord]:
         """Hold the inputs for one interval; see `Plant.apply`."""
         k = state.row
+        acting, shown, known_parameters = self._around(k, inputs)
         p = self._parameters[k]
-        x, y, _ = self._step(state.x, k * self._dt, inputs, p)
+        x, y, _ = self._step(state.x, k * self._dt, acting, p)
         now, measured = (k + 1) * self._dt, y + self._noise[k]
         taken = tuple(LateValue(name, now, float(measured[j])) for j, (name, _) in self._late.items())
         measured[list(self._late)] = np.nan
         known, pending = self._arrived((*state.pending, *taken), now)
-        return SimulatedState(k + 1, x, pending), PlantRecord(Sample(now, inputs, measured, known), y, p)
+        sample = Sample(now, shown, measured, known, known_parameters)
+        return SimulatedState(k + 1, x, pending), PlantRecord(sample, y, p, acting)
+
+    def _around(self, row: int, inputs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """Inputs that act, inputs that are known, and known parameters."""
+        if self._disturbances is None:
+            return inputs, inputs, None
+        imposed, shown, known = self._disturbances.inputs[row], self._disturbances.shown[row], None
+        if self._disturbances.parameters is not None:
+            known = self._disturbances.parameters[row]
+        return np.where(np.isnan(imposed), inputs, imposed), np.where(np.isnan(shown), inputs, shown), known
 
     def _arrived(
         self, values: tuple[LateValue, ...], now: float
@@ -109,4 +143,5 @@ class ReplayPlant:
         del inputs
         k = state.row
         sample = Sample(float(self.record.time[k]), self.record.inputs[k], self.record.outputs[k])
-        return ReplayState(k + 1), PlantRecord(sample, np.full(len(sample.outputs), np.nan), self._unknown)
+        unknown = np.full(len(sample.outputs), np.nan)
+        return ReplayState(k + 1), PlantRecord(sample, unknown, self._unknown, sample.inputs)

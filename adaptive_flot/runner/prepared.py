@@ -8,7 +8,6 @@ from functools import cached_property
 
 from adaptive_flot.batch import BatchEstimator
 from adaptive_flot.errors import ScenarioError, near_match
-from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.late import taking_late_values
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.protocols import AnyController, AnyEstimator, ControllerSetup, Setup
@@ -59,11 +58,11 @@ class Prepared:
             self._built[name] = taking_late_values(made, max(self.scenario.dead_times.values(), default=0.0))
         return self._built[name]
 
-    def controller(self, name: str, schedule: FloatArray) -> AnyController:
-        """A controller of that name for a run with planned inputs (N, nu)."""
+    def controller(self, name: str, seed: int) -> AnyController:
+        """A controller of that name for the run of a seed."""
         use, options = self.controllers[name].use, self.controllers[name].options
         s = self.scenario
-        setup = ControllerSetup(s.model, s.dt, schedule, s.setup.parameters, s.limits, s.prices)
+        setup = ControllerSetup(s.model, s.dt, s.plan(seed), s.setup.parameters, s.limits, s.prices)
         made: AnyController = construct(
             load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options
         )

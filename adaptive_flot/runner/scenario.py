@@ -39,6 +39,20 @@ class Measurement(_Part):
     """Time from taking a measurement to knowing it."""
 
 
+class DisturbancePart(_Part):
+    """What is known of an input or plant parameter that the controller does not choose.
+
+    A measurement is averaged over the interval that ends at its sample, repeated every `every_s` (default every sample)
+    and known `dead_time_s` later; `noise_std` is in the column's unit. Not measured, an input is taken for its first
+    planned value and a parameter for its nominal one.
+    """
+
+    measured: bool = True
+    noise_std: float = Field(default=0.0, ge=0)
+    every_s: float | None = Field(default=None, gt=0)
+    dead_time_s: float = Field(default=0.0, ge=0)
+
+
 class PlantPart(_Part):
     """How the plant is simulated: `fast` is the Runge-Kutta step, `accurate` IDAS on the DAE."""
 
@@ -112,6 +126,8 @@ class ScenarioFile(_Part):
     seeds: list[Annotated[int, Field(ge=0)]] = Field(default=[1], min_length=1)
     inputs: dict[str, InputProfile]
     parameters: dict[str, ParameterProfile] = Field(default_factory=dict)
+    disturbances: dict[str, DisturbancePart] = Field(default_factory=dict)
+    """What is known of inputs that are not moved (default: everything) and of parameters (default: nothing)."""
     measurements: dict[str, Measurement]
     plant: PlantPart = PlantPart()
     adapt: Adapt
@@ -204,6 +220,26 @@ class Scenario:
         """Planned inputs (N, nu) of a run."""
         columns = [self.file.inputs[q.column].values(self.starts, seed) for q in self.model.inputs]
         return np.column_stack(columns)
+
+    def plan(self, seed: int) -> FloatArray:
+        """Planned inputs (N, nu) as a controller may know them: disturbances keep their first value."""
+        plan = self.schedule(seed)
+        plan[:, self.imposed] = plan[0, self.imposed]
+        return plan
+
+    @property
+    def imposed(self) -> list[int]:
+        """Indices of the inputs that no controller moves: all but those with a range in `limits`; none in open loop."""
+        if self.limits is None:
+            return []
+        return [j for j, q in enumerate(self.model.inputs) if q.name not in self.limits.inputs]
+
+    @property
+    def measured_parameters(self) -> list[int]:
+        """Indices of the parameters that are measured."""
+        inputs = [q.column for q in self.model.inputs]
+        parts = self.file.disturbances.items()
+        return [self.model.index("parameters", key) for key, part in parts if key not in inputs and part.measured]
 
     def true_parameters(self) -> FloatArray:
         """Plant parameters (N, np) in each interval."""
@@ -315,6 +351,7 @@ def _check(scenario: Scenario) -> None:
             for extreme in (values.min(), values.max()):
                 model.with_parameters({name: float(extreme)})
     _check_closed_loop(scenario)
+    _check_disturbances(scenario)
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
 
@@ -333,6 +370,20 @@ def _check_closed_loop(scenario: Scenario) -> None:
         for name, known in ((case.estimator, file.estimators), (case.controller, file.controllers)):
             if name not in known:
                 raise ScenarioError(f"cases: {name!r} is not defined; {near_match(name, known)}")
+
+
+def _check_disturbances(scenario: Scenario) -> None:
+    model = scenario.model
+    imposed = [model.inputs[j].column for j in scenario.imposed]
+    for key in scenario.file.disturbances:
+        if key in (q.column for q in model.inputs):
+            if key not in imposed:
+                raise ScenarioError(f"disturbances: {key!r} is not one; name an input without a range in 'limits'")
+        elif key not in (name for p in model.parameters for name in (p.name, p.symbol)):
+            known = (*imposed, *model.names("parameters"))
+            raise ScenarioError(f"disturbances: unknown input or parameter {key!r}; {near_match(key, known)}")
+        elif model.parameters[model.index("parameters", key)].name in scenario.setup.parameters:
+            raise ScenarioError(f"disturbances: {key!r} is adapted, so it can not be measured too; leave one out")
 
 
 def _check_times(scenario: Scenario) -> None:

@@ -5,26 +5,21 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from adaptive_flot import metrics
 from adaptive_flot.batch import BatchFit
 from adaptive_flot.errors import located
-from adaptive_flot.greybox.dataset import Dataset
-from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.record import RecordSimulator
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.late import in_time
-from adaptive_flot.protocols import PlantRecord, Prior, Sample, Setup, Status
+from adaptive_flot.protocols import Prior, Status
 from adaptive_flot.runner.accounts import account, control_account
 from adaptive_flot.runner.loop import Step, run_loop
-from adaptive_flot.runner.plant import SimulatedPlant
 from adaptive_flot.runner.prepared import Prepared
 from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.scenario_plant import make_plant
+from adaptive_flot.runner.starts import nominal_start, record_of
+from adaptive_flot.runner.timeseries import fits, time_series
 
 Progress = Callable[[], None]
 
@@ -131,13 +126,13 @@ def run_one(
     schedule = scenario.schedule(seed)
     scenario.model.check_inputs(schedule, scenario.starts, where=f"inputs of seed {seed}")
     estimator = prepared.estimator(estimator_name)
-    controller = prepared.controller(controller_name, schedule)
+    controller = prepared.controller(controller_name, seed)
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
             initial["fit"] = prepared.batch.fit(record_of(steps, scenario.setup))
         prior = initial["fit"].prior(steps[-1].plant.sample.time)
-        return prior if plugin.start == "initial_estimate" else _nominal(scenario, steps, prior)
+        return prior if plugin.start == "initial_estimate" else nominal_start(scenario, steps, prior)
 
     steps = run_loop(
         make_plant(scenario, seed),
@@ -169,119 +164,3 @@ def _accounts(scenario: Scenario, table: pd.DataFrame) -> tuple[dict[str, float]
     late = table[table["time_s"] > scenario.fits_after + 1e-9]
     earned = account(late, scenario.model, scenario.dt, scenario.prices, scenario.limits.grade)
     return earned, control_account(late)
-
-
-def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
-    """Plant of a run: at the steady state of its first planned inputs, with its own drift and noise."""
-    parameters = scenario.true_parameters()
-    x0 = steady_state(scenario.model, scenario.schedule(seed)[0], parameters[0]).state
-    noise = measurement_noise(scenario, seed)
-    accurate = scenario.file.plant.integrator == "accurate"
-    return SimulatedPlant(
-        scenario.model, scenario.dt, x0, parameters, noise, accurate=accurate, dead_time=scenario.dead_times
-    )
-
-
-def simulate_plant(scenario: Scenario, seed: int) -> list[PlantRecord]:
-    """What the plant of a run shows under the planned inputs, one record an interval, without any estimator."""
-    plant = make_plant(scenario, seed)
-    state, records = plant.init(), []
-    for inputs in scenario.schedule(seed):
-        state, record = plant.apply(state, inputs)
-        records.append(record)
-    return records
-
-
-def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
-    """White Gaussian noise of a run (N, ny), the same for every estimator; NaN where nothing is measured."""
-    generator = np.random.default_rng([seed, 0])
-    std = scenario.noise_std()
-    noise = std * generator.standard_normal((len(scenario.starts), std.size))
-    return np.where(scenario.measured_at(), noise, np.nan)
-
-
-def record_of(steps: list[Step], setup: Setup) -> Dataset:
-    """What is known by the last step, as a record that starts one interval before the first, at the initial instant."""
-    samples = in_time([s.plant.sample for s in steps], setup)
-    dt = samples[1].time - samples[0].time
-    return Dataset(
-        name="initial record",
-        time=np.array([samples[0].time - dt, *(s.time for s in samples)]),
-        dt=dt,
-        inputs=np.vstack([samples[0].inputs, *(s.inputs for s in samples)]),
-        outputs=np.vstack([np.full(samples[0].outputs.size, np.nan), *(s.outputs for s in samples)]),
-    )
-
-
-def _nominal(scenario: Scenario, steps: list[Step], prior: Prior) -> Prior:
-    """Nominal parameters and their own free run from the steady state of the first inputs."""
-    model, record = scenario.model, record_of(steps, scenario.setup)
-    x0 = steady_state(model, record.inputs[0]).state
-    state = RecordSimulator(model, scenario.dt).last_state(record, x0, model.parameter_values)
-    values = model.parameter_values[model.indices("parameters", scenario.setup.parameters)]
-    return Prior(prior.time, state, values, prior.covariance, prior.noise_std)
-
-
-def time_series(scenario: Scenario, steps: list[Step]) -> pd.DataFrame:
-    """Table of a run: `time_s`, inputs, and with suffixes.
-
-    For outputs `_true`, `_measured`, `_predicted`, `_innovation`, `_innovation_std`; for adapted parameters `_true`,
-    `_estimate`, `_std`; then `status` of the estimator, `control_status`, `decided_by`, and `solve_seconds` where an
-    optimisation ran.
-    """
-    model, setup = scenario.model, scenario.setup
-    estimates = [s.estimate for s in steps]
-    columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
-    inputs = np.vstack([s.plant.sample.inputs for s in steps])
-    columns |= {q.column: inputs[:, j] for j, q in enumerate(model.inputs)}
-    true = np.vstack([s.plant.outputs for s in steps])
-    samples = in_time([s.plant.sample for s in steps], setup)
-    measured = np.vstack([s.outputs for s in samples])
-    unknown = np.full(len(model.outputs), np.nan)
-    predicted = np.vstack([e.prediction if e else unknown for e in estimates])
-    innovation = np.vstack([s.outputs for s in in_time(_innovations(steps, unknown), setup)])
-    expected = np.vstack([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
-    for j, q in enumerate(model.outputs):
-        columns[f"{q.column}_true"] = true[:, j]
-        columns[f"{q.column}_predicted"] = predicted[:, j]
-        if np.isfinite(measured[:, j]).any():
-            columns[f"{q.column}_measured"] = measured[:, j]
-            columns[f"{q.column}_innovation"] = innovation[:, j]
-        if q.name in setup.outputs:
-            columns[f"{q.column}_innovation_std"] = expected[:, setup.outputs.index(q.name)]
-    p_true = np.vstack([s.plant.parameters for s in steps])
-    blank = np.full(len(setup.parameters), np.nan)
-    theta = np.vstack([e.parameters if e else blank for e in estimates])
-    std = np.vstack([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
-    for j, i in enumerate(model.indices("parameters", setup.parameters)):
-        label = model.parameters[i].label
-        columns |= {f"{label}_true": p_true[:, i], f"{label}_estimate": theta[:, j], f"{label}_std": std[:, j]}
-    columns["status"] = [(e.status if e else Status.INITIALISING).name.lower() for e in estimates]
-    columns["control_status"] = [s.decision.status.name.lower() for s in steps]
-    columns["decided_by"] = [s.decision.decided_by for s in steps]
-    solve = np.array([s.decision.solve_seconds for s in steps])
-    if np.isfinite(solve).any():
-        columns["solve_seconds"] = solve
-    return pd.DataFrame(columns)
-
-
-def _innovations(steps: list[Step], unknown: FloatArray) -> list[Sample]:
-    """Innovations in place of the measurements, those of late values with the sample that they arrived with."""
-    return [
-        replace(s.plant.sample, outputs=s.estimate.innovation, late=s.estimate.late)
-        if s.estimate
-        else replace(s.plant.sample, outputs=unknown, late=())
-        for s in steps
-    ]
-
-
-def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
-    """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
-    late = table[table["time_s"] > scenario.fits_after + 1e-9]
-    model, setup = scenario.model, scenario.setup
-    labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
-    found = {x: metrics.fit(late[f"{x}_true"].to_numpy(), late[f"{x}_estimate"].to_numpy()) for x in labels}
-    for i in model.indices("outputs", setup.outputs):
-        q = model.outputs[i]
-        found[q.name] = metrics.fit(late[f"{q.column}_true"].to_numpy(), late[f"{q.column}_predicted"].to_numpy())
-    return found

@@ -7,7 +7,8 @@ import pytest
 
 from adaptive_flot.protocols import Status
 from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import run_scenario, simulate_plant
+from adaptive_flot.runner.scenario_plant import simulate_plant
+from adaptive_flot.runner.study import run_scenario
 from tests.runner.conftest import DURATION, INITIAL, WriteScenario
 
 GRADE = "concentrate_grade"

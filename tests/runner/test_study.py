@@ -17,7 +17,8 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import ControllerSetup, Prior, Setup
 from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import Run, measurement_noise, run_scenario
+from adaptive_flot.runner.scenario_plant import measurement_noise
+from adaptive_flot.runner.study import Run, run_scenario
 from controllers.schedule import Schedule
 from estimators.fixed import Fixed, FixedState
 from tests.runner.conftest import DURATION, INITIAL, WriteScenario

@@ -1,0 +1,120 @@
+"""The table of a run: one row an interval, and the fits that are taken from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from adaptive_flot import metrics
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.late import in_time
+from adaptive_flot.protocols import Sample, Status
+from adaptive_flot.runner.loop import Step
+from adaptive_flot.runner.scenario import Scenario
+
+
+def time_series(scenario: Scenario, steps: Sequence[Step]) -> pd.DataFrame:
+    """Table of a run: `time_s`, inputs, and with suffixes.
+
+    For inputs `_true` where what acted is not what was known; for outputs `_true`, `_measured`, `_predicted`,
+    `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std`, for others that move or are
+    measured `_true`, `_known`; then `status` of the estimator, `control_status`, `decided_by`, and, where a controller
+    optimised, `solve_seconds`.
+    """
+    columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
+    columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps)
+    columns |= _others(scenario, steps)
+    columns["status"] = [(s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps]
+    columns["control_status"] = [s.decision.status.name.lower() for s in steps]
+    columns["decided_by"] = [s.decision.decided_by for s in steps]
+    solve = np.array([s.decision.solve_seconds for s in steps])
+    if np.isfinite(solve).any():
+        columns["solve_seconds"] = solve
+    return pd.DataFrame(columns)
+
+
+def _inputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
+    known = np.vstack([s.plant.sample.inputs for s in steps])
+    acted = np.vstack([s.plant.inputs for s in steps])
+    columns: dict[str, object] = {}
+    for j, q in enumerate(scenario.model.inputs):
+        columns[q.column] = known[:, j]
+        if not np.array_equal(known[:, j], acted[:, j]):
+            columns[f"{q.column}_true"] = acted[:, j]
+    return columns
+
+
+def _outputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
+    model, setup = scenario.model, scenario.setup
+    estimates = [s.estimate for s in steps]
+    columns: dict[str, object] = {}
+    true = np.vstack([s.plant.outputs for s in steps])
+    measured = np.vstack([s.outputs for s in in_time([s.plant.sample for s in steps], setup)])
+    unknown = np.full(len(model.outputs), np.nan)
+    predicted = np.vstack([e.prediction if e else unknown for e in estimates])
+    innovation = np.vstack([s.outputs for s in in_time(_innovations(steps, unknown), setup)])
+    expected = np.vstack([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
+    for j, q in enumerate(model.outputs):
+        columns[f"{q.column}_true"] = true[:, j]
+        columns[f"{q.column}_predicted"] = predicted[:, j]
+        if np.isfinite(measured[:, j]).any():
+            columns[f"{q.column}_measured"] = measured[:, j]
+            columns[f"{q.column}_innovation"] = innovation[:, j]
+        if q.name in setup.outputs:
+            columns[f"{q.column}_innovation_std"] = expected[:, setup.outputs.index(q.name)]
+    return columns
+
+
+def _innovations(steps: Sequence[Step], unknown: FloatArray) -> list[Sample]:
+    """Innovations in place of the measurements, those of late values with the sample that they arrived with."""
+    return [
+        replace(s.plant.sample, outputs=s.estimate.innovation, late=s.estimate.late)
+        if s.estimate
+        else replace(s.plant.sample, outputs=unknown, late=())
+        for s in steps
+    ]
+
+
+def _adapted(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
+    model, setup = scenario.model, scenario.setup
+    estimates = [s.estimate for s in steps]
+    columns: dict[str, object] = {}
+    p_true = np.vstack([s.plant.parameters for s in steps])
+    blank = np.full(len(setup.parameters), np.nan)
+    theta = np.vstack([e.parameters if e else blank for e in estimates])
+    std = np.vstack([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
+    for j, i in enumerate(model.indices("parameters", setup.parameters)):
+        label = model.parameters[i].label
+        columns |= {f"{label}_true": p_true[:, i], f"{label}_estimate": theta[:, j], f"{label}_std": std[:, j]}
+    return columns
+
+
+def _others(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
+    """Parameters that are not adapted but move in the plant, or are measured."""
+    model = scenario.model
+    adapted = model.indices("parameters", scenario.setup.parameters)
+    moved = set(model.indices("parameters", scenario.file.parameters))
+    known = [s.plant.sample.parameters for s in steps]
+    measured = set(scenario.measured_parameters)
+    columns: dict[str, object] = {}
+    for i in sorted((moved | measured) - set(adapted)):
+        label = model.parameters[i].label
+        columns[f"{label}_true"] = [s.plant.parameters[i] for s in steps]
+        if i in measured:
+            columns[f"{label}_known"] = [np.nan if p is None else p[i] for p in known]
+    return columns
+
+
+def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
+    """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
+    late = table[table["time_s"] > scenario.fits_after + 1e-9]
+    model, setup = scenario.model, scenario.setup
+    labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
+    found = {x: metrics.fit(late[f"{x}_true"].to_numpy(), late[f"{x}_estimate"].to_numpy()) for x in labels}
+    for i in model.indices("outputs", setup.outputs):
+        q = model.outputs[i]
+        found[q.name] = metrics.fit(late[f"{q.column}_true"].to_numpy(), late[f"{q.column}_predicted"].to_numpy())
+    return found
