@@ -129,6 +129,39 @@ def estimate(
     typer.echo(f"Report: {folder / 'report.html'}")
 
 
+@app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift --out results/comparison")
+def compare(
+    results: Annotated[
+        list[Path], typer.Argument(help="Folder (or its summary.json) of `run` or of a study; several may be given.")
+    ],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the report; default none is written.")] = None,
+    json: Annotated[Path | None, typer.Option("--json", help="Write the comparison as JSON here.")] = None,
+    markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables as Markdown here.")] = None,
+) -> None:
+    """Put controllers and estimators of one or several results side by side, scenario by scenario."""
+    from adaptive_flot.console import print_comparison
+    from adaptive_flot.files import write_text
+    from adaptive_flot.report import compare_tables
+    from adaptive_flot.report.compare import write_compare_report
+    from adaptive_flot.report.compare_findings import findings
+    from adaptive_flot.runner import comparison
+    from adaptive_flot.runner.results import write_json
+    from adaptive_flot.runner.runs_table import read_runs
+
+    found = comparison.compare(read_runs(results))
+    tables = [compare_tables.compare_tables(c) for c in found]
+    if json is not None:
+        write_json(json, {"comparisons": [c.summary() for c in found]})
+    if markdown is not None:
+        write_text(markdown, "\n".join(compare_tables.markdown(t) for ts in tables for t in ts))
+    if out is not None:
+        write_compare_report(found, out / "comparison.html", command=_command())
+    for one, shown in zip(found, tables, strict=True):
+        print_comparison(shown, findings(one))
+    if out is not None:
+        typer.echo(f"Report: {out / 'comparison.html'}")
+
+
 @app.command(epilog="Example: adaptive-flot scenarios")
 def scenarios() -> None:
     """List the shipped scenarios with a line each."""

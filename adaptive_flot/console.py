@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from adaptive_flot.report import page as report
 from adaptive_flot.runner.estimate import RecordEstimate
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
@@ -99,3 +101,18 @@ def print_estimate(result: RecordEstimate) -> None:
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
     console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
+
+
+def print_comparison(tables: Sequence[report.Table], findings: Sequence[str]) -> None:
+    """Print the tables of a comparison and what follows from them."""
+    console = Console(width=None if Console().is_terminal else 140)
+    for content in tables:
+        table = Table(caption=escape(content.caption), caption_justify="left", show_lines=True)
+        for j, heading in enumerate(content.header):
+            table.add_column(escape(heading), justify="left" if j < content.words else "right")
+        for row in content.rows:
+            table.add_row(*(escape(cell) for cell in row))
+        console.print(table)
+    for sentence in findings:
+        console.print(f"- {sentence}", highlight=False, markup=False)
+    console.file.flush()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report import style
-from adaptive_flot.report.plotdata import Panel, Residuals, Role, Spread, Trace
+from adaptive_flot.report.plotdata import Panel, Residuals, Role, Trace
 
 ACF_LAGS = 40
 """Lags of the autocorrelation shown."""
@@ -48,7 +47,7 @@ def time_figure(panels: Sequence[Panel]) -> Figure:
     axes[-1].xaxis.set_major_locator(MaxNLocator(7, steps=_TIME_STEPS))
     figure.align_ylabels(axes)
     if any(len(p.traces) > 1 for p in panels):
-        _legend_above(figure, axes)
+        legend_above(figure, axes)
     return figure
 
 
@@ -79,42 +78,7 @@ def residual_figure(rows: Sequence[Residuals]) -> Figure:
     return figure
 
 
-@style.styled
-def spread_figure(spreads: Sequence[Spread], roles: Mapping[str, tuple[Role, int]]) -> Figure:
-    """Fits over the seeds, a panel a quantity and a row an estimator.
-
-    Parameters
-    ----------
-    spreads
-        Fits [%] of each quantity.
-    roles
-        Role and colour index of each estimator, in the order of the rows.
-
-    Returns
-    -------
-    Figure
-        Points (one a seed), box from quartile to quartile with the median, diamond at the published value.
-    """
-    names = list(roles)
-    figure = Figure(figsize=(style.WIDTH, 1.05 + 0.5 * len(names)))
-    grid = figure.subplots(1, len(spreads), sharey=True, squeeze=False)
-    axes: list[Axes] = list(grid[0])
-    for ax, spread in zip(axes, spreads, strict=True):
-        for y, name in enumerate(names):
-            _draw_spread(ax, y, spread.fits.get(name, np.empty(0)), _look(*roles[name])["color"])
-            if name in spread.published:
-                ax.plot(spread.published[name], y, "D", ms=7, mfc="white", mec="black", mew=1.3, label="published")
-        ax.set_xlabel(f"fit of {spread.quantity.replace('_', ' ')} [%]")
-        ax.xaxis.set_major_locator(MaxNLocator(4))
-        ax.margins(x=0.08)
-    axes[0].set_yticks(range(len(names)), names)
-    axes[0].set_ylim(len(names) - 0.5, -0.5)
-    if any(s.published for s in spreads):
-        _legend_above(figure, axes)
-    return figure
-
-
-def _look(role: Role, index: int) -> dict[str, Any]:
+def look(role: Role, index: int) -> dict[str, Any]:
     """How a line of a role is drawn. The dashes tell constant from estimate where colours can not."""
     if role is Role.TRUTH:
         return {"color": style.TRUTH, "lw": 1.1, "zorder": 3, "ls": ("-", "--", ":", "-.")[index % 4]}
@@ -152,17 +116,17 @@ def _zoom_limits(panel: Panel, followed: Sequence[Trace], factor: float) -> tupl
 
 
 def _draw_trace(ax: Axes, trace: Trace, factor: float) -> None:
-    look = _look(trace.role, trace.index)
+    line = look(trace.role, trace.index)
     values = trace.values * factor
-    ax.plot(trace.time, values, drawstyle="steps-pre" if trace.held else "default", label=trace.label, **look)
+    ax.plot(trace.time, values, drawstyle="steps-pre" if trace.held else "default", label=trace.label, **line)
     if trace.std is not None and np.any(np.nan_to_num(trace.std) > 0):
         half = 2.0 * trace.std * factor
-        band = {"color": look["color"], "alpha": 0.22, "lw": 0, "zorder": 1}
+        band = {"color": line["color"], "alpha": 0.22, "lw": 0, "zorder": 1}
         ax.fill_between(trace.time, values - half, values + half, label=f"{trace.label}, ±2σ", **band)
 
 
-def _legend_above(figure: Figure, axes: Sequence[Axes]) -> None:
-    """Put one legend over all panels, each entry once."""
+def legend_above(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Put one legend over all panels of a figure, each entry once."""
     entries: dict[str, Any] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -173,7 +137,7 @@ def _legend_above(figure: Figure, axes: Sequence[Axes]) -> None:
 
 
 def _draw_residuals(ax: Axes, row: Residuals) -> None:
-    color = _look(row.role, row.index)["color"]
+    color = look(row.role, row.index)["color"]
     ax.plot(row.time, row.values, color=color, lw=0.5)
     for level in (-2.0, 2.0):
         ax.axhline(level, color="black", lw=0.8, ls=(0, (4, 2)))
@@ -195,7 +159,7 @@ def _draw_autocorrelation(ax: Axes, row: Residuals) -> None:
     r = acf(row.values, nlags=min(ACF_LAGS, len(finite) - 1), fft=False, missing="conservative")[1:]
     half = WHITE_BAND / np.sqrt(len(finite))
     ax.axhspan(-half, half, color="#dddddd", lw=0)
-    ax.vlines(np.arange(1, len(r) + 1), 0.0, r, color=_look(row.role, row.index)["color"], lw=1.6)
+    ax.vlines(np.arange(1, len(r) + 1), 0.0, r, color=look(row.role, row.index)["color"], lw=1.6)
     ax.axhline(0.0, color="black", lw=0.8)
     low, high = min(0.0, float(np.min(r)), -half), max(float(np.max(r)), half)
     ax.set_ylim(low - 0.12 * (high - low), high + 0.12 * (high - low))
@@ -214,31 +178,10 @@ def p_text(p: float) -> str:
 
 def _draw_histogram(ax: Axes, row: Residuals) -> None:
     finite = row.values[np.isfinite(row.values)]
-    look = {"color": _look(row.role, row.index)["color"], "alpha": 0.55}
+    bars = {"color": look(row.role, row.index)["color"], "alpha": 0.55}
     if len(finite):
-        ax.hist(finite, bins=30, density=True, **look)
+        ax.hist(finite, bins=30, density=True, **bars)
     x = np.linspace(-4.0, 4.0, 161)
     ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="black", lw=1.1)
     ax.set_title("histogram, N(0, 1)")
     ax.set_ylabel("density [–]")
-
-
-def _draw_spread(ax: Axes, y: float, values: FloatArray, color: str) -> None:
-    values = values[np.isfinite(values)]
-    if not len(values):
-        return
-    box = {"color": color, "lw": 1.2}
-    ax.boxplot(
-        values,
-        positions=[y],
-        orientation="horizontal",
-        widths=0.5,
-        whis=(0, 100),
-        showcaps=False,
-        boxprops=box,
-        whiskerprops=box,
-        medianprops={"color": color, "lw": 2.4},
-        manage_ticks=False,
-    )
-    jitter = 0.16 * np.resize([-1.0, 0.4, 1.0, -0.4, 0.0], len(values))  # not random: the same data, the same picture
-    ax.plot(values, y + jitter, "o", ms=3.2, color=color, alpha=0.55, mew=0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adaptive_flot.files import write_text
-from adaptive_flot.report import figures, series, tables
+from adaptive_flot.report import distributions, figures, series, tables
 from adaptive_flot.report.findings import below_published, candidates, findings
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Panel
@@ -169,4 +169,6 @@ def _spread(case: Case, album: Album) -> Picture | None:
         f"{case.scenario.name}: fits over {tables.seeds_text(case)}, one point a seed; box from quartile to quartile "
         "with the median, whiskers to the extremes, diamond at the published value."
     )
-    return album.add(figures.spread_figure(spreads, case.roles), caption, "Distribution of the fits over the seeds")
+    return album.add(
+        distributions.spread_figure(spreads, case.roles), caption, "Distribution of the fits over the seeds"
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from adaptive_flot.greybox.model import FloatArray
@@ -92,8 +92,8 @@ class Residuals:
 
 @dataclass(frozen=True)
 class Spread:
-    """Fits [%] of one quantity over the seeds, by estimator, and the published ones."""
+    """Values of one quantity over the seeds, by who has them, and published ones; `label` is that of the axis."""
 
-    quantity: str
-    fits: Mapping[str, FloatArray]
-    published: Mapping[str, float]
+    label: str
+    values: Mapping[str, FloatArray]
+    published: Mapping[str, float] = field(default_factory=dict)

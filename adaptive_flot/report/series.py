@@ -175,7 +175,8 @@ def spreads(case: Case) -> list[Spread]:
     for quantity in (*case.labels, *(q.name for q in case.outputs)):
         published = {who: case.published(who, quantity) for who in case.roles}
         known = {who: value for who, value in published.items() if value is not None}
-        found.append(Spread(quantity, {who: case.fits(who, quantity) for who in case.roles}, known))
+        label = f"fit of {quantity.replace('_', ' ')} [%]"
+        found.append(Spread(label, {who: case.fits(who, quantity) for who in case.roles}, known))
     return found
 
 

@@ -17,7 +17,7 @@ PROGRAM = Path(sys.executable).with_name("adaptive-flot")
 
 
 def test_the_agreed_commands_are_there() -> None:
-    assert {"run", "simulate", "estimate", "scenarios"} <= set(COMMANDS)
+    assert {"run", "simulate", "estimate", "compare", "scenarios"} <= set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from adaptive_flot.report import figures, style
+from adaptive_flot.report import distributions, figures, style
 from adaptive_flot.report.plotdata import Panel, Residuals, Role, Spread, Trace
 from adaptive_flot.runner.estimate import ljung_box_p
 
@@ -53,7 +53,7 @@ def test_residual_figure_leaves_missing_samples_out() -> None:
 
 def test_spread_figure_marks_the_published_value() -> None:
     spread = Spread("n", {"rpem": np.array([97.0, np.nan, 98.0])}, {"rpem": 97.99})
-    figure = figures.spread_figure([spread], {"rpem": (Role.ESTIMATE, 0), "none": (Role.CONSTANT, 0)})
+    figure = distributions.spread_figure([spread], {"rpem": (Role.ESTIMATE, 0), "none": (Role.CONSTANT, 0)})
     assert any(97.99 in np.asarray(line.get_xdata()) for line in figure.axes[0].lines)
 
 

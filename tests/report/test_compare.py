@@ -1,0 +1,114 @@
+"""The page, tables and sentences of a comparison: right about the numbers they are made from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adaptive_flot.report.compare import compare_report
+from adaptive_flot.report.compare_findings import findings
+from adaptive_flot.report.compare_tables import compare_tables, markdown
+from adaptive_flot.report.page import Table
+from adaptive_flot.runner.comparison import Comparison, compare
+from tests.report.test_run_report import Links
+
+VALUES = {("mpc", "rpem"): 11.5, ("mpc", "fixed"): 10.0, ("mpc", "oracle"): 12.0, ("pi", "fixed"): 9.0}
+
+
+def comparison(seeds: int = 3, below: float = 0.0, gain: float = 1.0) -> Comparison:
+    """Contenders whose value differs from seed to seed by 0.01; all but the PI keep the limit for below = 0."""
+    rows = []
+    for (controller, estimator), value in VALUES.items():
+        for seed in range(1, seeds + 1):
+            rows.append(
+                {
+                    "scenario": "drift",
+                    "conditions": "abc",
+                    "result": "r",
+                    "controller": controller,
+                    "estimator": estimator,
+                    "seed": seed,
+                    "grade_limit": 0.2,
+                    "seconds": 1.0,
+                    "recovery": 0.8 + 0.001 * seed,
+                    "mean_grade": 0.21,
+                    "below_limit": 0.3 if controller == "pi" else below,
+                    "mean_depth": 0.004,
+                    "value_cu_h": 10.0 + gain * (value - 10.0) + 0.01 * seed,
+                    "value_metal_cu_h": 12.0,
+                    "value_air_cu_h": -1.0,
+                    "fit_n": 97.0,
+                    "solves": 0 if controller == "pi" else 110,
+                    "solve_median_s": np.nan if controller == "pi" else 0.0351,
+                    "solve_p99_s": np.nan if controller == "pi" else 0.0702,
+                    "control_ok": 110,
+                    "control_retried": 2,
+                    "status_ok": 3300,
+                    "decided_mpc": 3300,
+                }
+            )
+    (found,) = compare(pd.DataFrame(rows))
+    return found
+
+
+def column(table: Table, heading: str) -> list[str]:
+    return [row[table.header.index(heading)] for row in table.rows]
+
+
+def test_tables_hold_medians_and_ranges_in_the_units_of_their_headings() -> None:
+    outcome, value, decisions, fits = compare_tables(comparison())
+    assert column(outcome, "Value [cu/h]")[0] == "11.520\n11.510 – 11.530"
+    assert column(outcome, "Share of oracle's gain [%]") == ["75.0", "0.0", "100.0", "–"]
+    assert column(outcome, "Below limit [% of time]") == ["0.0", "0.0", "0.0", "30.0"]
+    assert column(value, "Air [cu/h]")[0] == "−1.000"
+    assert column(decisions, "Solve, median [ms]") == ["35.1", "35.1", "35.1", "–"]
+    assert column(decisions, "Solve, p99 [ms]")[0] == "70.2"
+    assert column(decisions, "Decisions")[0] == "ok 330\nretried 6"
+    assert column(fits, "n [%]") == ["97.00"] * 4
+    for table in (outcome, value, decisions, fits):
+        assert all(len(row) == len(table.header) for row in table.rows)
+
+
+def test_markdown_is_a_table_a_renderer_takes() -> None:
+    lines = markdown(compare_tables(comparison())[0]).splitlines()
+    assert lines[2].startswith("| Controller | Estimator |") and lines[3].startswith("|---|---|---:")
+    assert len({line.count("|") for line in lines[2:]}) == 1
+    assert "| 11.520 [11.510 – 11.530] |" in lines[4]
+
+
+def test_findings_say_how_much_of_the_gain_is_recaptured_and_who_breaks_the_limit() -> None:
+    said = findings(comparison())
+    assert any("earns +2.000 cu/h" in s and "rpem recaptures 75.0 % [75.0, 75.0]" in s for s in said)
+    assert any("pi, fixed 30.0 %" in s and "mpc" not in s for s in said)
+    assert any("Highest value" in s and "mpc, oracle, 12.020" in s for s in said)
+
+
+def test_findings_give_no_share_where_the_oracle_gains_nothing() -> None:
+    """Fixed parameters can earn more by breaking the limit; a share of that would be nonsense."""
+    said = " ".join(findings(comparison(below=0.02, gain=-0.01)))
+    assert "no gain to take a share of: fixed parameters spend 2.0 % of the time" in said
+    assert "recaptures" not in said and "Highest value" not in said
+
+
+@pytest.mark.parametrize("seeds", [1, 3, 8])
+def test_page_is_self_contained_and_complete(seeds: int) -> None:
+    page = compare_report([comparison(seeds)], command="adaptive-flot compare r")
+    links = Links()
+    links.feed(page)
+    assert (links.fetched, links.scripts, links.images) == ([], 0, 2)
+    for text in ("mpc", "oracle", "Share of oracle", "adaptive-flot compare r"):
+        assert text in page
+    assert ("box from quartile" in page) == (seeds >= 5)
+
+
+def test_a_page_of_open_loop_runs_shows_their_fits() -> None:
+    table = pd.DataFrame(
+        [
+            {"scenario": "s", "controller": "schedule", "estimator": e, "seed": k, "fit_n": 90.0 + k, "result": "r"}
+            for e in ("fixed", "rpem")
+            for k in range(6)
+        ]
+    )
+    page = compare_report(compare(table))
+    assert "fit of the estimates" in page and "Value [cu/h]" not in page
