@@ -2,9 +2,9 @@
 
 Radau collocation of degree 2 keeps the DAE exact at the collocation points: the interfacial gas velocity stays an
 algebraic variable with its own equation (Newton iterations inside the right-hand side would be half as fast). The order
-of variables and constraints is the one fatrop needs: x0, u0, x1, u1, ..., where u holds the moved inputs, the slack of
-the grade limit and the collocation points of its stage, and x the states and the inputs before; for each stage first
-the gap to the next, then its other constraints.
+of variables and constraints is the one fatrop needs: x0, u0, x1, u1, ..., where u holds the moved inputs, the slacks of
+the grade limit and of the level range and the collocation points of its stage, and x the states and the inputs before;
+for each stage first the gap to the next, then its other constraints.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ DEGREE = 2
 MOVED = ("air_flow", "level_setpoint")
 """Inputs that the controller moves; the others are disturbances, held over the horizon."""
 SLACK_SCALE = 0.01
+LEVEL_SLACK_SCALE = 0.01
+"""m. A drop of the feed pulls the level below its range whatever is done: the range is soft, and never the reason for a
+problem without a solution."""
 MOVE_SCALE = {"air_flow": 1e-3, "level_setpoint": 0.1}
 
 
@@ -45,7 +48,8 @@ class Arguments:
     grade_bias
         Added to every predicted grade: what the model is off by now.
     prices
-        Metal, treatment, air, reagent; then the cost of a squared scaled move and the penalty on a scaled slack second.
+        Metal, treatment, air, reagent; then the cost of a squared scaled move and the penalty on a scaled slack second
+        (for the level: on its square).
     """
 
     state: FloatArray
@@ -90,7 +94,7 @@ class Problem:
         CasADi function (x, p) -> grade at the end of each move (horizon,), bias included.
     """
 
-    term_names = ("metal", "treatment", "air", "reagent", "moves", "grade_slack")
+    term_names = ("metal", "treatment", "air", "reagent", "moves", "grade_slack", "level_slack")
 
     def __init__(self, model: Model, horizon: int, move_s: float) -> None:
         self.model = model
@@ -106,9 +110,9 @@ class Problem:
 
     @cached_property
     def stage_sizes(self) -> tuple[int, int]:
-        """Lengths of x (states and previous inputs) and of u (inputs, slack, collocation points) of a stage."""
+        """Lengths of x (states and previous inputs) and of u (inputs, slacks, collocation points) of a stage."""
         nx, nz, nu = len(self.model.states), len(self.model.algebraic), len(MOVED)
-        return nx + nu, nu + 1 + DEGREE * (nx + nz)
+        return nx + nu, nu + 2 + DEGREE * (nx + nz)
 
     def inputs_of(self, solution: FloatArray) -> FloatArray:
         """Moved inputs of the plan (horizon, 2) in SI units."""
@@ -127,30 +131,30 @@ class Problem:
         """Cold start: everything stays as it is. State (nx,), moved inputs (2,), algebraic variables (nz,)."""
         x, u, z = state / self.x_scale, inputs / self.u_scale, algebraic / self.z_scale
         points = np.concatenate([np.concatenate([x, z])] * DEGREE)
-        stage = np.concatenate([x, u, u, [0.0], points])
+        stage = np.concatenate([x, u, u, [0.0, 0.0], points])
         return np.concatenate([*[stage] * self.horizon, x, u])
 
     def bounds(self, bounds: Bounds) -> dict[str, FloatArray]:
         """Arguments lbx, ubx, lbg, ubg for a solver."""
         states = np.array([[q.lower, q.upper] for q in self.model.states])
         states = np.where(np.isfinite(states), states, np.array([[-1e3, 1e3]]))
-        states[self.model.index("states", "level")] = bounds.level
         x = states / self.x_scale[:, None]
         u = bounds.inputs / self.u_scale[:, None]
         z = np.array([[max(q.lower, 1e-3 * q.scale), 10 * q.scale] for q in self.model.algebraic])
         z = z / self.z_scale[:, None]
-        stage = np.vstack([x, u, u, [[0.0, 1e3]], *[x, z] * DEGREE])
+        stage = np.vstack([x, u, u, [[0.0, 1e3], [-1e3, 1e3]], *[x, z] * DEGREE])
         everything = np.vstack([*[stage] * self.horizon, x, u])
         first = len(x) + len(u)
         everything[:first] = [-1e6, 1e6]  # the initial condition is an equation: a measured state may lie outside
         moves = np.repeat(np.asarray(bounds.moves)[:, None] / self.u_scale[:, None], 2, axis=1) * [-1.0, 1.0]
-        g = np.vstack([self._constraint_bounds(k, moves) for k in range(self.horizon)])
+        level = np.asarray(bounds.level) / LEVEL_SLACK_SCALE
+        g = np.vstack([self._constraint_bounds(k, moves, level) for k in range(self.horizon)])
         return {"lbx": everything[:, 0], "ubx": everything[:, 1], "lbg": g[:, 0], "ubg": g[:, 1]}
 
-    def _constraint_bounds(self, stage: int, moves: FloatArray) -> FloatArray:
+    def _constraint_bounds(self, stage: int, moves: FloatArray, level: FloatArray) -> FloatArray:
         nx, nz, nu = len(self.model.states), len(self.model.algebraic), len(MOVED)
         equations = (nx + nu) * (2 if stage == 0 else 1) + DEGREE * (nx + nz)
-        return np.vstack([np.zeros((equations, 2)), moves, [[0.0, 1e3]] * DEGREE])
+        return np.vstack([np.zeros((equations, 2)), moves, [[0.0, 1e3]] * DEGREE, [level] * DEGREE])
 
     # -- construction ----------------------------------------------------------------------------------------------
 
@@ -176,12 +180,12 @@ class Problem:
             self.equality += [equation] * len(names)
             self.names += names
 
-        states, moves = model.names("states"), list(MOVED)
+        states, moves, level = model.names("states"), list(MOVED), model.index("states", "level")
         x = ca.SX.sym("x_0", nx + nu)
         for k in range(self.horizon):
-            u, slack = ca.SX.sym(f"u_{k}", nu), ca.SX.sym(f"slack_{k}")
+            u, slack, below = ca.SX.sym(f"u_{k}", nu), ca.SX.sym(f"slack_{k}"), ca.SX.sym(f"level_slack_{k}")
             points = [(ca.SX.sym(f"x_{k}_{j}", nx), ca.SX.sym(f"z_{k}_{j}", nz)) for j in range(DEGREE)]
-            variables += [x, u, slack, *(v for point in points for v in point)]
+            variables += [x, u, slack, below, *(v for point in points for v in point)]
             after = ca.SX.sym(f"x_{k + 1}", nx + nu)
             at = f"at {k * self.move_s:g} s"
             constrain(after - ca.vertcat(points[-1][0], u), True, [f"{n} continues {at}" for n in (*states, *moves)])
@@ -202,8 +206,12 @@ class Problem:
             for j, grade in enumerate(grades):  # a move acts on the grade at once and on the pulp later: both count
                 constrain((grade - limit) / SLACK_SCALE + slack, False, [f"grade limit {at}, point {j + 1}"])
             ends.append(grades[-1])
+            for j, (xj, _) in enumerate(points):
+                height = xj[level] * self.x_scale[level] / LEVEL_SLACK_SCALE
+                constrain(height + below, False, [f"level range {at}, point {j + 1}"])
             totals["moves"] -= prices[4] * ca.sumsqr(u - x[nx:])
             totals["grade_slack"] -= prices[5] * self.move_s * slack
+            totals["level_slack"] -= prices[5] * self.move_s * below**2
             x = after
         variables.append(x)
         terms = ca.vertcat(*(totals[name] for name in self.term_names))

@@ -104,11 +104,11 @@ def test_verification_catches_what_a_solver_may_return(problem: Problem, model: 
 
 
 def test_an_infeasible_problem_names_the_worst_constraints(problem: Problem, model: Model) -> None:
-    """A level that can not be reached: the verdict is not VALID and the message says which constraint."""
-    impossible = Bounds(BOUNDS.inputs, BOUNDS.moves, np.array([0.10, 0.12]))
+    """A range of the set-point that no allowed move reaches: the verdict is not VALID, the message says what breaks."""
+    impossible = Bounds(np.array([BOUNDS.inputs[0], [0.40, 0.42]]), BOUNDS.moves, BOUNDS.level)
     found = Solver(problem, "ipopt", 5.0)(arguments(model), problem.bounds(impossible), cold(problem, model))
     assert found.verdict is Verdict.VIOLATED
-    assert " by " in found.message
+    assert "level_setpoint" in found.message and " by " in found.message
 
 
 def test_terms_of_the_objective_add_up(problem: Problem, model: Model) -> None:
@@ -118,4 +118,4 @@ def test_terms_of_the_objective_add_up(problem: Problem, model: Model) -> None:
     rates = value_rates(y[0], y[1], HELD[0], HELD[1], 10.6, PRICES)
     expected = [HORIZON * MOVE_S * rates[name] for name in ("metal", "treatment", "air", "reagent")]
     np.testing.assert_allclose(terms[:4], expected, rtol=1e-6)
-    assert terms[4:].tolist() == [0.0, 0.0]
+    assert terms[4:].tolist() == [0.0, 0.0, 0.0]

@@ -148,3 +148,32 @@ def test_it_wants_limits_and_prices(case: ControllerCase) -> None:
         EconomicMpc(case.setup, solver="ipot")
     with pytest.raises(ModelError, match="positive"):
         EconomicMpc(case.setup, horizon=0)
+
+
+def test_a_level_out_of_its_range_is_brought_back(case: ControllerCase) -> None:
+    """A drop of the feed pulls the level below its range; that is no reason for a problem without a solution."""
+    model = case.setup.model
+    low = case.estimates[0].state.copy()
+    low[model.index("states", "level")] = 0.316
+    drop = replace(case.samples[0], inputs=case.samples[0].inputs * np.array([1.0, 0.67, 1.0]))
+    _, decision = case.controller.decide(start(case), drop, replace(case.estimates[0], state=low))
+    assert decision.status is Status.OK and decision.plan is not None
+    held = np.tile(decision.inputs, (6, 1))
+    held[:, model.index("inputs", "air_flow")] = decision.plan.inputs["air_flow"]
+    held[:, model.index("inputs", "level_setpoint")] = decision.plan.inputs["level_setpoint"]
+    levels = Stepper(model, 1.0).simulate(low, np.repeat(held, 30, axis=0), model.parameter_values).states
+    assert levels[-1, model.index("states", "level")] > 0.33
+
+
+def test_disturbances_are_those_of_the_newest_sample(case: ControllerCase) -> None:
+    """Feed flow and feed grade as they are measured now, not as they were when the controller took over."""
+    state, _ = run(case, start(case), slice(0, 1))
+    model = case.setup.model
+    p = model.parameter_values
+    p[model.index("parameters", "feed_concentration.chalcopyrite")] *= 0.7
+    late = replace(case.samples[0], time=31.0)
+    _, same = case.controller.decide(state, late, case.estimates[0])
+    _, poor = case.controller.decide(state, replace(late, parameters=p), case.estimates[0])
+    _, less = case.controller.decide(state, replace(late, inputs=late.inputs * [1.0, 0.8, 1.0]), case.estimates[0])
+    assert poor.inputs[0] < same.inputs[0]  # a poorer feed wants less air for the same grade
+    assert less.inputs[1] == pytest.approx(0.8 * same.inputs[1]) and less.inputs[0] != same.inputs[0]
