@@ -17,7 +17,8 @@ from rich.table import Table
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import Prior, full_parameters
-from adaptive_flot.runner.scenario import Measurement, Plugin, Scenario, load_scenario
+from adaptive_flot.runner.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario_file import Measurement, Plugin
 from adaptive_flot.runner.scenario_plant import simulate_plant
 from adaptive_flot.runner.study import run_scenario
 from estimators.rpem import Rpem

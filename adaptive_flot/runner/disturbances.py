@@ -6,7 +6,8 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.plant import Disturbances
-from adaptive_flot.runner.scenario import DisturbancePart, Scenario
+from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.scenario_file import DisturbancePart
 
 EXACT = DisturbancePart()
 

@@ -11,7 +11,8 @@ from adaptive_flot.errors import ScenarioError, near_match
 from adaptive_flot.late import taking_late_values
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.protocols import AnyController, AnyEstimator, ControllerSetup, Setup
-from adaptive_flot.runner.scenario import Plugin, Scenario
+from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.scenario_file import Plugin
 
 
 @dataclass(frozen=True)

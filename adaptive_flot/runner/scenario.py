@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from adaptive_flot.economics import Prices
 from adaptive_flot.errors import ScenarioError, located, near_match
@@ -18,129 +17,9 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import Limits, Setup
 from adaptive_flot.resources import scenario_folder
-from adaptive_flot.runner.profiles import InputProfile, ParameterProfile
+from adaptive_flot.runner.scenario_checks import check_scenario
+from adaptive_flot.runner.scenario_file import ScenarioFile
 from adaptive_flot.runner.yaml_problems import first_problem
-
-MOST_INTERVALS = 1e7
-"""Longest run: its table still fits into memory."""
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Measurement(_Part):
-    """One measured output: noise in the output's unit, how often it is measured, and when the value is known."""
-
-    noise_std: float = Field(ge=0)
-    every_s: float | None = Field(default=None, gt=0)
-    """Time between two measurements; default every sampling interval."""
-    dead_time_s: float = Field(default=0.0, ge=0)
-    """Time from taking a measurement to knowing it."""
-
-
-class DisturbancePart(_Part):
-    """What is known of an input or plant parameter that the controller does not choose.
-
-    A measurement is averaged over the interval that ends at its sample, repeated every `every_s` (default every sample)
-    and known `dead_time_s` later; `noise_std` is in the column's unit. Not measured, an input is taken for its first
-    planned value and a parameter for its nominal one.
-    """
-
-    measured: bool = True
-    noise_std: float = Field(default=0.0, ge=0)
-    every_s: float | None = Field(default=None, gt=0)
-    dead_time_s: float = Field(default=0.0, ge=0)
-
-
-class PlantPart(_Part):
-    """How the plant is simulated: `fast` is the Runge-Kutta step, `accurate` IDAS on the DAE."""
-
-    integrator: Literal["fast", "accurate"] = "fast"
-
-
-class Adapt(_Part):
-    """Adapted parameters and the outputs that drive the adaptation."""
-
-    parameters: list[str] = Field(min_length=1)
-    outputs: list[str] = Field(min_length=1)
-
-
-class InitialEstimate(_Part):
-    """First estimate: batch fit of the record up to a time, from a guess that is not the truth."""
-
-    method: str = "pem"
-    until_s: float = Field(gt=0)
-    guess: dict[str, float] = Field(default_factory=dict)
-    options: dict[str, Any] = Field(default_factory=dict)
-
-
-class Plugin(_Part):
-    """An estimator or controller: shipped name or `my_file:MyClass`, and its options."""
-
-    use: str
-    options: dict[str, Any] = Field(default_factory=dict)
-    start: Literal["initial_estimate", "nominal"] = "initial_estimate"
-
-
-class LimitsPart(_Part):
-    """Limits of the closed loop; columns carry the units."""
-
-    concentrate_grade: float = Field(ge=0, le=1)
-    level_m: tuple[float, float]
-    inputs: dict[str, tuple[float, float]]
-    largest_move: dict[str, Annotated[float, Field(gt=0)]]
-
-
-class EconomicsPart(_Part):
-    """Prices in currency units: per kg of valuable mineral, per kg of concentrate, per m3 of air, per m3 of feed."""
-
-    metal_per_kg: float = Prices().metal
-    treatment_per_kg: float = Prices().treatment
-    air_per_m3: float = Prices().air
-    reagent_per_m3: float = Prices().reagent
-
-
-class Case(_Part):
-    """One combination to run."""
-
-    estimator: str
-    controller: str
-
-
-class Published(_Part):
-    """Published fits by estimator name, and their source, for the report."""
-
-    source: str
-    fits: dict[str, dict[str, float]]
-
-
-class ScenarioFile(_Part):
-    """Keys of a scenario file."""
-
-    description: str
-    model: str = "flotation"
-    cell: str | None = None
-    duration_s: float = Field(gt=0)
-    sampling_s: float = Field(default=1.0, gt=0)
-    seeds: list[Annotated[int, Field(ge=0)]] = Field(default=[1], min_length=1)
-    inputs: dict[str, InputProfile]
-    parameters: dict[str, ParameterProfile] = Field(default_factory=dict)
-    disturbances: dict[str, DisturbancePart] = Field(default_factory=dict)
-    """What is known of inputs that are not moved (default: everything) and of parameters (default: nothing)."""
-    measurements: dict[str, Measurement]
-    plant: PlantPart = PlantPart()
-    adapt: Adapt
-    initial_estimate: InitialEstimate
-    estimators: dict[str, Plugin] = Field(min_length=1)
-    controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
-    cases: list[Case] = Field(default_factory=list)
-    """Combinations of estimator and controller; default all."""
-    limits: LimitsPart | None = None
-    economics: EconomicsPart | None = None
-    fits_after_s: float | None = None
-    """Fits are taken over later times; default from the end of the initial record on."""
-    published: Published | None = None
 
 
 @dataclass(frozen=True)
@@ -318,7 +197,7 @@ def load_scenario(name: Path | str) -> Scenario:
     with located(path):
         model = make_model(file.model, cell=file.cell, folder=path.parent)
         scenario = Scenario(path.stem, path, file, model, _setup(file, model))
-        _check(scenario)
+        check_scenario(scenario)
     return scenario
 
 
@@ -329,77 +208,3 @@ def _setup(file: ScenarioFile, model: Model) -> Setup:
     if unmeasured:
         raise ScenarioError(f"adapt.outputs: {unmeasured[0]!r} is not among the measurements; add it there")
     return Setup(model, file.sampling_s, parameters, outputs)
-
-
-def _check(scenario: Scenario) -> None:
-    """Check what one key alone does not show: times, names of the model, ranges."""
-    _check_times(scenario)
-    file, model = scenario.file, scenario.model
-    columns = [q.column for q in model.inputs]
-    for key in file.inputs:
-        if key not in columns:
-            raise ScenarioError(f"inputs: unknown input {key!r}; {near_match(key, columns)}")
-    for column in columns:
-        if column not in file.inputs:
-            raise ScenarioError(f"inputs: {column!r} is missing; give its profile")
-    model.indices("outputs", file.measurements)
-    with located("initial_estimate.guess"):
-        model.with_parameters(file.initial_estimate.guess)
-    with located("parameters"):
-        for name in file.parameters:
-            values = scenario.true_parameters()[:, model.index("parameters", name)]
-            for extreme in (values.min(), values.max()):
-                model.with_parameters({name: float(extreme)})
-    _check_closed_loop(scenario)
-    _check_disturbances(scenario)
-    for seed in file.seeds:
-        model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
-
-
-def _check_closed_loop(scenario: Scenario) -> None:
-    file = scenario.file
-    columns = [q.column for q in scenario.model.inputs]
-    if file.limits is not None:
-        for key in (*file.limits.inputs, *file.limits.largest_move):
-            if key not in columns:
-                raise ScenarioError(f"limits: unknown input {key!r}; {near_match(key, columns)}")
-        for key, (low, high) in [("level_m", file.limits.level_m), *file.limits.inputs.items()]:
-            if not low < high:
-                raise ScenarioError(f"limits: {key} = [{low:g}, {high:g}]; give the lower value first")
-    for case in file.cases:
-        for name, known in ((case.estimator, file.estimators), (case.controller, file.controllers)):
-            if name not in known:
-                raise ScenarioError(f"cases: {name!r} is not defined; {near_match(name, known)}")
-
-
-def _check_disturbances(scenario: Scenario) -> None:
-    model = scenario.model
-    imposed = [model.inputs[j].column for j in scenario.imposed]
-    for key in scenario.file.disturbances:
-        if key in (q.column for q in model.inputs):
-            if key not in imposed:
-                raise ScenarioError(f"disturbances: {key!r} is not one; name an input without a range in 'limits'")
-        elif key not in (name for p in model.parameters for name in (p.name, p.symbol)):
-            known = (*imposed, *model.names("parameters"))
-            raise ScenarioError(f"disturbances: unknown input or parameter {key!r}; {near_match(key, known)}")
-        elif model.parameters[model.index("parameters", key)].name in scenario.setup.parameters:
-            raise ScenarioError(f"disturbances: {key!r} is adapted, so it can not be measured too; leave one out")
-
-
-def _check_times(scenario: Scenario) -> None:
-    file = scenario.file
-    intervals = file.duration_s / file.sampling_s
-    if not 2 <= intervals <= MOST_INTERVALS or abs(intervals - round(intervals)) > 1e-9:
-        raise ScenarioError(
-            f"duration_s = {file.duration_s:g} must be a whole number (2 to {MOST_INTERVALS:g}) of sampling_s intervals"
-        )
-    if not 2 <= scenario.initial_rows < round(intervals):
-        raise ScenarioError(
-            f"initial_estimate.until_s = {file.initial_estimate.until_s:g} s must hold 2 intervals or more and lie "
-            f"before the end, {file.duration_s:g} s; correct it"
-        )
-    if not file.initial_estimate.until_s <= scenario.fits_after < file.duration_s:
-        raise ScenarioError(
-            f"fits_after_s = {scenario.fits_after:g} must lie between initial_estimate.until_s "
-            f"({file.initial_estimate.until_s:g} s) and the end ({file.duration_s:g} s); correct it"
-        )

@@ -13,7 +13,8 @@ from adaptive_flot.errors import ScenarioError
 from adaptive_flot.runner.accounts import account
 from adaptive_flot.runner.disturbances import disturbances
 from adaptive_flot.runner.profiles import Factors, Steps
-from adaptive_flot.runner.scenario import DisturbancePart, Scenario, load_scenario
+from adaptive_flot.runner.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario_file import DisturbancePart
 from adaptive_flot.runner.study import run_scenario
 from tests.runner.conftest import WriteScenario
 

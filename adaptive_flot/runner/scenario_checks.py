@@ -1,0 +1,95 @@
+"""What one key of a scenario alone does not show: times that do not fit, names the model does not have, ranges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from adaptive_flot.errors import ScenarioError, located, near_match
+
+if TYPE_CHECKING:  # the scenario that is being loaded, which calls this
+    from adaptive_flot.runner.scenario import Scenario
+
+MOST_INTERVALS = 1e7
+"""Longest run: its table still fits into memory."""
+
+
+def check_scenario(scenario: Scenario) -> None:
+    """Check a scenario as a whole.
+
+    Raises
+    ------
+    ScenarioError
+        Times, limits, cases or disturbances that do not fit.
+    ModelError, RangeError
+        Names that the model does not have, values outside its range.
+    """
+    _check_times(scenario)
+    file, model = scenario.file, scenario.model
+    columns = [q.column for q in model.inputs]
+    for key in file.inputs:
+        if key not in columns:
+            raise ScenarioError(f"inputs: unknown input {key!r}; {near_match(key, columns)}")
+    for column in columns:
+        if column not in file.inputs:
+            raise ScenarioError(f"inputs: {column!r} is missing; give its profile")
+    model.indices("outputs", file.measurements)
+    with located("initial_estimate.guess"):
+        model.with_parameters(file.initial_estimate.guess)
+    with located("parameters"):
+        for name in file.parameters:
+            values = scenario.true_parameters()[:, model.index("parameters", name)]
+            for extreme in (values.min(), values.max()):
+                model.with_parameters({name: float(extreme)})
+    _check_closed_loop(scenario)
+    _check_disturbances(scenario)
+    for seed in file.seeds:
+        model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
+
+
+def _check_closed_loop(scenario: Scenario) -> None:
+    file = scenario.file
+    columns = [q.column for q in scenario.model.inputs]
+    if file.limits is not None:
+        for key in (*file.limits.inputs, *file.limits.largest_move):
+            if key not in columns:
+                raise ScenarioError(f"limits: unknown input {key!r}; {near_match(key, columns)}")
+        for key, (low, high) in [("level_m", file.limits.level_m), *file.limits.inputs.items()]:
+            if not low < high:
+                raise ScenarioError(f"limits: {key} = [{low:g}, {high:g}]; give the lower value first")
+    for case in file.cases:
+        for name, known in ((case.estimator, file.estimators), (case.controller, file.controllers)):
+            if name not in known:
+                raise ScenarioError(f"cases: {name!r} is not defined; {near_match(name, known)}")
+
+
+def _check_disturbances(scenario: Scenario) -> None:
+    model = scenario.model
+    imposed = [model.inputs[j].column for j in scenario.imposed]
+    for key in scenario.file.disturbances:
+        if key in (q.column for q in model.inputs):
+            if key not in imposed:
+                raise ScenarioError(f"disturbances: {key!r} is not one; name an input without a range in 'limits'")
+        elif key not in (name for p in model.parameters for name in (p.name, p.symbol)):
+            known = (*imposed, *model.names("parameters"))
+            raise ScenarioError(f"disturbances: unknown input or parameter {key!r}; {near_match(key, known)}")
+        elif model.parameters[model.index("parameters", key)].name in scenario.setup.parameters:
+            raise ScenarioError(f"disturbances: {key!r} is adapted, so it can not be measured too; leave one out")
+
+
+def _check_times(scenario: Scenario) -> None:
+    file = scenario.file
+    intervals = file.duration_s / file.sampling_s
+    if not 2 <= intervals <= MOST_INTERVALS or abs(intervals - round(intervals)) > 1e-9:
+        raise ScenarioError(
+            f"duration_s = {file.duration_s:g} must be a whole number (2 to {MOST_INTERVALS:g}) of sampling_s intervals"
+        )
+    if not 2 <= scenario.initial_rows < round(intervals):
+        raise ScenarioError(
+            f"initial_estimate.until_s = {file.initial_estimate.until_s:g} s must hold 2 intervals or more and lie "
+            f"before the end, {file.duration_s:g} s; correct it"
+        )
+    if not file.initial_estimate.until_s <= scenario.fits_after < file.duration_s:
+        raise ScenarioError(
+            f"fits_after_s = {scenario.fits_after:g} must lie between initial_estimate.until_s "
+            f"({file.initial_estimate.until_s:g} s) and the end ({file.duration_s:g} s); correct it"
+        )
