@@ -23,6 +23,21 @@ app = typer.Typer(
 
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the results; default results/<name>.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the summary here too.")]
+
+
+def _file_here(model: str) -> str:
+    """A model file of this folder goes before one of that name beside the data."""
+    return str(Path(model).resolve()) if Path(model).is_file() else model
+
+
+ModelOption = Annotated[
+    str,
+    typer.Option(
+        "--model",
+        callback=_file_here,
+        help="flotation, cascaded-tanks, a model file (YAML), or my_file:make_model.",
+    ),
+]
 CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML), or the name of a shipped one.")]
 
 
@@ -65,6 +80,7 @@ def run(
 def simulate(
     inputs: Annotated[Path, typer.Argument(help="Table with time_s and the input columns (and n, C where they move).")],
     out: Annotated[Path, typer.Option("--out", help="Table to write, .csv or .parquet.")],
+    model: ModelOption = "flotation",
     cell: CellOption = None,
     accurate: Annotated[bool, typer.Option("--accurate", help="IDAS on the DAE instead of the fast step.")] = False,
 ) -> None:
@@ -73,7 +89,7 @@ def simulate(
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.runner.simulate import simulate_file
 
-    table = simulate_file(inputs, make_model("flotation", cell=cell), accurate=accurate)
+    table = simulate_file(inputs, make_model(model, cell=cell, folder=inputs.parent), accurate=accurate)
     write_table(table, out)
     typer.echo(f"{len(table)} rows: {out}")
 
@@ -83,7 +99,7 @@ def simulate(
 )
 def estimate(
     data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
-    model: Annotated[str, typer.Option(help="flotation, cascaded-tanks, or my_file:make_model.")] = "flotation",
+    model: ModelOption = "flotation",
     cell: CellOption = None,
     estimator: Annotated[
         list[str] | None, typer.Option(help="Estimator (repeatable); default fixed, rpem and pem.")
@@ -96,6 +112,7 @@ def estimate(
     ] = None,
     fit_share: Annotated[float, typer.Option(min=0.05, max=0.95, help="Share of the record to fit on.")] = 0.6,
     save_cell: Annotated[Path | None, typer.Option(help="Write the fitted parameters as a cell file.")] = None,
+    save_model: Annotated[Path | None, typer.Option(help="Write the fitted model as a model file (YAML).")] = None,
     out: Out = None,
     json: Json = None,
 ) -> None:
@@ -105,10 +122,10 @@ def estimate(
     from adaptive_flot.processes.registry import find_cell, make_model
     from adaptive_flot.runner.estimate import estimate_record, read_blocks
     from adaptive_flot.runner.results import write_json
-    from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, write_replays
+    from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, save_fitted_model, write_replays
 
     if save_cell is not None and model != "flotation":
-        raise CellError(f"--save-cell: model {model!r} has no cell file; leave the option out")
+        raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
     made = make_model(model, cell=cell, folder=data.parent)
     blocks = read_blocks(data, made, fit_share)
     names = estimator or ["fixed", "rpem", "pem"]
@@ -122,6 +139,8 @@ def estimate(
         write_json(target, estimate_summary(data, result))
     if save_cell is not None:
         save_fitted_cell(result, find_cell(cell, data.parent), save_cell)
+    if save_model is not None:
+        save_fitted_model(result, save_model, base=model, cell=cell, folder=data.parent)
     print_estimate(result)
     from adaptive_flot.report.estimate import write_estimate_report
 

@@ -70,14 +70,21 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
 
 def _import(name: str, folder: Path | None) -> ModuleType:
     """Import a module by the path of its file, by name beside the file that names it, or as an installed one."""
-    stem = name.removesuffix(".py")
-    for place in (folder, Path.cwd()):
-        file = (place or Path()) / f"{stem}.py"
-        if place is not None and file.is_file():
-            return _import_file(file.resolve())
+    file = module_file(name, folder)
+    if file is not None:
+        return _import_file(file.resolve())
     if name.endswith(".py") or "/" in name:
         raise ModuleNotFoundError(name, name=name)
-    return importlib.import_module(stem)
+    return importlib.import_module(name)
+
+
+def module_file(name: str, folder: Path | None = None) -> Path | None:
+    """File of a user's module, beside the file that names it or here; None for an installed one."""
+    for place in (folder, Path.cwd()):
+        file = (place or Path()) / f"{name.removesuffix('.py')}.py"
+        if place is not None and file.is_file():
+            return file
+    return None
 
 
 def _import_file(file: Path) -> ModuleType:

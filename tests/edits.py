@@ -8,12 +8,12 @@ from typing import Any
 
 
 def edit(content: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
-    """Change entries in place by dotted path; `...` deletes, a new path adds."""
+    """Change entries in place by dotted path (a number counts in a list); `...` deletes, a new path adds."""
     for path, value in changes.items():
         *parents, last = path.split(".")
-        entry = content
+        entry: Any = content
         for key in parents:
-            entry = entry[key]
+            entry = entry[int(key)] if isinstance(entry, list) else entry[key]
         if isinstance(value, EllipsisType):
             del entry[last]
         else:

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError, near_match
-from adaptive_flot.greybox.forms import FORMS, Coefficient, Form, Settings
+from adaptive_flot.greybox.forms import FORMS, Coefficient, Form, Settings, wrong_setting
 from adaptive_flot.greybox.quantities import Parameter, Quantity
 
 Mode = Literal["factor", "offset"]
@@ -64,6 +64,9 @@ class Effect:
         missing = [n for n, default in shape.settings.items() if default is None and n not in self.settings]
         if missing:
             raise ModelError(f"{self.label}: setting {missing[0]!r} is missing; give it")
+        for name, setting in self.settings.items():
+            if problem := wrong_setting(name, setting):
+                raise ModelError(f"{self.label}: setting {name} = {setting}: {problem}")
         known = {c.name: c for c in self.terms}
         for name, value in self.coefficients.items():
             if name not in known:
@@ -97,14 +100,31 @@ class Effect:
         """Full parameter name of a coefficient."""
         return f"{self.label}.{coefficient}"
 
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Coefficients as model parameters."""
+    def units(self, site: str | None, driver: str | None, mode: Mode) -> dict[str, str | None]:
+        """Unit of each coefficient and setting by name; None where it is the site's and that is not known.
+
+        Parameters
+        ----------
+        site, driver
+            Their units, None where unknown.
+        mode
+            How effects act at the site by default.
+        """
+        slope = f"{site}/{driver}" if site and driver else None
+        g = "-" if (self.mode or mode) == "factor" else site
+        known = {"g": g, "value": site, "driver": driver, "value/driver": slope}
+        words = {c.name: c.unit for c in self.terms}
+        words |= {name: self.shape.setting_units.get(name, "-") for name in self.shape.settings}
+        return {name: known.get(word, word) for name, word in words.items()}
+
+    def parameters(self, units: Mapping[str, str | None] | None = None) -> tuple[Parameter, ...]:
+        """Coefficients as model parameters, with their `units` where these are known."""
         source = f"effect: {self.shape.description}"
         return tuple(
             Parameter(
                 self.parameter(c.name),
                 float(self.coefficients.get(c.name, c.default)),
-                c.unit,
+                (units or {}).get(c.name) or c.unit,
                 source,
                 None,
                 c.lower,

@@ -10,7 +10,7 @@ Two kinds. A *static* form gives a number g(driver); the site's value becomes `v
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import casadi as ca
@@ -20,10 +20,17 @@ from adaptive_flot.greybox.quantities import FloatArray
 
 Settings = Mapping[str, float | tuple[float, ...]]
 
+RELATIVE_UNITS = ("g", "value", "driver", "value/driver")
+"""Units in terms of where an effect acts: `g` that of a static form's result (none for a factor, the site's for an
+offset), `value` the site's unit, `driver` the driver's."""
+
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A coefficient of a form: value at which the form does nothing, physical range, a change that matters, unit."""
+    """A coefficient of a form: value at which the form does nothing, physical range, a change that matters, unit.
+
+    `unit` is an SI unit or one of `RELATIVE_UNITS`, since a form knows neither its site nor its driver.
+    """
 
     name: str
     default: float = 0.0
@@ -64,6 +71,8 @@ class Form:
         Its coefficients, from the settings.
     settings
         Fixed numbers it needs (reference, knots, stages), with their defaults; None where it must be given.
+    setting_units
+        Unit of each setting that has one, as in `Coefficient`.
     static, direct
         Its law, one of the two: `(driver, coefficients, settings) -> g` or
         `(scope, value, driver, coefficients, settings) -> value`.
@@ -78,6 +87,7 @@ class Form:
     coefficients: Callable[[Settings], tuple[Coefficient, ...]]
     drivers: tuple[str, ...]
     settings: Mapping[str, float | tuple[float, ...] | None]
+    setting_units: Mapping[str, str] = field(default_factory=dict)
     static: StaticLaw | None = None
     direct: DirectLaw | None = None
     states: Callable[[Settings], tuple[str, ...]] = lambda settings: ()
@@ -92,6 +102,18 @@ def number(settings: Settings, name: str) -> float:
 def numbers(settings: Settings, name: str) -> FloatArray:
     """Several numbers of the settings (n,)."""
     return np.atleast_1d(np.asarray(settings[name], dtype=float))
+
+
+def wrong_setting(name: str, value: float | tuple[float, ...]) -> str | None:
+    """What is wrong with a setting, None if nothing: knots rise, stages are counted, all others are positive."""
+    several = np.atleast_1d(np.asarray(value, dtype=float))
+    if not np.isfinite(several).all():
+        return "give finite numbers"
+    if name == "knots":
+        return None if several.size >= 2 and (np.diff(several) > 0).all() else "give two or more numbers that rise"
+    if several.size != 1 or not several[0] > 0:
+        return "give one positive number"
+    return "give a whole number" if name == "stages" and several[0] % 1 else None
 
 
 # -- static forms ------------------------------------------------------------------------------------------------------
@@ -116,7 +138,8 @@ def _linear(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
 
 
 def _step(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
-    return c["amplitude"] / (1 + ca.exp(-(driver - c["onset"]) / number(s, "width")))
+    # a logistic function, written so that it and its slope stay finite far from the onset
+    return c["amplitude"] * (1 + ca.tanh((driver - c["onset"]) / (2 * number(s, "width")))) / 2
 
 
 def _ramp(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
@@ -231,14 +254,14 @@ def _fixed(*coefficients: Coefficient) -> Callable[[Settings], tuple[Coefficient
 
 
 def _curve_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
-    return tuple(Coefficient(f"value_{k + 1}") for k in range(len(numbers(settings, "knots"))))
+    return tuple(Coefficient(f"value_{k + 1}", unit="g") for k in range(len(numbers(settings, "knots"))))
 
 
 def _delay_states(settings: Settings) -> tuple[str, ...]:
     return tuple(f"stage_{k + 1}" for k in range(int(number(settings, "stages"))))
 
 
-_AMPLITUDE = Coefficient("amplitude")
+_AMPLITUDE = Coefficient("amplitude", unit="g")
 _SHARE = Coefficient("amplitude", 0.0, 0.0, 1.0, 1.0)
 _ONSET = Coefficient("onset", 0.0, scale=60.0, unit="s", shape=True)
 
@@ -249,17 +272,19 @@ FORMS: Mapping[str, Form] = {
         Form(
             "power",
             "power law in the driver, with a free constant",
-            _fixed(_AMPLITUDE, Coefficient("exponent", 0.0, -10.0, 10.0)),
+            _fixed(_AMPLITUDE, Coefficient("exponent", 0.0, -10.0, 10.0, unit="g")),
             ("signal",),
             {"reference": None},
+            {"reference": "driver"},
             static=_power,
         ),
         Form(
             "linear",
             "straight line in the driver, with a free constant",
-            _fixed(_AMPLITUDE, Coefficient("slope")),
+            _fixed(_AMPLITUDE, Coefficient("slope", unit="g")),
             ("signal",),
             {"reference": None},
+            {"reference": "driver"},
             static=_linear,
         ),
         Form(
@@ -268,14 +293,16 @@ FORMS: Mapping[str, Form] = {
             _curve_coefficients,
             ("signal", "time"),
             {"knots": None},
+            {"knots": "driver"},
             static=_curve,
         ),
         Form(
             "hinge",
             "nothing below a threshold of the driver, a straight line above",
-            _fixed(Coefficient("slope"), Coefficient("threshold", 0.0, shape=True)),
+            _fixed(Coefficient("slope", unit="g"), Coefficient("threshold", 0.0, unit="driver", shape=True)),
             ("signal",),
             {"reference": None, "width": 0.02},
+            {"reference": "driver"},
             static=_hinge,
         ),
         Form(
@@ -284,6 +311,7 @@ FORMS: Mapping[str, Form] = {
             _fixed(_AMPLITUDE, _ONSET),
             ("time",),
             {"width": 2.0},
+            {"width": "s"},
             static=_step,
         ),
         Form(
@@ -307,10 +335,11 @@ FORMS: Mapping[str, Form] = {
             "what stands above a threshold of the driver spills",
             _fixed(
                 Coefficient("gain", 0.0, 0.0, scale=0.1, unit="value/driver"),
-                Coefficient("threshold", 0.0, scale=1.0, shape=True),
+                Coefficient("threshold", 0.0, scale=1.0, unit="driver", shape=True),
             ),
             ("signal",),
             {"width": 0.05},
+            {"width": "driver"},
             direct=_overflow,
         ),
         Form(
@@ -324,9 +353,10 @@ FORMS: Mapping[str, Form] = {
         Form(
             "saturation",
             "the value can not pass a limit",
-            _fixed(_SHARE, Coefficient("limit", 0.0, scale=1.0, shape=True)),
+            _fixed(_SHARE, Coefficient("limit", 0.0, scale=1.0, unit="value", shape=True)),
             ("saturation",),
             {"width": 0.01},
+            {"width": "value"},
             direct=_clip,
         ),
         Form(
@@ -335,6 +365,7 @@ FORMS: Mapping[str, Form] = {
             _fixed(_SHARE, Coefficient("time_constant", 30.0, 1.0, scale=10.0, unit="s", shape=True)),
             ("lag",),
             {"scale": None},
+            {"scale": "value"},
             direct=_lag,
             states=lambda settings: ("lagged",),
         ),
@@ -344,15 +375,17 @@ FORMS: Mapping[str, Form] = {
             _fixed(_SHARE, Coefficient("dead_time", 30.0, 2.0, scale=10.0, unit="s", shape=True)),
             ("delay",),
             {"scale": None, "stages": 12.0},
+            {"scale": "value"},
             direct=_delay,
             states=_delay_states,
         ),
         Form(
             "stiction",
             "the value follows only when the demand leaves a band",
-            _fixed(_SHARE, Coefficient("band", 0.0, 0.0, shape=True)),
+            _fixed(_SHARE, Coefficient("band", 0.0, 0.0, unit="value", shape=True)),
             ("lag",),
             {"scale": None, "follow_s": 2.0},
+            {"scale": "value", "follow_s": "s"},
             direct=_stiction,
             states=lambda settings: ("position",),
         ),

@@ -146,9 +146,30 @@ class Model:
         return replace(
             self,
             states=self.states + tuple(s for e in added for s in e.states()),
-            parameters=self.parameters + tuple(p for e in added for p in e.parameters()),
+            parameters=self.parameters + tuple(p for e in added for p in e.parameters(self.effect_units(e))),
             effects=self.effects + added,
         )
+
+    def without_effects(self) -> Model:
+        """Return this model without its effects; its own parameters keep their present values."""
+        states = len(self.states) - sum(len(e.states()) for e in self.effects)
+        parameters = len(self.parameters) - sum(len(e.terms) for e in self.effects)
+        return replace(self, states=self.states[:states], parameters=self.parameters[:parameters], effects=())
+
+    def effect_units(self, effect: Effect) -> dict[str, str | None]:
+        """Unit of each coefficient and setting of an effect on this model; None where its site does not tell its unit.
+
+        Raises
+        ------
+        ModelError
+            Unknown site.
+        """
+        sites = {s.name: s for s in self.sites}
+        if effect.site not in sites:
+            raise ModelError(f"model '{self.name}' has no site {effect.site!r}; {near_match(effect.site, sites)}")
+        units = {q.name: q.unit for q in (*self.inputs, *self.states, *self.signals)} | {"time": "s"}
+        site = sites[effect.site]
+        return effect.units(site.unit, units.get(effect.driver), site.mode)
 
     def check_inputs(self, inputs: FloatArray, time: FloatArray | None = None, where: str = "inputs") -> None:
         """Check an input table (N, nu) against the physical range of each input.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -14,11 +14,12 @@ from adaptive_flot.greybox.quantities import Kind
 
 @dataclass(frozen=True)
 class Site:
-    """A quantity that effects may act on: how they act by default, and how often the equations pass it."""
+    """A quantity that effects may act on: how they act by default, how often the equations pass it, and its unit."""
 
     name: str
     mode: Mode
     passed: int
+    unit: str | None = None
 
 
 class Scope:
@@ -63,14 +64,14 @@ class Scope:
         """Symbol of an algebraic variable; give its equation with `residual`."""
         return self._symbol("algebraic", name)
 
-    def site(self, name: str, value: ca.SX, mode: Mode = "factor") -> ca.SX:
+    def site(self, name: str, value: ca.SX, mode: Mode = "factor", *, unit: str | None = None) -> ca.SX:
         """Pass a physical quantity through a named site, once or once per component of the same quantity.
 
         `mode` says how an effect acts here unless it says so itself: it multiplies the quantity by exp(g), or adds g
-        in the quantity's unit (sensors).
+        in the quantity's unit (sensors). With `unit`, what an effect here is given in can be checked.
         """
-        before = self.sites.get(name, Site(name, mode, 0))
-        self.sites[name] = Site(name, mode, before.passed + 1)
+        before = self.sites.get(name, Site(name, mode, 0, unit))
+        self.sites[name] = replace(before, passed=before.passed + 1)
         for effect in self._effects:
             if effect.site == name:
                 if before.passed and effect.states():

@@ -1,13 +1,14 @@
-"""The shipped processes by name, and a user's own as `module:factory`."""
+"""The shipped processes by name, a user's own as `module:factory`, and model files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from adaptive_flot.errors import CellError, ModelError, PluginError, near_match
+from adaptive_flot.errors import CellError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import construct, load
 from adaptive_flot.processes import cascaded_tanks, flotation
+from adaptive_flot.processes.model_file import find_model_file, is_model_file, load_model_file
 from adaptive_flot.resources import cell_file
 
 PROCESSES = ("flotation", "cascaded-tanks")
@@ -19,7 +20,8 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     Parameters
     ----------
     name
-        `flotation`, `cascaded-tanks`, or `module:factory` of a function without arguments that returns a `Model`.
+        `flotation`, `cascaded-tanks`, `module:factory` of a function without arguments that returns a `Model`, or the
+        path of a model file (relative to `folder` or to here).
     cell
         Cell file for the flotation model: a path (relative to `folder` or to here), or the name of a shipped one.
     folder
@@ -31,15 +33,20 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
         Unknown name, or the factory does not return a `Model`.
     CellError
         The cell file can not be used, or the process takes none.
+    ModelError, RangeError
+        The model file can not be used.
     """
+    if is_model_file(name):
+        return _read(find_model_file(name, folder), cell)
     if name == "flotation":
         return flotation.make_model(flotation.read_cell(find_cell(cell, folder)))
+    if name not in PROCESSES and ":" not in name:
+        known = near_match(name, PROCESSES)
+        raise PluginError(f"unknown model {name!r}; {known}, or a model file, or your own as my_file:make_model")
     if cell is not None:
         raise CellError(f"model {name!r} takes no cell file; leave 'cell' out")
     if name == "cascaded-tanks":
         return cascaded_tanks.make_model()
-    if ":" not in name:
-        raise PluginError(f"unknown model {name!r}; {near_match(name, PROCESSES)}, or your own as my_file:make_model")
     try:
         model = construct(load(name, {}, "model", folder), name, "model")
     except ModelError as error:
@@ -47,6 +54,16 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     if not isinstance(model, Model):
         raise PluginError(f"model {name!r}: the factory returned a {type(model).__name__}; return a Model")
     return model
+
+
+def _read(path: Path, cell: str | None) -> Model:
+    if cell is not None:
+        raise CellError(f"{path}: a model file names its cell itself; leave 'cell' out, or write it there")
+    file = load_model_file(path)
+    beside = path.parent / file.cell if file.cell else None
+    with located(path):
+        own_cell = str(beside) if beside is not None and beside.is_file() else file.cell
+        return file.extend(make_model(file.model, cell=own_cell, folder=path.parent))
 
 
 def find_cell(cell: str | None, folder: Path | None = None) -> Path:

@@ -19,7 +19,7 @@ from adaptive_flot.protocols import Limits, Setup
 from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.scenario_checks import check_scenario
 from adaptive_flot.runner.scenario_file import ScenarioFile
-from adaptive_flot.runner.yaml_problems import first_problem
+from adaptive_flot.yaml_problems import first_problem
 
 
 @dataclass(frozen=True)

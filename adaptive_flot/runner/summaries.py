@@ -8,6 +8,7 @@ from typing import Any
 
 from adaptive_flot.greybox.tables import write_table
 from adaptive_flot.processes.flotation import save_cell
+from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.runner.estimate import RecordEstimate
 
 
@@ -48,3 +49,10 @@ def save_fitted_cell(result: RecordEstimate, cell: Path, path: Path) -> None:
     """Write the batch fit as a copy of a cell file; `run`, `simulate` and `estimate` accept it."""
     values = {e.name: e.value for e in result.batch.estimates}
     save_cell(cell, values, f"calibrated on {result.blocks.name}", path)
+
+
+def save_fitted_model(result: RecordEstimate, path: Path, *, base: str, cell: str | None, folder: Path) -> None:
+    """Write the batch fit as a model file; every command that takes a model accepts it."""
+    model = result.setup.model.with_parameters({e.name: e.value for e in result.batch.estimates})
+    note = f"calibrated on {result.blocks.name}"
+    save_model(model, path, base=base, cell=cell, folder=folder, note=note)

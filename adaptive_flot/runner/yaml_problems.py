@@ -1,55 +1,5 @@
-"""Turn what pydantic says of a YAML file into one line: key path, what is wrong, nearest known key."""
+"""Moved to `adaptive_flot.yaml_problems`; this name stays until nothing imports it."""
 
-from __future__ import annotations
+from adaptive_flot.yaml_problems import first_problem
 
-from typing import Any
-
-from pydantic import BaseModel, ValidationError
-
-from adaptive_flot.errors import near_match
-
-Place = tuple[int | str, ...]
-
-
-def first_problem(error: ValidationError, schema: type[BaseModel]) -> str:
-    """Describe the first problem of a file that was validated against a schema."""
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        known = _known_keys(schema, first["loc"][:-1])
-        hint = f"; {near_match(str(first['loc'][-1]), known)}" if known else ""
-        return f"unknown key {place!r}{hint}"
-    if first["type"] == "missing":
-        return f"key {place!r} is missing; add it"
-    got = first.get("input")
-    shown = f", got {got!r}" if not isinstance(got, dict) else ""
-    return f"{place}: {first['msg'].removeprefix('Value error, ')}{shown}; correct it"
-
-
-def _known_keys(schema: type[BaseModel], where: Place) -> list[str]:
-    """Keys that are allowed at a place of the file."""
-    found: type[BaseModel] | None = schema
-    for part in where:
-        fields = found.model_fields if found is not None else {}
-        if part in fields:
-            found = _nested(fields[str(part)].annotation, where)
-    return [f.alias or name.rstrip("_") for name, f in found.model_fields.items()] if found is not None else []
-
-
-def _nested(annotation: Any, where: Place) -> type[BaseModel] | None:
-    """Model behind an annotation; of several profiles the one that the path names."""
-    candidates = _models(annotation)
-    by_profile: dict[str, type[BaseModel]] = {
-        str(m.model_fields["profile"].annotation.__args__[0]): m  # type: ignore[union-attr]
-        for m in candidates
-        if "profile" in m.model_fields
-    }
-    if len(by_profile) > 1:
-        return by_profile.get(str(where[-1]), candidates[0])
-    return candidates[0] if candidates else None
-
-
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for argument in getattr(annotation, "__args__", ()) for model in _models(argument)]
+__all__ = ["first_problem"]

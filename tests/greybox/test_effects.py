@@ -107,6 +107,41 @@ def test_a_delay_of_a_ramp_is_late_by_its_dead_time() -> None:
     )  # held inputs: half a sample
 
 
+def test_a_step_far_ahead_has_finite_derivatives(cell: Model) -> None:
+    """An onset an hour ahead: the step's slope there is zero, not a quotient of two overflows."""
+    later = cell.with_effects([Effect("coalescence", "time", "step", {"amplitude": 0.2, "onset": 3600.0})])
+    u = inputs(1)[0]
+    step = Stepper(later, 1.0).one_step_gradient(["n", "coalescence_by_time.amplitude", "coalescence_by_time.onset"])
+    gradient = np.array(step(steady_state(later, u).state, 0.0, u, later.parameter_values)[2])
+    assert np.isfinite(gradient).all() and gradient[0, 0] != 0 and not gradient[:, 1:].any()
+
+
+def test_coefficients_have_the_units_of_their_site_and_driver(cell: Model) -> None:
+    """A factor is dimensionless, an offset has the site's unit, a threshold the driver's."""
+    added = cell.with_effects(
+        [
+            effect("shift", "grade_sensor"),
+            effect("shift", "level_sensor"),
+            effect("shift", "coalescence"),
+            Effect("concentrate_flow", "level", "overflow"),
+        ]
+    )
+    units = {p.name: p.unit for p in added.parameters}
+    assert units["grade_sensor_by_constant.amplitude"] == "-"
+    assert units["level_sensor_by_constant.amplitude"] == "m"
+    assert units["coalescence_by_constant.amplitude"] == "-"
+    assert units["concentrate_flow_by_level.threshold"] == "m"
+    assert units["concentrate_flow_by_level.gain"] == "m3/s/m"
+
+
+def test_without_effects_is_the_model_before(cell: Model) -> None:
+    """Own parameters keep new values; states and coefficients of the effects are gone."""
+    extended = cell.with_effects([effect("lag"), effect("power", "bubble_size")]).with_parameters({"n": 1.1})
+    back = extended.without_effects()
+    assert back.names("states") == cell.names("states") and back.effects == ()
+    assert back.parameters == cell.with_parameters({"n": 1.1}).parameters
+
+
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
@@ -122,6 +157,10 @@ def test_a_delay_of_a_ramp_is_late_by_its_dead_time() -> None:
         (lambda m: Effect("burst_rate", "air_flow", "power"), "reference"),
         (lambda m: effect("power", exponnt=1.0), "exponent"),
         (lambda m: effect("lag", amplitude=2.0), "outside"),
+        (lambda m: Effect("burst_rate", "air_flow", "power", {}, {"reference": 0.0}), "positive"),
+        (lambda m: Effect("burst_rate", "air_flow", "power", {}, {"reference": (1.0, 2.0)}), "one positive number"),
+        (lambda m: Effect("burst_rate", "air_flow", "curve", {}, {"knots": (1e-3, 1e-3)}), "rise"),
+        (lambda m: Effect("feed_flow", "delay", "delay", {}, {"scale": 1e-4, "stages": 2.5}), "whole"),
     ],
 )
 def test_a_wrong_effect_is_one_clear_error(cell: Model, wrong: Callable[[Model], object], says: str) -> None:

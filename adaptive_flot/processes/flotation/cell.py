@@ -123,9 +123,9 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     m.signal("valuable_solids", mass[0] / v_pulp)
     m.signal("grade", mass[0] / (total_mass + TRACE))
 
-    q_air = m.site("air_flow", m.input("air_flow"))
-    q_feed = m.site("feed_flow", m.input("feed_flow"))
-    q_tails = m.site("tails_valve", m.state("tails_flow"))
+    q_air = m.site("air_flow", m.input("air_flow"), unit="m3/s")
+    q_feed = m.site("feed_flow", m.input("feed_flow"), unit="m3/s")
+    q_tails = m.site("tails_valve", m.state("tails_flow"), unit="m3/s")
     jg = q_air / area
 
     # Pulp
@@ -133,25 +133,24 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     mu_p = pulp.pulp_viscosity(phi, m.parameter("water_viscosity"))
     gas = sum(r[1:], r[0])
     eps = [rk / (1 + gas) for rk in r]
-    d = [m.site("bubble_size", dk) for dk in m.parameter_group("bubble_diameter")]
-    v = [m.site("gas_slip", pulp.slip_velocity(dk, ek, rho_p, mu_p, gravity)) for dk, ek in zip(d, eps, strict=True)]
+    d = [m.site("bubble_size", dk, unit="m") for dk in m.parameter_group("bubble_diameter")]
+    slip = [pulp.slip_velocity(dk, ek, rho_p, mu_p, gravity) for dk, ek in zip(d, eps, strict=True)]
+    v = [m.site("gas_slip", vk, unit="m/s") for vk in slip]
     out = pulp.gas_outflow(d, eps, v)
     d_int = m.signal("interface_bubble_size", out.interface_bubble_size)
 
     # Froth
     vg = m.signal("interfacial_gas_velocity", m.algebraic("interfacial_gas_velocity"))
-    v_b = m.site(
-        "burst_rate", froth.bursting_rate(jg, m.parameter("burst_a"), m.parameter("burst_b"), m.parameter("burst_c"))
-    )
+    v_b = froth.bursting_rate(jg, m.parameter("burst_a"), m.parameter("burst_b"), m.parameter("burst_c"))
+    v_b = m.site("burst_rate", v_b, unit="m/s")
     alpha = m.signal("alpha_star", 1 - v_b / vg)
-    n = m.site("growth_exponent", m.parameter("growth_exponent"))
-    growth = m.site("coalescence", m.parameter("coalescence_rate"))
+    n = m.site("growth_exponent", m.parameter("growth_exponent"), unit="-")
+    growth = m.site("coalescence", m.parameter("coalescence_rate"), unit="m^n/s")
     d_froth = m.signal("froth_bubble_size", froth.froth_bubble_size(d_int, h_f / vg, n, growth))
     k1 = froth.drainage_constant(rho_p, mu_p, gravity, m.parameter("drag_coefficient"))
     dispersion = froth.axial_dispersion(jg, k1, m.parameter("peclet"))
-    q_conc = m.site(
-        "concentrate_flow", froth.concentrate_flow(alpha, vg, area, k1, d_froth, m.parameter("plateau_border"))
-    )
+    q_conc = froth.concentrate_flow(alpha, vg, area, k1, d_froth, m.parameter("plateau_border"))
+    q_conc = m.site("concentrate_flow", q_conc, unit="m3/s")
     # v_g* = (Q_feed - Q_tails - Q_conc + Q_air) / A (paper, vg*); the concentrate is a small part of it
     m.residual(
         "interfacial_gas_velocity", vg - (q_feed - q_tails - q_conc + q_air) / area, (q_feed - q_tails + q_air) / area
@@ -159,24 +158,22 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
 
     # Minerals: flow to the concentrate F_i and mass balance (paper, mass-balance)
     feed = m.parameter_group("feed_concentration")
-    feed[0] = m.site("feed_grade", feed[0])
+    feed[0] = m.site("feed_grade", feed[0], unit="kg/m3")
     s_b = 6 * vg / d_int  # bubble surface area flux (Part I, 53)
     to_concentrate = []
     for i, (mi, p_i) in enumerate(zip(mass, m.parameter_group("floatability"), strict=True)):
-        p_i = m.site("floatability_valuable" if i == 0 else "floatability_gangue", p_i)
-        v_set = m.site(
-            "settling",
-            froth.settling_velocity(
-                m.parameter_group("mineral_density")[i],
-                m.parameter_group("particle_diameter")[i],
-                phi,
-                mu_p,
-                gravity,
-                m.parameter("water_density"),
-            ),
+        p_i = m.site("floatability_valuable" if i == 0 else "floatability_gangue", p_i, unit="-")
+        v_set = froth.settling_velocity(
+            m.parameter_group("mineral_density")[i],
+            m.parameter_group("particle_diameter")[i],
+            phi,
+            mu_p,
+            gravity,
+            m.parameter("water_density"),
         )
-        r_f = m.site("froth_recovery", froth.froth_recovery(alpha, vg, v_set, d_int, d_froth))
-        r_ent = m.site("entrainment", froth.entrainment(alpha, vg, v_set, h_f, dispersion))
+        v_set = m.site("settling", v_set, unit="m/s")
+        r_f = m.site("froth_recovery", froth.froth_recovery(alpha, vg, v_set, d_int, d_froth), unit="-")
+        r_ent = m.site("entrainment", froth.entrainment(alpha, vg, v_set, h_f, dispersion), unit="-")
         flow = mi / v_pulp * (m.parameter("volume") * p_i * s_b * r_f + q_conc * r_ent)
         to_concentrate.append(flow)
         m.derivative(masses[i], feed[i] * q_feed - mi / v_pulp * q_tails - flow)
@@ -190,15 +187,15 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
         m.derivative(name, (1 + gas) / v_pulp * balance, decay=-vk / h_p)
 
     # Level loop on the measured level (paper, Qtails, with the stable sign)
-    level = m.site("level_sensor", h_p, "offset")
+    level = m.site("level_sensor", h_p, "offset", unit="m")
     gain = m.parameter("proportional_gain")
     error = level - m.input("level_setpoint")
     m.derivative("tails_flow", gain * m.time_derivative(level) + gain / m.parameter("integral_time") * error)
 
     grade = to_concentrate[0] / sum(to_concentrate[1:], to_concentrate[0])  # paper, grade
-    m.output("concentrate_grade", m.site("grade_sensor", grade, "offset"))
+    m.output("concentrate_grade", m.site("grade_sensor", grade, "offset", unit="-"))
     m.output("recovery", to_concentrate[0] / (feed[0] * q_feed))
-    m.output("tails_flow", m.site("tails_sensor", q_tails))
+    m.output("tails_flow", m.site("tails_sensor", q_tails, unit="m3/s"))
     m.output("level", level)
-    m.output("concentrate_flow", m.site("concentrate_flow_sensor", q_conc))
-    m.output("air_recovery", m.site("air_recovery_sensor", alpha * vg * area / q_air))
+    m.output("concentrate_flow", m.site("concentrate_flow_sensor", q_conc, unit="m3/s"))
+    m.output("air_recovery", m.site("air_recovery_sensor", alpha * vg * area / q_air, unit="-"))
