@@ -8,6 +8,7 @@ from pathlib import Path
 
 from adaptive_flot.files import write_text
 from adaptive_flot.report import distributions, figures, series, tables
+from adaptive_flot.report.fault_table import fault_table
 from adaptive_flot.report.findings import below_published, candidates, findings
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Panel
@@ -36,6 +37,7 @@ class Chapter:
     initial: Table
     statuses: Table
     account: Table | None
+    faults: Table | None
 
 
 def write_run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], path: Path | str, command: str = "") -> None:
@@ -110,6 +112,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         initial=tables.initial_table(case),
         statuses=tables.status_table(case),
         account=tables.account_table(case),
+        faults=fault_table(case),
     )
 
 
