@@ -16,6 +16,7 @@ from adaptive_flot.protocols import Prior, Status
 from adaptive_flot.runner.accounts import account, control_account
 from adaptive_flot.runner.injection import with_faults
 from adaptive_flot.runner.loop import Step, run_loop
+from adaptive_flot.runner.plans import plan_table
 from adaptive_flot.runner.prepared import Prepared
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.scenario_plant import make_plant
@@ -49,6 +50,8 @@ class Run:
         Solve times, statuses and who decided over the same times (see `control_account`); empty without economics.
     fault_counts
         Intervals in which each injected fault changed something; empty without faults.
+    plans
+        What the controller expected, one row a planned move (see `plan_table`); empty where it makes no plans.
     """
 
     estimator: str
@@ -62,6 +65,7 @@ class Run:
     account: dict[str, float] = field(default_factory=dict)
     control: dict[str, Any] = field(default_factory=dict)
     fault_counts: dict[str, int] = field(default_factory=dict)
+    plans: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     def summary(self) -> dict[str, object]:
         """Entry of the JSON summary; `account` and `control` only with economics, `fault_counts` with faults."""
@@ -164,6 +168,7 @@ def run_one(
         round(seconds, 4),
         *_accounts(scenario, table),
         dict(Counter(fault for s in steps for fault in (*s.plant.faults, *s.decision.faults))),
+        plans=plan_table(scenario.model, steps),
     )
 
 
