@@ -42,6 +42,7 @@ def check_scenario(scenario: Scenario) -> None:
             for extreme in (values.min(), values.max()):
                 model.with_parameters({name: float(extreme)})
     _check_closed_loop(scenario)
+    _check_initial_state(scenario)
     _check_disturbances(scenario)
     _check_faults(scenario)
     for seed in file.seeds:
@@ -76,6 +77,16 @@ def _check_disturbances(scenario: Scenario) -> None:
             raise ScenarioError(f"disturbances: unknown input or parameter {key!r}; {near_match(key, known)}")
         elif model.parameters[model.index("parameters", key)].name in scenario.setup.parameters:
             raise ScenarioError(f"disturbances: {key!r} is adapted, so it can not be measured too; leave one out")
+
+
+def _check_initial_state(scenario: Scenario) -> None:
+    states = {q.column: q for q in scenario.model.states}
+    for key, value in scenario.file.initial_state.items():
+        if key not in states:
+            raise ScenarioError(f"initial_state: unknown state {key!r}; {near_match(key, states)}")
+        if not states[key].lower <= value <= states[key].upper:
+            low, high = states[key].lower, states[key].upper
+            raise ScenarioError(f"initial_state: {key} = {value:g} lies outside [{low:g}, {high:g}]; correct it")
 
 
 def _check_faults(scenario: Scenario) -> None:

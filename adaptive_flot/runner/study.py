@@ -139,7 +139,7 @@ def run_one(
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
-            initial["fit"] = prepared.batch.fit(record_of(steps, scenario.setup))
+            initial["fit"] = prepared.batch.fit(record_of(scenario, steps))
         prior = initial["fit"].prior(steps[-1].plant.sample.time)
         return prior if plugin.start == "initial_estimate" else nominal_start(scenario, steps, prior)
 
