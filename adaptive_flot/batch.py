@@ -114,6 +114,8 @@ class BatchFit:
         What happened.
     identifiability
         What the record can not separate.
+    joint_covariance
+        Covariance of the last state and the fitted parameters together (nx + q, nx + q), where it is known.
     """
 
     record: str
@@ -126,6 +128,7 @@ class BatchFit:
     evaluations: int
     status: Status
     identifiability: Identifiability
+    joint_covariance: FloatArray | None = None
 
     def values(self) -> FloatArray:
         """Fitted values (q,)."""
@@ -133,7 +136,7 @@ class BatchFit:
 
     def prior(self, time: float) -> Prior:
         """Where a recursive estimator goes on from the last row of the record."""
-        return Prior(time, self.last_state, self.values(), self.covariance, self.noise_std)
+        return Prior(time, self.last_state, self.values(), self.covariance, self.noise_std, self.joint_covariance)
 
 
 class BatchEstimator(Protocol):

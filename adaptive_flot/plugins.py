@@ -14,7 +14,9 @@ from adaptive_flot.errors import PluginError, near_match
 
 # Addresses, not imports: the core never imports a plug-in.
 ESTIMATORS: Mapping[str, str] = {
+    "ekf": "estimators.ekf:Ekf",
     "fixed": "estimators.fixed:Fixed",
+    "imm": "estimators.imm:Imm",
     "oracle": "estimators.oracle:Oracle",
     "rpem": "estimators.rpem:Rpem",
 }

@@ -116,6 +116,8 @@ class Prior:
         Their covariance (q, q).
     noise_std
         Standard deviation of the measurement noise of each driving output (m,).
+    joint_covariance
+        Covariance of state and parameters together (nx + q, nx + q); None: the state is taken as known.
     """
 
     time: float
@@ -123,6 +125,7 @@ class Prior:
     parameters: FloatArray
     covariance: FloatArray
     noise_std: FloatArray
+    joint_covariance: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -228,8 +231,6 @@ class Decision:
         What was wrong, in words: the most violated constraints of a failed solve.
     plan
         What the optimisation that this decision comes from expects; None where none ran or none was valid.
-    faults
-        Names of the faults that were injected into this decision.
     """
 
     inputs: FloatArray
@@ -238,7 +239,6 @@ class Decision:
     solve_seconds: float = float("nan")
     message: str = ""
     plan: Plan | None = None
-    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -316,15 +316,12 @@ class PlantRecord:
         True parameter vector (np,) during the interval, NaN in a replayed record.
     inputs
         Inputs (nu,) that really acted; `sample.inputs` is what is known of them.
-    faults
-        Names of the injected faults that changed something in the interval.
     """
 
     sample: Sample
     outputs: FloatArray
     parameters: FloatArray
     inputs: FloatArray
-    faults: tuple[str, ...] = ()
 
 
 class Plant(Protocol[State]):

@@ -197,17 +197,21 @@ class Pem:
 
     def _jacobian(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> FloatArray:
         """d(prediction)/d(unknowns) (N, m, q + free)."""
-        return problem.once("gradient", unknowns, lambda: self._gradient(record, problem, unknowns))
+        return self._gradients(record, problem, unknowns)[0]
 
-    def _gradient(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> FloatArray:
+    def _gradients(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives for the unknowns of the prediction (N, m, q + free) and of the last state (nx, q + free)."""
+        return problem.once("gradients", unknowns, lambda: self._sensitivities(record, problem, unknowns))
+
+    def _sensitivities(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         p, x0 = self._start_of(record, problem, unknowns)
         names, q = self.setup.parameters, len(self.setup.parameters)
         x0_gradient = np.zeros((x0.size, len(problem.centre)))
         if self.initial_state == "steady":
             x0_gradient[:, :q] = steady_state_gradient(self.setup.model, x0, record.inputs[0], p, names)
         x0_gradient[self._free, q + np.arange(len(self._free))] = 1.0
-        gradient = self._simulator.sensitivities(record, x0, p, names, x0_gradient)[1]
-        return gradient[:, self._columns, :] * problem.scale
+        _, gradient, last = self._simulator.sensitivities(record, x0, p, names, x0_gradient)
+        return gradient[:, self._columns, :] * problem.scale, last * problem.scale
 
     def _solve(
         self,
@@ -262,6 +266,8 @@ class Pem:
         model, q = self.setup.model, len(self.setup.parameters)
         scaled = _covariance(self._rows(record, problem, unknowns, noise, present))
         covariance = (scaled * np.outer(problem.scale, problem.scale))[:q, :q]
+        by_unknowns = np.vstack([self._gradients(record, problem, unknowns)[1], np.diag(problem.scale)[:q]])
+        joint = by_unknowns @ scaled @ by_unknowns.T
         p, x0 = self._start_of(record, problem, unknowns)
         values = problem.centre[:q] + problem.scale[:q] * unknowns[:q]
         at_bound = np.minimum(unknowns - problem.lower, problem.upper - unknowns)[:q] < 1e-6
@@ -289,6 +295,7 @@ class Pem:
             identifiability=Identifiability.judge(
                 [e.label for e in estimates], scaled[:q, :q], [e.at_bound for e in estimates]
             ),
+            joint_covariance=(joint + joint.T) / 2,
         )
 
     def _failed(self, record: Dataset, problem: _Problem) -> BatchFit:

@@ -34,13 +34,16 @@ class RecordSimulator:
 
     def sensitivities(
         self, record: Dataset, x0: FloatArray, p: FloatArray, wrt: Sequence[str], x0_gradient: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Outputs (N, ny) and their exact derivatives (N, ny, q); see `Stepper.simulate_sensitivities` for q."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Outputs (N, ny) with exact derivatives (N, ny, q), and those of the last state (nx, q).
+
+        See `Stepper.simulate_sensitivities` for q.
+        """
         tail = self.stepper.simulate_sensitivities(x0, record.inputs[1:], p, wrt, x0_gradient, record.time[0])
         y0, by_x, by_p = self._first(x0, record.time[0], record.inputs[0], p)
         first = by_x.reshape(y0.size, -1) @ x0_gradient
         first[:, : len(wrt)] += by_p.reshape(y0.size, -1)[:, self.model.indices("parameters", wrt)]
-        return np.vstack([y0, tail.outputs]), np.concatenate([first[None], tail.gradient])
+        return np.vstack([y0, tail.outputs]), np.concatenate([first[None], tail.gradient]), tail.last_state_gradient
 
 
 def _first_row(model: Model) -> ca.Function:

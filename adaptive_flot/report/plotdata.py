@@ -15,8 +15,7 @@ class Role(Enum):
     TRUTH = "truth"
     CONSTANT = "constant"
     ESTIMATE = "estimate"
-    FOLLOWED = "followed"
-    PLAN = "plan"
+    INPUT = "input"
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Trace:
     Attributes
     ----------
     label
-        Entry in the legend; none if empty.
+        Entry in the legend.
     time
         Time [s] (N,).
     values
@@ -68,8 +67,6 @@ class Panel:
         Let the vertical axis follow the lines of role ESTIMATE only; what leaves the panel is cut off.
     band
         Half width of a shaded band around zero in the panel's unit, or None; its legend entry is `band_label`.
-    limits
-        Values that must not be crossed, drawn as lines.
     """
 
     label: str
@@ -79,7 +76,6 @@ class Panel:
     zoom: bool = False
     band: float | None = None
     band_label: str = ""
-    limits: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

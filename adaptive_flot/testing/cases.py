@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from adaptive_flot.economics import Prices
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.processes import flotation
@@ -51,7 +52,7 @@ class ControllerCase:
 
 def estimator_case(factory: Callable[..., AnyEstimator], seed: int = 1, **options: Any) -> EstimatorCase:
     """Build a case for an estimator class or factory, called as `factory(setup, **options)`."""
-    setup = Setup(flotation.make_model(), dt=1.0)
+    setup = Setup(_cell(), dt=1.0)
     inputs, samples, _ = _record(setup, seed)
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     prior = Prior(
@@ -66,7 +67,7 @@ def estimator_case(factory: Callable[..., AnyEstimator], seed: int = 1, **option
 
 def controller_case(factory: Callable[..., AnyController], seed: int = 1, **options: Any) -> ControllerCase:
     """Build a case for a controller class or factory, called as `factory(setup, **options)`."""
-    setup = Setup(flotation.make_model(), dt=1.0)
+    setup = Setup(_cell(), dt=1.0)
     inputs, samples, states = _record(setup, seed)
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     limits = Limits(
@@ -90,6 +91,12 @@ def controller_case(factory: Callable[..., AnyController], seed: int = 1, **opti
         for sample, state in zip(samples, states, strict=True)
     )
     return ControllerCase(factory(controller_setup, **options), controller_setup, samples, estimates)
+
+
+@cache
+def _cell() -> Model:
+    # one model for all checks: what is compiled for it is compiled once
+    return flotation.make_model()
 
 
 def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...], FloatArray]:

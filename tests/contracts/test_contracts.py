@@ -22,6 +22,7 @@ from adaptive_flot.testing import (
 from estimators.fixed import Fixed, FixedState
 
 ESTIMATOR_CASES: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for name in ESTIMATORS} | {
+    "ekf-integrated": ("ekf", {"walk": "integrated"}),
     "rpem-central": ("rpem", {"gradient": "central"}),
 }
 

@@ -43,17 +43,20 @@ def test_sensitivities_of_every_row(model: Model, record: Dataset, start: FloatA
     simulator, p, i = RecordSimulator(model, 1.0), model.parameter_values, model.index("parameters", "C")
     x0_gradient = np.zeros((9, 2))
     x0_gradient[1] = [5.0, 1.0]
-    outputs, gradient = simulator.sensitivities(record, start, p, ["C"], x0_gradient)
+    outputs, gradient, last = simulator.sensitivities(record, start, p, ["C"], x0_gradient)
     np.testing.assert_allclose(outputs, simulator.outputs(record, start, p), rtol=1e-12)
 
-    def run(c: float, level: float) -> FloatArray:
+    def run(c: float, level: float) -> tuple[FloatArray, FloatArray]:
         q, x0 = p.copy(), start.copy()
         q[i] += c
         x0[1] += level + 5.0 * c
-        return simulator.outputs(record, x0, q)
+        return simulator.outputs(record, x0, q), simulator.last_state(record, x0, q)
 
     for j, (c, level) in enumerate([(1e-8, 0.0), (0.0, 1e-6)]):
-        difference = (run(c, level) - run(-c, -level)) / (2 * (c + level))
+        difference, last_difference = (
+            (a - b) / (2 * (c + level)) for a, b in zip(run(c, level), run(-c, -level), strict=True)
+        )
+        np.testing.assert_allclose(last[:, j], last_difference, rtol=1e-5, atol=1e-7 * np.abs(last_difference).max())
         error = np.abs(gradient[:, :, j] - difference).max(axis=0)
         assert np.all(error <= 1e-5 * np.abs(difference).max(axis=0))
         assert np.any(gradient[0, :, j] != 0)
