@@ -53,7 +53,7 @@ def run(
     parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
-    from adaptive_flot.console import print_accounts, print_fits, progress_bar
+    from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
     from adaptive_flot.runner.results import run_summary, write_json, write_runs
     from adaptive_flot.runner.scenario import load_scenario
     from adaptive_flot.runner.study import run_scenario
@@ -69,7 +69,7 @@ def run(
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, summary)
     print_fits([(loaded, runs)])
-    print_accounts(loaded, runs)
+    print_closed_loop(loaded, runs)
     from adaptive_flot.report.html import write_run_report
 
     write_run_report([(loaded, runs)], folder / "report.html", command=_command())

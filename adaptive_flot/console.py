@@ -11,7 +11,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from adaptive_flot.report import compare_tables
 from adaptive_flot.report import page as report
+from adaptive_flot.report.compare_findings import findings
+from adaptive_flot.runner.comparison import compare_runs
 from adaptive_flot.runner.estimate import RecordEstimate
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
@@ -48,36 +51,6 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
     console.file.flush()  # a reader on a pipe sees the result before the report is drawn
 
 
-def print_accounts(scenario: Scenario, runs: Sequence[Run]) -> None:
-    """Print recovery, grade and value of each controller and estimator where the scenario has economics."""
-    if not any(run.account for run in runs):
-        return
-    limit = scenario.limits.grade if scenario.limits else float("nan")
-    table = Table(title=f"{scenario.name}: account of the closed loop, medians over the seeds; grade limit {limit:g}")
-    for heading in (
-        "controller",
-        "estimator",
-        "recovery",
-        "mean grade",
-        "time below limit",
-        "value, cu/h",
-        "solve, ms",
-    ):
-        table.add_column(heading, justify="left" if heading in ("controller", "estimator") else "right")
-    for controller, estimator in dict.fromkeys((r.controller, r.estimator) for r in runs):
-        own = [r for r in runs if (r.controller, r.estimator) == (controller, estimator)]
-        recovery, grade, below, value = (
-            statistics.median(r.account[key] for r in own)
-            for key in ("recovery", "mean_grade", "below_limit", "value_cu_h")
-        )
-        solves = [1e3 * s for r in own if "solve_seconds" in r.table for s in r.table["solve_seconds"].dropna()]
-        cells = (f"{recovery:.4f}", f"{grade:.4f}", f"{below:.1%}", f"{value:.3f}")
-        table.add_row(controller, estimator, *cells, f"{statistics.median(solves):.0f}" if solves else "")
-    console = Console(width=None if Console().is_terminal else 140)
-    console.print(table)
-    console.file.flush()
-
-
 def _fit_cell(values: Sequence[float], published: float | None) -> str:
     if not values:
         return ""
@@ -103,7 +76,16 @@ def print_estimate(result: RecordEstimate) -> None:
     console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
 
 
-def print_comparison(tables: Sequence[report.Table], findings: Sequence[str]) -> None:
+def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
+    """Print what controllers and estimators earned where the scenario has economics, and how they decided."""
+    if not any(run.account for run in runs):
+        return
+    comparison = compare_runs(scenario, runs)
+    found = (compare_tables.outcome_table(comparison), compare_tables.decision_table(comparison))
+    print_comparison([table for table in found if table is not None], findings(comparison))
+
+
+def print_comparison(tables: Sequence[report.Table], sentences: Sequence[str]) -> None:
     """Print the tables of a comparison and what follows from them."""
     console = Console(width=None if Console().is_terminal else 140)
     for content in tables:
@@ -113,6 +95,6 @@ def print_comparison(tables: Sequence[report.Table], findings: Sequence[str]) ->
         for row in content.rows:
             table.add_row(*(escape(cell) for cell in row))
         console.print(table)
-    for sentence in findings:
+    for sentence in sentences:
         console.print(f"- {sentence}", highlight=False, markup=False)
     console.file.flush()

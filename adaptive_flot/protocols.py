@@ -231,6 +231,8 @@ class Decision:
         What was wrong, in words: the most violated constraints of a failed solve.
     plan
         What the optimisation that this decision comes from expects; None where none ran or none was valid.
+    faults
+        Names of the faults that were injected into this decision.
     """
 
     inputs: FloatArray
@@ -239,6 +241,7 @@ class Decision:
     solve_seconds: float = float("nan")
     message: str = ""
     plan: Plan | None = None
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -316,12 +319,15 @@ class PlantRecord:
         True parameter vector (np,) during the interval, NaN in a replayed record.
     inputs
         Inputs (nu,) that really acted; `sample.inputs` is what is known of them.
+    faults
+        Names of the injected faults that changed something in the interval.
     """
 
     sample: Sample
     outputs: FloatArray
     parameters: FloatArray
     inputs: FloatArray
+    faults: tuple[str, ...] = ()
 
 
 class Plant(Protocol[State]):

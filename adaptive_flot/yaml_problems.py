@@ -13,7 +13,11 @@ Place = tuple[int | str, ...]
 
 def first_problem(error: ValidationError, schema: type[BaseModel]) -> str:
     """Describe the first problem of a file that was validated against a schema."""
-    first = error.errors()[0]
+    problems = error.errors()
+    first = problems[0]
+    if first["type"] == "missing":  # perhaps because it is misspelt
+        beside = (p for p in problems if p["type"] == "extra_forbidden" and p["loc"][:-1] == first["loc"][:-1])
+        first = next(beside, first)
     place = ".".join(str(part) for part in first["loc"])
     if first["type"] == "extra_forbidden":
         known = _known_keys(schema, first["loc"][:-1])
@@ -21,6 +25,14 @@ def first_problem(error: ValidationError, schema: type[BaseModel]) -> str:
         return f"unknown key {place!r}{hint}"
     if first["type"] == "missing":
         return f"key {place!r} is missing; add it"
+    if first["type"] == "union_tag_invalid":
+        context = first["ctx"]
+        known = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
+        key = context["discriminator"].strip("'")
+        return f"{place}: unknown {key} {context['tag']!r}; {near_match(context['tag'], known)}"
+    if first["type"] == "union_tag_not_found":
+        key = first["ctx"]["discriminator"].strip("'")
+        return f"{place}: key {key!r} is missing; it says what kind of entry this is"
     got = first.get("input")
     shown = f", got {got!r}" if not isinstance(got, dict) else ""
     return f"{place}: {first['msg'].removeprefix('Value error, ')}{shown}; correct it"
@@ -37,15 +49,16 @@ def _known_keys(schema: type[BaseModel], where: Place) -> list[str]:
 
 
 def _nested(annotation: Any, where: Place) -> type[BaseModel] | None:
-    """Model behind an annotation; of several profiles the one that the path names."""
+    """Model behind an annotation; of several kinds of profiles or faults the one that the path names."""
     candidates = _models(annotation)
-    by_profile: dict[str, type[BaseModel]] = {
-        str(m.model_fields["profile"].annotation.__args__[0]): m  # type: ignore[union-attr]
+    by_kind: dict[str, type[BaseModel]] = {
+        str(m.model_fields[key].annotation.__args__[0]): m  # type: ignore[union-attr]
         for m in candidates
-        if "profile" in m.model_fields
+        for key in ("profile", "fault")
+        if key in m.model_fields
     }
-    if len(by_profile) > 1:
-        return by_profile.get(str(where[-1]), candidates[0])
+    if len(by_kind) > 1:
+        return by_kind.get(str(where[-1]), candidates[0])
     return candidates[0] if candidates else None
 
 

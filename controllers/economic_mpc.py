@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Plan, Sample, Status, full_parameters
 from controllers.collocation import MOVED, Arguments, Bounds, Problem
-from controllers.nlp_solvers import Solution, Solver, Verdict
+from controllers.nlp_solvers import FailingSolver, Solution, Solver, Verdict
 
 VALUE_SCALE = 1000.0
 """Prices are scaled so that the objective is of order 1 to 100: solvers' tolerances then mean something."""
@@ -36,6 +37,8 @@ class MpcState:
     bias
         Filtered measured minus predicted grade: added to every prediction, so that a model that is off does not break
         the limit for good.
+    heard
+        Time of the newest grade in that filter [s].
     """
 
     row: int
@@ -45,6 +48,7 @@ class MpcState:
     multipliers: tuple[FloatArray, FloatArray] | None
     age: int
     bias: float
+    heard: float
 
 
 class EconomicMpc:
@@ -104,7 +108,7 @@ class EconomicMpc:
                 raise ModelError(f"economic_mpc moves {name!r}; give its range and its largest move in 'limits'")
         self.setup = setup
         self.problem = Problem(setup.model, horizon, move_s)
-        self.solver = Solver(self.problem, solver, budget_s)
+        self.solver: Solver | FailingSolver = Solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
         self.grade_limit = setup.limits.grade + backoff
         self._prices = VALUE_SCALE * np.array([*setup.prices.values(), move_cost, grade_penalty])
@@ -115,18 +119,24 @@ class EconomicMpc:
             level=np.array(limits.level),
         )
         self._solver_bounds = self.problem.bounds(self._bounds)
-        self._memory = float(np.exp(-setup.dt / bias_time_s))
+        self._bias_time = bias_time_s
         self._grade = setup.model.index("outputs", "concentrate_grade")
         self._ode = FastCall(setup.model.ode)
         self._grades = FastCall(self.problem.grades)
 
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
-        return MpcState(0, time, None, None, None, 0, 0.0)
+        return MpcState(0, time, None, None, None, 0, 0.0, time)
+
+    def with_failing_solver(self) -> EconomicMpc:
+        """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
+        drill = copy.copy(self)
+        drill.solver = FailingSolver()
+        return drill
 
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
         """Inputs of the next interval: the planned ones until there is an estimate, then the optimiser's."""
-        state = replace(state, row=state.row + 1, bias=self._bias(state, estimate))
+        state = self._listen(replace(state, row=state.row + 1), estimate)
         if sample is None or estimate is None:
             row = min(state.row, len(self.setup.schedule)) - 1
             inputs = self.setup.schedule[row].copy()
@@ -139,11 +149,18 @@ class EconomicMpc:
         state = replace(state, due=max(state.due, sample.time) + self.problem.move_s)
         return self._optimise(state, held, sample, estimate)
 
-    def _bias(self, state: MpcState, estimate: Estimate | None) -> float:
-        innovation = np.nan if estimate is None else float(estimate.innovation[self._grade])
+    def _listen(self, state: MpcState, estimate: Estimate | None) -> MpcState:
+        """Filter the grade's innovation; after a gap, one value counts for the time since the last one."""
+        if estimate is None:
+            return state
+        innovation = float(estimate.innovation[self._grade])
+        late = [v.value for v in estimate.late if v.output == "concentrate_grade"]
         if not np.isfinite(innovation):
-            return state.bias
-        return self._memory * state.bias + (1 - self._memory) * innovation
+            innovation = late[-1] if late else np.nan
+        if not np.isfinite(innovation):
+            return state
+        memory = float(np.exp(-max(estimate.time - state.heard, self.setup.dt) / self._bias_time))
+        return replace(state, bias=memory * state.bias + (1 - memory) * innovation, heard=estimate.time)
 
     def _optimise(
         self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
@@ -172,7 +189,7 @@ class EconomicMpc:
         """Warm from the last plan, then once cold."""
         z = self._ode(estimate.time, estimate.state, held, theta)[3]
         cold = self.problem.start(estimate.state, held[self.problem.moved], z)
-        if state.plan is None:
+        if state.plan is None or state.age > 0:  # what is left of a plan from before a failure is no start
             return self.solver(now, self._solver_bounds, cold), Status.OK
         solution = self.solver(now, self._solver_bounds, self.problem.shifted(state.plan), state.multipliers)
         if solution.verdict is Verdict.VALID or solution.seconds > self.budget_s:

@@ -106,6 +106,22 @@ class Solver:
         return Solution(x, (lam_x, lam_g), verdict, message, iterations, seconds)
 
 
+class FailingSolver:
+    """Never finds a solution: for drills."""
+
+    def __call__(
+        self,
+        arguments: FloatArray,
+        bounds: dict[str, FloatArray],
+        start: FloatArray,
+        multipliers: tuple[FloatArray, FloatArray] | None = None,
+    ) -> Solution:
+        """Fail; see `Solver`."""
+        del arguments, multipliers
+        nothing, lost = np.full(len(start), np.nan), np.full(len(bounds["lbg"]), np.nan)
+        return Solution(nothing, (nothing, lost), Verdict.NOT_FINITE, "the solver was made to fail", 0, 0.0)
+
+
 def verify(
     problem: Problem, x: FloatArray, arguments: FloatArray, bounds: dict[str, FloatArray]
 ) -> tuple[Verdict, str]:

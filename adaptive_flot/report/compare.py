@@ -48,10 +48,7 @@ def write_compare_report(comparisons: Sequence[Comparison], path: Path, command:
 def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
     """Return the page that `write_compare_report` writes."""
     album = Album()
-    chapters = [
-        Chapter(f"scenario-{i}", c.scenario, compare_tables(c), findings(c), _pictures(c, album))
-        for i, c in enumerate(comparisons, 1)
-    ]
+    chapters = [compare_chapter(c, f"scenario-{i}", album) for i, c in enumerate(comparisons, 1)]
     runs = sum(len(x.runs) for c in comparisons for x in c.contenders)
     page = Page(
         title=f"Comparison: {', '.join(c.scenario for c in comparisons)}",
@@ -61,6 +58,13 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
         made=made_by(command),
     )
     return render("compare.html", page, chapters=chapters)
+
+
+def compare_chapter(comparison: Comparison, anchor: str, album: Album) -> Chapter:
+    """Tables, sentences and pictures of one scenario; the pictures take the album's next numbers."""
+    return Chapter(
+        anchor, comparison.scenario, compare_tables(comparison), findings(comparison), _pictures(comparison, album)
+    )
 
 
 def _pictures(comparison: Comparison, album: Album) -> list[Picture]:

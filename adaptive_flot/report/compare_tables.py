@@ -82,7 +82,7 @@ def decision_table(comparison: Comparison) -> Table:
         _column("Run [s]", "seconds", ".1f"),
     ]
     words = {
-        "Estimates": lambda c: _counts(c.counts("status")),
+        "Estimates": lambda c: _counts({k: n for k, n in c.counts("status").items() if k != "initialising"}),
         "Decisions": lambda c: _counts(c.counts("control")),
         "Decided by": lambda c: _counts(c.counts("decided"), share=True),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from adaptive_flot.report import style
 from adaptive_flot.report.plotdata import Panel, Residuals, Role, Trace
 
+LABEL_WIDTH = 20
+"""Letters of an axis label that fit beside a low panel; a longer one is broken between words."""
+LEGEND_WIDTH = 90
+"""Letters that fit beside each other in a legend as wide as a figure."""
 ACF_LAGS = 40
 """Lags of the autocorrelation shown."""
 WHITE_BAND = 1.96
@@ -43,10 +48,10 @@ def time_figure(panels: Sequence[Panel]) -> Figure:
     for ax, panel in zip(axes, panels, strict=True):
         _draw_panel(ax, panel)
     axes[-1].set_xlabel("time [s]")
-    axes[-1].set_xlim(_time_limits([t for p in panels for t in p.traces]))
+    axes[-1].set_xlim(_time_limits([t for p in panels for t in p.traces if t.role is not Role.PLAN]))
     axes[-1].xaxis.set_major_locator(MaxNLocator(7, steps=_TIME_STEPS))
     figure.align_ylabels(axes)
-    if any(len(p.traces) > 1 for p in panels):
+    if any(len(p.traces) > 1 or p.limits for p in panels):
         legend_above(figure, axes)
     return figure
 
@@ -84,20 +89,26 @@ def look(role: Role, index: int) -> dict[str, Any]:
         return {"color": style.TRUTH, "lw": 1.1, "zorder": 3, "ls": ("-", "--", ":", "-.")[index % 4]}
     if role is Role.CONSTANT:
         return {"color": style.CONSTANT, "lw": 1.5, "zorder": 2, "ls": (0, (5, 1.5))}
+    if role is Role.FOLLOWED:
+        return {"color": style.colour(index), "lw": 1.0, "zorder": 3, "ls": ":"}
+    if role is Role.PLAN:
+        return {"color": style.PLAN, "lw": 1.1, "zorder": 5, "marker": "o", "ms": 3.5, "markevery": [0]}
     return {"color": style.colour(index), "zorder": 4}
 
 
 def _draw_panel(ax: Axes, panel: Panel) -> None:
     followed = [t for t in panel.traces if t.role is Role.ESTIMATE] if panel.zoom else []
-    power = style.exponent(*(t.values for t in followed or panel.traces))
+    power = style.exponent(*(t.values for t in followed or panel.traces), np.array(panel.limits))
     factor = 10.0**-power
     if panel.band is not None:
         ax.axhspan(-panel.band * factor, panel.band * factor, color="#ededed", lw=0, label=panel.band_label)
+    for limit in panel.limits:
+        ax.axhline(limit * factor, color=style.LIMIT, lw=1.0, ls=(0, (6, 2)), zorder=2.5, label="limit")
     for trace in panel.traces:
         _draw_trace(ax, trace, factor)
     if followed:
         ax.set_ylim(_zoom_limits(panel, followed, factor))
-    ax.set_ylabel(f"{panel.label}\n[{style.unit_text(panel.unit, power)}]")
+    ax.set_ylabel(f"{fill(panel.label, LABEL_WIDTH)}\n[{style.unit_text(panel.unit, power)}]")
     ax.yaxis.set_major_locator(MaxNLocator(5))
 
 
@@ -131,9 +142,19 @@ def legend_above(figure: Figure, axes: Sequence[Axes]) -> None:
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    rows = -(-len(entries) // 5)
-    columns = -(-len(entries) // rows)  # even rows
-    figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=columns)
+    figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=legend_columns(list(entries)))
+
+
+def legend_columns(labels: Sequence[str]) -> int:
+    """Columns of a legend as wide as a figure, in even rows.
+
+    >>> legend_columns(["n", "C"]), legend_columns(["economic_mpc, rpem"] * 5)
+    (2, 3)
+    """
+    widest = max(map(len, labels), default=1) + 7  # handle and spaces
+    most = max(1, min(5, LEGEND_WIDTH // widest))
+    rows = -(-len(labels) // most)
+    return max(1, -(-len(labels) // max(1, rows)))
 
 
 def _draw_residuals(ax: Axes, row: Residuals) -> None:

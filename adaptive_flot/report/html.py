@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adaptive_flot.files import write_text
-from adaptive_flot.report import distributions, figures, series, tables
+from adaptive_flot.report import compare, distributions, figures, series, tables
+from adaptive_flot.report.closed_loop_pictures import Sections, closed_loop_sections
+from adaptive_flot.report.fault_table import fault_table
 from adaptive_flot.report.findings import below_published, candidates, findings
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Panel
 from adaptive_flot.report.series import Case
+from adaptive_flot.runner.comparison import compare_runs
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
 
@@ -27,7 +30,7 @@ class Chapter:
     fits: Table
     findings: list[str]
     spread: Picture | None
-    inputs: Picture
+    course: Sections
     parameters: Picture
     parameter_table: Table
     outputs: Picture
@@ -35,7 +38,7 @@ class Chapter:
     innovation_table: Table
     initial: Table
     statuses: Table
-    account: Table | None
+    faults: Table | None
 
 
 def write_run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], path: Path | str, command: str = "") -> None:
@@ -57,7 +60,8 @@ def run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], command: str =
     """Return the page that `write_run_report` writes."""
     cases = series.cases(results)
     album = Album()
-    overview = [_spread(case, album) for case in cases]  # first, as they come first on the page and so in number
+    closed_loops = _closed_loops(results, album)  # first, as they come first on the page and so in number
+    overview = [_spread(case, album) for case in cases]
     chapters = [
         _chapter(case, f"case-{i}", album, spread)
         for i, (case, spread) in enumerate(zip(cases, overview, strict=True), 1)
@@ -66,12 +70,17 @@ def run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], command: str =
     page = Page(
         title=f"Run report: {', '.join(names)}",
         lead=_lead(cases),
-        contents=[("fits", "Fits"), *((c.anchor, c.title) for c in chapters)],
+        contents=[
+            *((c.anchor, f"Closed loop: {c.title}") for c in closed_loops),
+            ("fits", "Fits"),
+            *((c.anchor, c.title) for c in chapters),
+        ],
         made=made_by(command, _made(cases)),
     )
     return render(
         "run.html",
         page,
+        closed_loops=closed_loops,
         chapters=chapters,
         candidates=candidates(cases),
         below=[c.title for c, case in zip(chapters, cases, strict=True) if below_published(case)],
@@ -89,10 +98,24 @@ def _made(cases: Sequence[Case]) -> list[tuple[str, str]]:
     return [(f"Seeds of {name}", text) for name, text in seeds.items()]
 
 
+def _closed_loops(results: Sequence[tuple[Scenario, Sequence[Run]]], album: Album) -> list[compare.Chapter]:
+    """Controllers and estimators side by side for each scenario with economics."""
+    found = []
+    for i, (scenario, runs) in enumerate(results, 1):
+        if any(run.account for run in runs):
+            found.append(compare.compare_chapter(compare_runs(scenario, runs), f"closed-loop-{i}", album))
+    return found
+
+
 def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> Chapter:
     published = case.scenario.file.published
     title = f"{case.scenario.name}, controller {case.controller}" if case.several_controllers else case.scenario.name
-    inputs, parameters, outputs = (_add(album, *made) for made in (_inputs(case), _parameters(case), _outputs(case)))
+    course = (
+        closed_loop_sections(case, _first(case), album)
+        if case.closed_loop
+        else [("Inputs", [_add(album, *_inputs(case))])]
+    )
+    parameters, outputs = (_add(album, *made) for made in (_parameters(case), _outputs(case)))
     return Chapter(
         anchor=anchor,
         title=title,
@@ -100,7 +123,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         source=published.source if published else "",
         fits=tables.fits_table(case),
         findings=findings(case),
-        inputs=inputs,
+        course=course,
         parameters=parameters,
         parameter_table=tables.parameter_table(case),
         outputs=outputs,
@@ -109,7 +132,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         innovation_table=tables.innovation_table(case),
         initial=tables.initial_table(case),
         statuses=tables.status_table(case),
-        account=tables.account_table(case),
+        faults=fault_table(case),
     )
 
 

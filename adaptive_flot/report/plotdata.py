@@ -15,7 +15,8 @@ class Role(Enum):
     TRUTH = "truth"
     CONSTANT = "constant"
     ESTIMATE = "estimate"
-    INPUT = "input"
+    FOLLOWED = "followed"
+    PLAN = "plan"
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Trace:
     Attributes
     ----------
     label
-        Entry in the legend.
+        Entry in the legend; none if empty.
     time
         Time [s] (N,).
     values
@@ -67,6 +68,8 @@ class Panel:
         Let the vertical axis follow the lines of role ESTIMATE only; what leaves the panel is cut off.
     band
         Half width of a shaded band around zero in the panel's unit, or None; its legend entry is `band_label`.
+    limits
+        Values that must not be crossed, drawn as lines.
     """
 
     label: str
@@ -76,6 +79,7 @@ class Panel:
     zoom: bool = False
     band: float | None = None
     band_label: str = ""
+    limits: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

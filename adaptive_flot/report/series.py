@@ -11,7 +11,7 @@ import pandas as pd
 
 from adaptive_flot.greybox.model import FloatArray, Quantity
 from adaptive_flot.report.plotdata import Panel, Residuals, Role, Spread, Trace
-from adaptive_flot.report.style import exponent, unit_text
+from adaptive_flot.report.style import amount
 from adaptive_flot.runner.estimate import ljung_box_p
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
@@ -55,10 +55,15 @@ class Case:
         """Role and colour index of each estimator: constant is one whose estimates never move."""
         found: dict[str, tuple[Role, int]] = {}
         for name, run in self.first.items():
-            moves = any(_moves(run.table[f"{x}_estimate"].to_numpy()) for x in self.labels)
+            moves = any(changes(run.table[f"{x}_estimate"].to_numpy()) for x in self.labels)
             role = Role.ESTIMATE if moves else Role.CONSTANT
             found[name] = (role, sum(r is role for r, _ in found.values()))
         return found
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether the runs have an account, so limits and prices."""
+        return any(run.account for run in self.runs)
 
     @property
     def several_controllers(self) -> bool:
@@ -96,12 +101,12 @@ def input_panels(case: Case) -> tuple[list[Panel], list[str]]:
     """Panels of the inputs that move, and a phrase for each that does not ("feed flow 0.000167 m3/s")."""
     panels, still = [], []
     inputs = case.scenario.model.inputs
-    resting = not any(_moves(v) for q in inputs for _, _, v in _distinct(case, q.column))  # then all are shown
+    resting = not any(changes(v) for q in inputs for _, _, v in _distinct(case, q.column))  # then all are shown
     for q in inputs:
         name = q.name.replace("_", " ")
         lines = _distinct(case, q.column)
-        if not resting and not any(_moves(values) for _, _, values in lines):
-            still.append(f"{name} {_amount(float(lines[0][2][0]), q.unit)}")
+        if not resting and not any(changes(values) for _, _, values in lines):
+            still.append(f"{name} {amount(float(lines[0][2][0]), q.unit)}")
             continue
         traces = [
             Trace(_suffixed("input", who), time, values, Role.ESTIMATE, j, held=True)
@@ -133,6 +138,8 @@ def parameter_panels(case: Case) -> list[Panel]:
         for who, (role, j) in case.roles.items():
             table = case.shown(case.first[who])
             time, values, std = (table[c].to_numpy() for c in ("time_s", f"{label}_estimate", f"{label}_std"))
+            if np.array_equal(values, table[f"{label}_true"].to_numpy()):  # the oracle: its line is the truth's
+                continue
             traces.append(Trace(_named(who, role), time, values, role, j, std=std))
         panels.append(Panel(label, unit, tuple(traces)))
     return panels
@@ -196,13 +203,6 @@ def _truth(case: Case, column: str) -> list[Trace]:
     return [Trace(_suffixed("truth", who), time, values, Role.TRUTH, j) for j, (who, time, values) in courses]
 
 
-def _amount(value: float, unit: str) -> str:
-    """Value and unit as text: "1.67 × 10⁻⁴ m³/s"."""
-    power = exponent(np.array([value]))
-    scaled = f"{value * 10.0**-power:.4g}" + (" ×" if power else "")
-    return scaled if unit == "-" and not power else f"{scaled} {unit_text(unit, power)}"
-
-
 def _suffixed(text: str, who: str) -> str:
     return f"{text} ({who})" if who else text
 
@@ -211,6 +211,7 @@ def _named(who: str, role: Role) -> str:
     return f"{who} (constant)" if role is Role.CONSTANT else who
 
 
-def _moves(values: FloatArray) -> bool:
+def changes(values: FloatArray) -> bool:
+    """Whether the finite values differ."""
     finite = values[np.isfinite(values)]
     return bool(len(finite) and np.ptp(finite) > 0)

@@ -23,6 +23,8 @@ WIDTH = 7.2
 """Width of every figure [inch]; the page shows it at about this size, so that text in figures keeps its size."""
 TRUTH = "#000000"
 CONSTANT = "#7f7f7f"
+PLAN = "#d55e00"
+LIMIT = "#b2182b"
 ESTIMATES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's palette without its yellow: told apart with every common colour vision."""
 LARGEST_SVG = 300_000
@@ -110,6 +112,17 @@ def unit_text(unit: str, power: int = 0) -> str:
             text = text.replace(base + old, base + old.lstrip("^").translate(raised))
     factor = f"10{str(power).translate(raised)}" if power else ""
     return " ".join(filter(None, (factor, text))) or "–"
+
+
+def amount(value: float, unit: str) -> str:
+    """Value and unit as text.
+
+    >>> amount(1.67e-4, "m3/s"), amount(0.5, "-")
+    ('1.67 × 10⁻⁴ m³/s', '0.5')
+    """
+    power = exponent(np.array([value]))
+    scaled = f"{value * 10.0**-power:.4g}" + (" ×" if power else "")
+    return scaled if unit == "-" and not power else f"{scaled} {unit_text(unit, power)}"
 
 
 def svg_uri(figure: Figure) -> str:

@@ -122,28 +122,6 @@ def initial_table(case: Case) -> Table:
     return Table(caption, header, tuple(rows), words=3)
 
 
-def account_table(case: Case) -> Table | None:
-    """Recovery, grade and value of the closed loop; None where the scenario has no economics."""
-    if not any(run.account for run in case.runs):
-        return None
-    rows = []
-    for who in case.roles:
-        own = [run.account for run in case.of(who)]
-        recovery, grade, below, depth, value = (
-            median(np.array([a[key] for a in own]))
-            for key in ("recovery", "mean_grade", "below_limit", "mean_depth", "value_cu_h")
-        )
-        shown = (number(recovery, ".4f"), number(grade, ".4f"), number(100 * below, ".1f"), number(depth, ".4f"))
-        rows.append((who, *shown, number(value, ".3f")))
-    caption = (
-        "Account of the plant's true outputs: recovery (valuable mass recovered over fed), mean grade of the "
-        "concentrate, share of time more than 0.002 below the grade limit and mean depth in that time, economic value "
-        f"in currency units (cu). Medians over {seeds_text(case)}."
-    )
-    header = ("Estimator", "Recovery", "Mean grade", "Below limit [% of time]", "Mean depth", "Value [cu/h]")
-    return Table(caption, header, tuple(rows))
-
-
 def status_table(case: Case) -> Table:
     """How often each estimator returned which status, and how long a run took."""
     known = [s for s in Status if any(run.status_counts.get(s.name.lower()) for run in case.runs)]

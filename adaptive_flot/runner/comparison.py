@@ -12,6 +12,10 @@ import pandas as pd
 
 from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.runner.results import run_summary
+from adaptive_flot.runner.runs_table import run_rows
+from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.study import Run
 
 FIXED, ORACLE = "fixed", "oracle"
 """Names of the estimators between which the gain of knowing the parameters lies."""
@@ -85,7 +89,7 @@ class Contender:
     @property
     def metrics(self) -> list[str]:
         """Columns with numbers that are spread over the seeds: all but names, settings and counts by status."""
-        apart = ("status_", "control_", "decided_", "grade_limit")
+        apart = ("status_", "control_", "decided_", "fault_", "grade_limit")
         columns = self.runs.select_dtypes("number").columns
         return [str(c) for c in columns if not str(c).startswith(apart) and self.has(str(c))]
 
@@ -174,6 +178,7 @@ class Comparison:
             "status_counts": c.counts("status"),
             "control_status_counts": c.counts("control"),
             "decided_by": c.counts("decided"),
+            "fault_counts": c.counts("fault"),
         }
 
 
@@ -198,6 +203,12 @@ def compare(table: pd.DataFrame) -> list[Comparison]:
         limit = float(rows["grade_limit"].iloc[0]) if "grade_limit" in rows else float("nan")
         names = " / ".join(dict.fromkeys(map(str, rows["scenario"])))
         found.append(Comparison(names, limit, tuple(_contenders(rows))))
+    return found
+
+
+def compare_runs(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
+    """Put runs of one scenario side by side, as `compare` does with what is read from files."""
+    (found,) = compare(pd.DataFrame(run_rows(run_summary(scenario, runs))).assign(result=""))
     return found
 
 

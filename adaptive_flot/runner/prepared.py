@@ -56,7 +56,7 @@ class Prepared:
                 setup = replace(setup, truth=self.scenario.true_parameters())
             factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
             made = construct(factory, use, "estimator", setup, **options)
-            self._built[name] = taking_late_values(made, max(self.scenario.dead_times.values(), default=0.0))
+            self._built[name] = taking_late_values(made, self.scenario.longest_dead_time)
         return self._built[name]
 
     def controller(self, name: str, seed: int) -> AnyController:

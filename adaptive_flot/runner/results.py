@@ -51,10 +51,18 @@ def run_summary(scenario: Scenario, runs: Sequence[Run]) -> dict[str, Any]:
 
 
 def write_runs(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[Path]:
-    """Write the time series of each run as `<estimator>_<controller>_seed<N>` and return the paths."""
+    """Write the time series of each run as `<estimator>_<controller>_seed<N>`, its plans as `..._plans` beside it.
+
+    Returns
+    -------
+    list of Path
+        The time series.
+    """
     paths = []
     for run in runs:
-        name = f"{run.estimator}_{run.controller}_seed{run.seed}{suffix}".replace(":", "-").replace("/", "-")
-        paths.append(folder / name)
+        name = f"{run.estimator}_{run.controller}_seed{run.seed}".replace(":", "-").replace("/", "-")
+        paths.append(folder / f"{name}{suffix}")
         write_table(run.table, paths[-1])
+        if not run.plans.empty:
+            write_table(run.plans, folder / f"{name}_plans{suffix}")
     return paths

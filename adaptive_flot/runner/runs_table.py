@@ -32,7 +32,7 @@ def run_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         For each run `scenario`, `controller`, `estimator`, `seed`, `seconds`, `fit_<quantity>` [%] and
         `status_<name>` (samples by status of the estimator); where the scenario has economics also `conditions`,
         `grade_limit`, the entries of `account`, `solves`, `solve_median_s`, `solve_p99_s`, `control_<status>`
-        (decisions by status) and `decided_<who>` (intervals by who decided).
+        (decisions by status), `decided_<who>` (intervals by who decided) and `fault_<name>` (intervals it changed).
 
     Raises
     ------
@@ -51,6 +51,7 @@ def run_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
             ("status", run.get("status_counts", {})),
             ("control", control.get("status_counts", {})),
             ("decided", control.get("decided_by", {})),
+            ("fault", run.get("fault_counts", {})),
         ):
             row |= {f"{prefix}_{key}": count for key, count in counts.items()}
         rows.append(row)

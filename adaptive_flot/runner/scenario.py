@@ -17,6 +17,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import Limits, Setup
 from adaptive_flot.resources import scenario_folder
+from adaptive_flot.runner.faults import SlowAnalyser
 from adaptive_flot.runner.scenario_checks import check_scenario
 from adaptive_flot.runner.scenario_file import ScenarioFile
 from adaptive_flot.yaml_problems import first_problem
@@ -131,6 +132,12 @@ class Scenario:
     def dead_times(self) -> dict[str, float]:
         """Dead time of each output that is known late [s]."""
         return {name: m.dead_time_s for name, m in self.file.measurements.items() if m.dead_time_s > 0}
+
+    @property
+    def longest_dead_time(self) -> float:
+        """Age of the oldest measurement that may still arrive [s], those of slow analysers (`faults`) included."""
+        slow = [f.dead_time_s for f in self.file.faults if isinstance(f, SlowAnalyser)]
+        return max([*self.dead_times.values(), *slow], default=0.0)
 
     def measured_at(self) -> npt.NDArray[np.bool_]:
         """Whether each output is measured at the end of each interval (N, ny)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from adaptive_flot.errors import ScenarioError, located, near_match
+from adaptive_flot.runner.faults import ControllerFault, SlowAnalyser, Stuck
 
 if TYPE_CHECKING:  # the scenario that is being loaded, which calls this
     from adaptive_flot.runner.scenario import Scenario
@@ -41,7 +42,9 @@ def check_scenario(scenario: Scenario) -> None:
             for extreme in (values.min(), values.max()):
                 model.with_parameters({name: float(extreme)})
     _check_closed_loop(scenario)
+    _check_initial_state(scenario)
     _check_disturbances(scenario)
+    _check_faults(scenario)
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
 
@@ -74,6 +77,36 @@ def _check_disturbances(scenario: Scenario) -> None:
             raise ScenarioError(f"disturbances: unknown input or parameter {key!r}; {near_match(key, known)}")
         elif model.parameters[model.index("parameters", key)].name in scenario.setup.parameters:
             raise ScenarioError(f"disturbances: {key!r} is adapted, so it can not be measured too; leave one out")
+
+
+def _check_initial_state(scenario: Scenario) -> None:
+    states = {q.column: q for q in scenario.model.states}
+    for key, value in scenario.file.initial_state.items():
+        if key not in states:
+            raise ScenarioError(f"initial_state: unknown state {key!r}; {near_match(key, states)}")
+        if not states[key].lower <= value <= states[key].upper:
+            low, high = states[key].lower, states[key].upper
+            raise ScenarioError(f"initial_state: {key} = {value:g} lies outside [{low:g}, {high:g}]; correct it")
+
+
+def _check_faults(scenario: Scenario) -> None:
+    file = scenario.file
+    moved = [q.column for j, q in enumerate(scenario.model.inputs) if j not in scenario.imposed]
+    for i, fault in enumerate(file.faults):
+        where = f"faults.{i} ({fault.fault})"
+        if fault.from_s >= file.duration_s:
+            raise ScenarioError(
+                f"{where}: from_s = {fault.from_s:g} is not before the end, {file.duration_s:g} s; correct it"
+            )
+        if isinstance(fault, Stuck):
+            if fault.input not in moved:
+                raise ScenarioError(f"{where}: {fault.input!r} has no actuator; {near_match(fault.input, moved)}")
+        elif not isinstance(fault, ControllerFault):
+            if fault.output not in file.measurements:
+                hint = near_match(fault.output, file.measurements)
+                raise ScenarioError(f"{where}: output {fault.output!r} is not measured; {hint}")
+            if isinstance(fault, SlowAnalyser) and fault.output in scenario.dead_times:
+                raise ScenarioError(f"{where}: {fault.output!r} has a dead_time_s already; leave one out")
 
 
 def _check_times(scenario: Scenario) -> None:

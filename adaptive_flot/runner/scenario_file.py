@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from adaptive_flot.economics import Prices
+from adaptive_flot.runner.faults import Fault
 from adaptive_flot.runner.profiles import InputProfile, ParameterProfile
 
 
@@ -114,6 +115,10 @@ class ScenarioFile(_Part):
     disturbances: dict[str, DisturbancePart] = Field(default_factory=dict)
     """What is known of inputs that are not moved (default: everything) and of parameters (default: nothing)."""
     measurements: dict[str, Measurement]
+    initial_state: dict[str, float] = Field(default_factory=dict)
+    """States that do not start steady, by column (`m_valuable_kg: 0`); known to the estimators too."""
+    faults: list[Fault] = Field(default_factory=list)
+    """What fails when; see `adaptive_flot.runner.faults`."""
     plant: PlantPart = PlantPart()
     adapt: Adapt
     initial_estimate: InitialEstimate

@@ -13,9 +13,9 @@ from adaptive_flot.runner.scenario import Scenario
 
 
 def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
-    """Plant of a run: at the steady state of its first planned inputs, with its own drift and noise."""
+    """Plant of a run, with its own drift and noise."""
     parameters = scenario.true_parameters()
-    x0 = steady_state(scenario.model, scenario.schedule(seed)[0], parameters[0]).state
+    x0 = initial_state(scenario, scenario.schedule(seed)[0], parameters[0])
     noise = measurement_noise(scenario, seed)
     accurate = scenario.file.plant.integrator == "accurate"
     return SimulatedPlant(
@@ -28,6 +28,15 @@ def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
         accurate=accurate,
         dead_time=scenario.dead_times,
     )
+
+
+def initial_state(scenario: Scenario, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
+    """State (nx,) in which a run starts: steady at its first inputs (nu,), but for what `initial_state` says."""
+    x0 = steady_state(scenario.model, inputs, parameters).state
+    columns = [q.column for q in scenario.model.states]
+    for column, value in scenario.file.initial_state.items():
+        x0[columns.index(column)] = value
+    return x0
 
 
 def simulate_plant(scenario: Scenario, seed: int) -> list[PlantRecord]:

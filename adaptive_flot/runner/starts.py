@@ -7,17 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
-from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.late import in_time
-from adaptive_flot.protocols import Prior, Setup
+from adaptive_flot.protocols import Prior
 from adaptive_flot.runner.loop import Step
 from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.scenario_plant import initial_state
 
 
-def record_of(steps: Sequence[Step], setup: Setup) -> Dataset:
-    """What is known by the last step, as a record that starts one interval before the first, at the initial instant."""
-    samples = in_time([s.plant.sample for s in steps], setup)
+def record_of(scenario: Scenario, steps: Sequence[Step]) -> Dataset:
+    """What is known by the last step, as a record that starts one interval before the first, at the initial instant.
+
+    Where the scenario says that the cell does not start steady, that is known too: the record carries the state.
+    """
+    samples = in_time([s.plant.sample for s in steps], scenario.setup)
     dt = samples[1].time - samples[0].time
     return Dataset(
         name="initial record",
@@ -25,13 +29,18 @@ def record_of(steps: Sequence[Step], setup: Setup) -> Dataset:
         dt=dt,
         inputs=np.vstack([samples[0].inputs, *(s.inputs for s in samples)]),
         outputs=np.vstack([np.full(samples[0].outputs.size, np.nan), *(s.outputs for s in samples)]),
+        initial_state=_start(scenario, samples[0].inputs) if scenario.file.initial_state else None,
     )
 
 
 def nominal_start(scenario: Scenario, steps: Sequence[Step], prior: Prior) -> Prior:
-    """Nominal parameters and their own free run from the steady state of the first inputs."""
-    model, record = scenario.model, record_of(steps, scenario.setup)
-    x0 = steady_state(model, record.inputs[0]).state
+    """Nominal parameters and their own free run from the start."""
+    model, record = scenario.model, record_of(scenario, steps)
+    x0 = _start(scenario, record.inputs[0])
     state = RecordSimulator(model, scenario.dt).last_state(record, x0, model.parameter_values)
     values = model.parameter_values[model.indices("parameters", scenario.setup.parameters)]
     return Prior(prior.time, state, values, prior.covariance, prior.noise_std)
+
+
+def _start(scenario: Scenario, inputs: FloatArray) -> FloatArray:
+    return initial_state(scenario, inputs, scenario.model.parameter_values)

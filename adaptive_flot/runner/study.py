@@ -14,7 +14,9 @@ from adaptive_flot.batch import BatchFit
 from adaptive_flot.errors import located
 from adaptive_flot.protocols import Prior, Status
 from adaptive_flot.runner.accounts import account, control_account
+from adaptive_flot.runner.injection import with_faults
 from adaptive_flot.runner.loop import Step, run_loop
+from adaptive_flot.runner.plans import plan_table
 from adaptive_flot.runner.prepared import Prepared
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.scenario_plant import make_plant
@@ -46,6 +48,10 @@ class Run:
         Recovery, grade and economic value over the same times (see `account`); empty without economics.
     control
         Solve times, statuses and who decided over the same times (see `control_account`); empty without economics.
+    fault_counts
+        Intervals in which each injected fault changed something; empty without faults.
+    plans
+        What the controller expected, one row a planned move (see `plan_table`); empty where it makes no plans.
     """
 
     estimator: str
@@ -58,10 +64,14 @@ class Run:
     seconds: float
     account: dict[str, float] = field(default_factory=dict)
     control: dict[str, Any] = field(default_factory=dict)
+    fault_counts: dict[str, int] = field(default_factory=dict)
+    plans: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     def summary(self) -> dict[str, object]:
-        """Entry of the JSON summary; `account` and `control` only where the scenario has economics."""
-        extra = {"account": self.account, "control": self.control} if self.account else {}
+        """Entry of the JSON summary; `account` and `control` only with economics, `fault_counts` with faults."""
+        extra: dict[str, object] = {"account": self.account, "control": self.control} if self.account else {}
+        if self.fault_counts:
+            extra["fault_counts"] = self.fault_counts
         return {
             "estimator": self.estimator,
             "controller": self.controller,
@@ -126,16 +136,18 @@ def run_one(
     schedule = scenario.schedule(seed)
     scenario.model.check_inputs(schedule, scenario.starts, where=f"inputs of seed {seed}")
     estimator = prepared.estimator(estimator_name)
-    controller = prepared.controller(controller_name, seed)
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
-            initial["fit"] = prepared.batch.fit(record_of(steps, scenario.setup))
+            initial["fit"] = prepared.batch.fit(record_of(scenario, steps))
         prior = initial["fit"].prior(steps[-1].plant.sample.time)
         return prior if plugin.start == "initial_estimate" else nominal_start(scenario, steps, prior)
 
+    plant, controller = with_faults(
+        scenario, seed, make_plant(scenario, seed), prepared.controller(controller_name, seed)
+    )
     steps = run_loop(
-        make_plant(scenario, seed),
+        plant,
         estimator,
         controller,
         len(schedule),
@@ -155,6 +167,8 @@ def run_one(
         initial["fit"],
         round(seconds, 4),
         *_accounts(scenario, table),
+        dict(Counter(fault for s in steps for fault in (*s.plant.faults, *s.decision.faults))),
+        plans=plan_table(scenario.model, steps),
     )
 
 

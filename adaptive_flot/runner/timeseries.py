@@ -21,8 +21,8 @@ def time_series(scenario: Scenario, steps: Sequence[Step]) -> pd.DataFrame:
 
     For inputs `_true` where what acted is not what was known; for outputs `_true`, `_measured`, `_predicted`,
     `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std`, for others that move or are
-    measured `_true`, `_known`; then `status` of the estimator, `control_status`, `decided_by`, and, where a controller
-    optimised, `solve_seconds`.
+    measured `_true`, `_known`; then `status` of the estimator, `control_status`, `decided_by`, the `faults` of a
+    scenario that has any, and, where a controller optimised, `solve_seconds`.
     """
     columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
     columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps)
@@ -30,6 +30,8 @@ def time_series(scenario: Scenario, steps: Sequence[Step]) -> pd.DataFrame:
     columns["status"] = [(s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps]
     columns["control_status"] = [s.decision.status.name.lower() for s in steps]
     columns["decided_by"] = [s.decision.decided_by for s in steps]
+    if scenario.file.faults:
+        columns["faults"] = ["; ".join((*s.plant.faults, *s.decision.faults)) for s in steps]
     solve = np.array([s.decision.solve_seconds for s in steps])
     if np.isfinite(solve).any():
         columns["solve_seconds"] = solve

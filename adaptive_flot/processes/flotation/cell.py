@@ -87,6 +87,9 @@ def make_model(cell: Cell | None = None) -> Model:
 
 TRACE = 1e-12
 """Mass [kg] that keeps the grade of an empty pulp finite."""
+TRACE = 1e-12
+"""Share of the feed's minerals that the grade counts as present: without any mineral it is then that of the first to
+arrive, and not 0/0; otherwise it changes in the twelfth digit."""
 FASTEST_DECAY = 2.0
 """Largest decay rate times step at which the fast step keeps its accuracy (see `SERIES_TERMS` there)."""
 
@@ -160,7 +163,7 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     feed = m.parameter_group("feed_concentration")
     feed[0] = m.site("feed_grade", feed[0], unit="kg/m3")
     s_b = 6 * vg / d_int  # bubble surface area flux (Part I, 53)
-    to_concentrate = []
+    to_concentrate, graded = [], []
     for i, (mi, p_i) in enumerate(zip(mass, m.parameter_group("floatability"), strict=True)):
         p_i = m.site("floatability_valuable" if i == 0 else "floatability_gangue", p_i, unit="-")
         v_set = froth.settling_velocity(
@@ -174,8 +177,10 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
         v_set = m.site("settling", v_set, unit="m/s")
         r_f = m.site("froth_recovery", froth.froth_recovery(alpha, vg, v_set, d_int, d_froth), unit="-")
         r_ent = m.site("entrainment", froth.entrainment(alpha, vg, v_set, h_f, dispersion), unit="-")
-        flow = mi / v_pulp * (m.parameter("volume") * p_i * s_b * r_f + q_conc * r_ent)
+        carried = m.parameter("volume") * p_i * s_b * r_f + q_conc * r_ent  # per concentration in the pulp
+        flow = mi / v_pulp * carried
         to_concentrate.append(flow)
+        graded.append((mi / v_pulp + TRACE * feed[i]) * carried)
         m.derivative(masses[i], feed[i] * q_feed - mi / v_pulp * q_tails - flow)
 
     # Level and gas (paper, hp and gas-holdup)
@@ -192,7 +197,7 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     error = level - m.input("level_setpoint")
     m.derivative("tails_flow", gain * m.time_derivative(level) + gain / m.parameter("integral_time") * error)
 
-    grade = to_concentrate[0] / sum(to_concentrate[1:], to_concentrate[0])  # paper, grade
+    grade = graded[0] / sum(graded[1:], graded[0])  # paper, grade
     m.output("concentrate_grade", m.site("grade_sensor", grade, "offset", unit="-"))
     m.output("recovery", to_concentrate[0] / (feed[0] * q_feed))
     m.output("tails_flow", m.site("tails_sensor", q_tails, unit="m3/s"))

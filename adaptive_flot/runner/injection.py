@@ -1,0 +1,24 @@
+"""Put the faults of a scenario between its plant and its controller; without faults both stay as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.protocols import AnyController, AnyPlant
+from adaptive_flot.runner.faults import ControllerFault
+from adaptive_flot.runner.faulty_controller import FaultyController
+from adaptive_flot.runner.faulty_plant import FaultyPlant
+from adaptive_flot.runner.scenario import Scenario
+
+
+def with_faults(
+    scenario: Scenario, seed: int, plant: AnyPlant, controller: AnyController
+) -> tuple[AnyPlant, AnyController]:
+    """Plant and controller of a run with the faults of its scenario; chance is drawn from the seed, fault by fault."""
+    inside = [fault for fault in scenario.file.faults if isinstance(fault, ControllerFault)]
+    around = [fault for fault in scenario.file.faults if not isinstance(fault, ControllerFault)]
+    if around:
+        rows = len(scenario.starts)
+        draws = np.stack([np.random.default_rng([seed, 4, i]).random((rows, 2)) for i in range(len(around))], axis=1)
+        plant = FaultyPlant(plant, around, scenario.model, scenario.dt, draws)
+    return plant, FaultyController(controller, inside) if inside else controller

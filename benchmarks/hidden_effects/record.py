@@ -1,0 +1,102 @@
+"""Make record k of a seed: draw, size, add faults, measure what there is to gain; the table and its answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.hidden_effects import base_fit, schedule
+from benchmarks.hidden_effects.answer import Answer
+from benchmarks.hidden_effects.cases import Case, CaseError, draw_case
+from benchmarks.hidden_effects.experiment import Experiment, Run, run, wander_spec
+from benchmarks.hidden_effects.simulate import Array, SimulationError
+from benchmarks.hidden_effects.sites import INPUTS
+
+ATTEMPTS = 8
+FIT_SHARE, REPORT_SHARE = 0.6, 0.8  # of the record: fitted before the first, reported on after the second
+
+
+@dataclass(frozen=True)
+class Record:
+    """One record of the benchmark."""
+
+    name: str
+    table: pd.DataFrame
+    answer: Answer
+
+
+def make_record(seed: int, k: int) -> Record:
+    """Record k of a seed, always the same.
+
+    Raises
+    ------
+    RuntimeError
+        No attempt gave a cell that runs (a fault of the generator, not of the user).
+    """
+    problems = []
+    for attempt in range(ATTEMPTS):
+        rng = schedule.child(seed, k, attempt)
+        try:
+            case = draw_case(seed, k, rng, last=attempt == ATTEMPTS - 1)
+            wander = wander_spec(case.experiment, rng)
+            done = run(case.experiment, [*case.specs, *([wander] if wander else [])], case.structure)
+            return _finish(seed, k, case, done, run(case.experiment, case.specs, case.structure) if wander else done)
+        except (SimulationError, CaseError) as error:
+            problems.append(str(error))
+    raise RuntimeError(f"record {k} of seed {seed}: {'; '.join(problems)}")
+
+
+def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
+    """Table and answer; `calm` is the run without the wander of the feed, which no oracle knows."""
+    experiment, name = case.experiment, f"record_{k:04d}"
+    measured = {column: done.noisy[column] for column in experiment.outputs}
+    for fault in case.faults:
+        if fault.output in measured:
+            measured[fault.output] = fault.apply(measured[fault.output])
+    base, fitted = _base_error(experiment, done, measured)
+    oracle = _errors(measured, calm.clean) if experiment.loop == "open" else _errors(measured, done.clean)
+    answer = Answer(
+        record=name, category=case.category, verdict=case.verdict, right_verdicts=list(case.right_verdicts),
+        effects=list(case.hidden), tolerated=list(case.tolerated), ordinary=case.ordinary, loop=experiment.loop,
+        noise={"kind": experiment.noise.kind, **(experiment.noise.details or {}),
+               "feed_wander": experiment.noise.feed_wander, "std": _std(done, measured)},
+        seed=[seed, k], rows=experiment.rows, n=experiment.n, C=experiment.C, drift=list(case.drift), note=case.note,
+        size=case.size, absorbed=fitted, base_error=base, oracle_error=oracle,
+    )  # fmt: skip
+    columns: dict[str, Any] = {"time_s": np.arange(1.0, experiment.rows + 1.0)}
+    columns |= dict(zip(INPUTS, done.inputs.T, strict=True)) | measured
+    return Record(name, pd.DataFrame(columns), answer)
+
+
+def _std(done: Run, measured: dict[str, Array]) -> dict[str, float]:
+    return {name: float(np.std(done.noisy[name] - done.clean[name])) for name in measured}
+
+
+def _errors(measured: dict[str, Array], predicted: dict[str, Array]) -> dict[str, dict[str, float]]:
+    """Root mean square of measured - predicted on the part fitted and the part reported on; missing left out."""
+    count = len(next(iter(measured.values())))
+    fit, report = slice(base_fit.BURN_IN, int(FIT_SHARE * count)), slice(int(REPORT_SHARE * count), None)
+    found = {}
+    for name, y in measured.items():
+        error = y - predicted[name]
+        parts = {"fit": error[fit], "report": error[report]}
+        found[name] = {
+            part: float(np.sqrt(np.mean(e[np.isfinite(e)] ** 2))) if np.isfinite(e).any() else float("nan")
+            for part, e in parts.items()
+        }
+    return found
+
+
+def _base_error(
+    experiment: Experiment, done: Run, measured: dict[str, Array]
+) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
+    """Error of the nominal cell fitted to the first 60 %, and how far n and C went to get there."""
+    noise = {name: max(s, 1e-12) for name, s in _std(done, measured).items()}
+    rows = slice(base_fit.BURN_IN, int(FIT_SHARE * experiment.rows))
+    guess = (experiment.n, experiment.C)
+    fit = base_fit.fit_nominal(done.inputs, measured, noise, done.start, rows, guess)
+    moved = {"n": fit.n / experiment.n - 1.0, "C": fit.C / experiment.C - 1.0}
+    return _errors(measured, fit.predicted), moved

@@ -1,0 +1,89 @@
+"""All faults at once in a closed loop: it keeps running within its limits, and the report counts what happened."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from adaptive_flot.errors import ScenarioError
+from adaptive_flot.runner.injection import with_faults
+from adaptive_flot.runner.scenario import load_scenario
+from adaptive_flot.runner.scenario_plant import make_plant
+from adaptive_flot.runner.study import Run, run_scenario
+from controllers.hold import Hold
+from tests.runner.conftest import WriteScenario
+
+WINDOWS: dict[str, dict[str, float | None]] = {
+    "missing": {"from_s": 310, "to_s": 340},
+    "outliers": {"from_s": 310, "to_s": 340, "rate": 0.3},
+    "frozen": {"from_s": 341, "to_s": 350},
+    "stuck": {"from_s": 352, "to_s": 366},
+    "solver_failure": {"from_s": 360, "to_s": 395},
+    "nan_state": {"from_s": 421, "to_s": 422},
+    "slow_analyser": {"from_s": 425, "every_s": 10, "dead_time_s": 7},
+}
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Run]:
+    """The shipped scenario with its faults pressed into 150 s."""
+    scenario = load_scenario("faults")
+    faults = [f.model_copy(update=WINDOWS[f.fault]) for f in scenario.file.faults]
+    cases = [
+        c for c in scenario.file.cases if (c.controller, c.estimator) in (("economic_mpc", "rpem"), ("pi", "fixed"))
+    ]
+    file = scenario.file.model_copy(update={"duration_s": 460.0, "faults": faults, "cases": cases})
+    return run_scenario(replace(scenario, file=file), seeds=[1])
+
+
+def test_the_loop_runs_on_within_its_limits_and_counts_what_happened(runs: list[Run]) -> None:
+    """Every kind acts; inputs stay finite and in range; counts, fallbacks and true flows are in table and summary."""
+    for run in runs:
+        late = run.table[run.table["time_s"] > 302]
+        assert late["air_flow_m3_s"].between(9.05e-4, 2.17e-3).all()
+        assert late["level_setpoint_m"].between(0.33, 0.42).all()
+        assert np.isfinite(late[["concentrate_grade_true", "n_estimate", "C_estimate"]].to_numpy()).all()
+
+        named = Counter(name for text in run.table["faults"] for name in text.split("; ") if name)
+        assert run.fault_counts == dict(named) and run.summary()["fault_counts"] == run.fault_counts
+        expected = set(WINDOWS) - ({"solver_failure"} if run.controller == "pi" else set())
+        assert {name.split()[0] for name in run.fault_counts} == expected
+
+        stuck = run.table["faults"].str.contains("stuck air_flow")
+        true, asked = run.table["air_flow_m3_s_true"], run.table["air_flow_m3_s"]
+        assert true[stuck].nunique() == 1 and stuck.sum() == 14
+        np.testing.assert_array_equal(true[~stuck], asked[~stuck])
+        if run.controller == "economic_mpc":
+            failed = run.table["faults"].str.contains("solver_failure|nan_state")
+            assert run.table["control_status"][failed].tolist() == ["shifted_plan"] * 3
+            assert run.table["control_status"].iloc[-1] == "ok"
+
+
+def test_without_faults_nothing_is_put_between(write_scenario: WriteScenario) -> None:
+    scenario = load_scenario(write_scenario())
+    plant, controller = make_plant(scenario, 1), object.__new__(Hold)
+    assert with_faults(scenario, 1, plant, controller) == (plant, controller)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{fault: mising, output: level}", "did you mean 'missing'"),
+        ("{output: level}", "key 'fault' is missing"),
+        ("{fault: outliers, output: level, rates: 0.1, size: 1}", "did you mean 'rate'"),
+        ("{fault: outliers, output: level, rate: 2, size: 1}", r"faults.0.outliers.rate: .* less than or equal to 1"),
+        ("{fault: missing, output: levl}", "output 'levl' is not measured; did you mean 'level'"),
+        ("{fault: frozen, output: level, from_s: 9, to_s: 9}", "to_s must lie after from_s"),
+        ("{fault: frozen, output: level, from_s: 999}", "is not before the end"),
+        ("{fault: stuck, input: air_flow}", "did you mean 'air_flow_m3_s'"),
+        ("{fault: slow_analyser, output: level, every_s: 0}", "greater than 0"),
+    ],
+)
+def test_a_wrong_fault_is_one_clear_line(write_scenario: WriteScenario, entry: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message) as caught:
+        load_scenario(write_scenario({"faults": [yaml.safe_load(entry)]}))
+    assert "\n" not in str(caught.value)
