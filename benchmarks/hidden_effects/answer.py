@@ -23,6 +23,7 @@ class Hidden:
     parameters: dict[str, Any]
     onset_s: float | None
     story: str
+    scale: dict[str, float]  # of the driver and the amplitude, as `spec.Spec` has them
     size: dict[str, float]  # removable, noise standard deviations rms, an output
     accepted: list[dict[str, str]]
 
@@ -30,10 +31,17 @@ class Hidden:
     def of(spec: Spec, size: dict[str, float]) -> Hidden:
         """Answer of a spec whose size was measured."""
         onset = onset_of(spec.shape, spec.parameters) if spec.driver == "time" else None
+        scale = {"low": spec.low, "high": spec.high, "centre": spec.centre, "unit": spec.unit}
+        what = (spec.site, spec.driver, spec.shape, spec.amplitude, dict(spec.parameters))
         same = equivalents(spec.site, spec.driver, spec.shape)
-        return Hidden(
-            spec.site, spec.driver, spec.shape, spec.amplitude, dict(spec.parameters), onset, spec.story, size, same
-        )
+        return Hidden(*what, onset, spec.story, scale, size, same)
+
+
+def spec_of(hidden: dict[str, Any]) -> Spec:
+    """The effect of an answer read back, for an oracle."""
+    return Spec(
+        hidden["site"], hidden["driver"], hidden["shape"], hidden["amplitude"], hidden["parameters"], **hidden["scale"]
+    )
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,7 @@ class Answer:
     rows: int
     n: float
     C: float
+    start: list[float]  # nominal core state before the first row
     drift: list[dict[str, Any]] = field(default_factory=list)
     note: str = ""
     size: dict[str, float] = field(default_factory=dict)  # of everything together

@@ -51,16 +51,17 @@ def sensitivity(
 
 def project(
     difference: Mapping[str, Array], slopes: list[dict[str, Array]], noise: Mapping[str, float], rows: slice
-) -> tuple[Array, dict[str, Array]]:
-    """Part of a difference (a table) that changes of ln n and ln C do not explain, to first order, and those changes.
+) -> dict[str, Array]:
+    """Part of a difference (a table) that changes of ln n and ln C do not explain, to first order.
 
     The two nearly cancel along a ridge, so the changes are bounded by `REACH`.
     """
     J = np.column_stack([_stack(slope, noise, rows) for slope in slopes])
     shift = lsq_linear(J, _stack(difference, noise, rows), bounds=(-REACH, REACH)).x
-    left = {name: difference[name] - sum(float(s) * slope[name] for s, slope in zip(shift, slopes, strict=True))
-            for name in noise}  # fmt: skip
-    return shift, left
+    return {
+        name: difference[name] - sum(float(s) * slope[name] for s, slope in zip(shift, slopes, strict=True))
+        for name in noise
+    }
 
 
 def fit_nominal(
@@ -82,11 +83,10 @@ def fit_nominal(
     for _ in range(iterations):
         slopes = sensitivity(theta, inputs, start, predicted, tuple(noise))
         J = np.column_stack([_stack(slope, noise, rows) for slope in slopes])[used]
-        step = np.linalg.lstsq(J, (y - _stack(predicted, noise, rows))[used], rcond=None)[0]
-        step *= min(1.0, 0.4 / max(1e-12, float(np.abs(step).max())))
-        step = np.clip(theta + step, first - REACH, first + REACH) - theta
+        low, high = np.maximum(first - REACH - theta, -0.5), np.minimum(first + REACH - theta, 0.5)
+        step = lsq_linear(J, (y - _stack(predicted, noise, rows))[used], bounds=(low - 1e-9, high + 1e-9)).x
         before, accepted = cost(predicted), False
-        for _ in range(5):
+        for _ in range(4):
             try:
                 trial = _run(theta + step, inputs, start)
             except SimulationError:
@@ -96,6 +96,6 @@ def fit_nominal(
                 theta, predicted, accepted = theta + step, trial, True
                 break
             step = 0.5 * step
-        if not accepted or before - cost(predicted) < 1e-4 * before:
+        if not accepted or before - cost(predicted) < 0.01 * before:
             break
     return Fit(float(np.exp(theta[0])), float(np.exp(theta[1])), predicted)

@@ -13,7 +13,7 @@ from benchmarks.hidden_effects.answer import Hidden
 from benchmarks.hidden_effects.beyond import draw_beyond
 from benchmarks.hidden_effects.catalogue import CATALOGUE, Entry
 from benchmarks.hidden_effects.draw import draw_effect, draw_experiment, limits_of
-from benchmarks.hidden_effects.experiment import Experiment, Structure, run
+from benchmarks.hidden_effects.experiment import Experiment, Run, Structure, run
 from benchmarks.hidden_effects.sensors import OUTPUT_OF, Fault
 from benchmarks.hidden_effects.sites import OUTPUTS
 from benchmarks.hidden_effects.sizing import ORDINARY, Sized, measure, scale_to
@@ -45,6 +45,7 @@ class Case:
     ordinary: bool = False
     note: str = ""
     size: dict[str, float] = field(default_factory=dict)
+    done: Run | None = None  # where it was run already
 
 
 def draw_case(seed: int, k: int, rng: Rng, *, last: bool) -> Case:
@@ -62,7 +63,7 @@ def _sized_effect(experiment: Experiment, entry: Entry, rng: Rng, last: bool) ->
     pilot = run(experiment)
     spec = draw_effect(rng, entry, pilot)
     target = float(np.exp(rng.uniform(*_TARGETS)))
-    found = scale_to(experiment, spec, target, limits_of(entry, spec.shape))
+    found = scale_to(experiment, spec, target, limits_of(entry, spec.shape), pilot)
     if found is None or (found[1].of(entry.site) < ORDINARY[0] and not last):
         raise CaseError(f"{entry.site}/{entry.driver}: too small")
     return found
@@ -74,7 +75,8 @@ def _single(seed: int, k: int, rng: Rng, last: bool) -> Case:
     spec, sized = _sized_effect(experiment, entry, rng, last)
     ordinary = ORDINARY[0] <= sized.of(spec.site) <= ORDINARY[1]
     hidden = Hidden.of(spec, sized.removable)
-    return Case("single", experiment, "named", (), (spec,), (hidden,), ordinary=ordinary, size=sized.removable)
+    return Case("single", experiment, "named", (), (spec,), (hidden,), ordinary=ordinary, size=sized.removable,
+                done=sized.done)  # fmt: skip
 
 
 def _none(seed: int, k: int, rng: Rng, last: bool) -> Case:
@@ -97,7 +99,7 @@ def _drift(seed: int, k: int, rng: Rng, last: bool) -> Case:
     names = [{"site": s, "driver": "time", "why": why} for s in ("coalescence", "growth_exponent")]
     drift = [{"site": s.site, "shape": s.shape, "amplitude": s.amplitude} for s in specs]
     return Case("drift", experiment, "none", ("none",), tuple(specs), tolerated=tuple(names), drift=tuple(drift),
-                size=sized.removable)  # fmt: skip
+                size=sized.removable, done=sized.done)  # fmt: skip
 
 
 def _pair(seed: int, k: int, rng: Rng, last: bool) -> Case:
@@ -106,7 +108,7 @@ def _pair(seed: int, k: int, rng: Rng, last: bool) -> Case:
     specs = tuple(spec for spec, _ in found)
     together = measure(experiment, specs)
     hidden = tuple(Hidden.of(spec, sized.removable) for spec, sized in found)
-    return Case("pair", experiment, "named", (), specs, hidden, size=together.removable)
+    return Case("pair", experiment, "named", (), specs, hidden, size=together.removable, done=together.done)
 
 
 def _beyond(seed: int, k: int, rng: Rng, last: bool) -> Case:
@@ -145,7 +147,8 @@ def _unexcited(seed: int, k: int, rng: Rng, last: bool) -> Case:
     why = "its driver does not move: it is a constant here"
     names = () if kind == "actuator" else ("constant", *(("level", "froth_depth") if kind == "level" else (kind,)))
     same = tuple({"site": spec.site, "driver": driver, "why": why} for driver in names)
-    return Case("unexcited", experiment, "none", QUIET, (spec,), tolerated=same, note=note, size=sized.removable)
+    return Case("unexcited", experiment, "none", QUIET, (spec,), tolerated=same, note=note, size=sized.removable,
+                done=sized.done)  # fmt: skip
 
 
 def _unexcited_entry(kind: str, rng: Rng) -> Entry:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from benchmarks.hidden_effects import constants as c
@@ -80,7 +81,7 @@ class World:
     dead_share: float = 0.0  # share of the pulp volume that only exchanges ...
     exchange_flow: float = 0.0  # ... with the rest, m3/s
 
-    @property
+    @cached_property
     def n_core(self) -> int:
         """Number of states before those of the effects."""
         return N_GAS + len(self.populations) * (2 if self.dead_share else 1)

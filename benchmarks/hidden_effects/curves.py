@@ -113,7 +113,7 @@ TEMPORAL: dict[str, Callable[[Mapping[str, float]], Curve]] = {
 
 def draw_temporal(shape: str, seconds: float, rng: Rng) -> Parameters:
     """Random parameters of a shape in time for a record of that many seconds (0 = its first row)."""
-    onset = float(rng.uniform(0.12, 0.6) * seconds)
+    onset = float(rng.uniform(0.12, 0.5) * seconds)  # a search that keeps the end apart must see it too
     match shape:
         case "smooth_step":
             return {"onset": onset, "width": float(rng.uniform(2.0, 25.0))}

@@ -42,8 +42,9 @@ def make_record(seed: int, k: int) -> Record:
         try:
             case = draw_case(seed, k, rng, last=attempt == ATTEMPTS - 1)
             wander = wander_spec(case.experiment, rng)
-            done = run(case.experiment, [*case.specs, *([wander] if wander else [])], case.structure)
-            return _finish(seed, k, case, done, run(case.experiment, case.specs, case.structure) if wander else done)
+            calm = case.done or run(case.experiment, case.specs, case.structure)
+            done = run(case.experiment, [*case.specs, wander], case.structure) if wander else calm
+            return _finish(seed, k, case, done, calm)
         except (SimulationError, CaseError) as error:
             problems.append(str(error))
     raise RuntimeError(f"record {k} of seed {seed}: {'; '.join(problems)}")
@@ -63,8 +64,8 @@ def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
         effects=list(case.hidden), tolerated=list(case.tolerated), ordinary=case.ordinary, loop=experiment.loop,
         noise={"kind": experiment.noise.kind, **(experiment.noise.details or {}),
                "feed_wander": experiment.noise.feed_wander, "std": _std(done, measured)},
-        seed=[seed, k], rows=experiment.rows, n=experiment.n, C=experiment.C, drift=list(case.drift), note=case.note,
-        size=case.size, absorbed=fitted, base_error=base, oracle_error=oracle,
+        seed=[seed, k], rows=experiment.rows, n=experiment.n, C=experiment.C, start=done.start,
+        drift=list(case.drift), note=case.note, size=case.size, absorbed=fitted, base_error=base, oracle_error=oracle,
     )  # fmt: skip
     columns: dict[str, Any] = {"time_s": np.arange(1.0, experiment.rows + 1.0)}
     columns |= dict(zip(INPUTS, done.inputs.T, strict=True)) | measured

@@ -16,26 +16,21 @@ from benchmarks.hidden_effects.spec import Spec
 ORDINARY = (5.0, 50.0)  # noise standard deviations, root mean square
 _FLOWS = {"air_flow", "feed_flow", "gas_slip", "burst_rate", "tails_valve"}
 _ANY_OUTPUT = ({*SENSOR_SITES} | _FLOWS) - {"grade_sensor"}  # sites that may show elsewhere than in the grade
+_SEARCH = 5  # trials of an amplitude
+Columns = dict[str, Array]
 
 
 @dataclass(frozen=True)
 class Sized:
-    """A run with effects, what they change in each output [noise std, rms], the shift of n and C that hides part."""
+    """A run with effects, and what they change in each output [noise std, rms]: all, and what n and C can not hide."""
 
     done: Run
     raw: dict[str, float]
     removable: dict[str, float]
-    absorbed: tuple[float, float]  # relative change of n and C
-    noise: dict[str, float]
 
     def of(self, site: str) -> float:
-        """The size that counts for a site: in the grade, or in whatever output shows a sensor or valve most."""
+        """The size that counts for a site: in the grade, or in the output that shows most."""
         return max(self.removable.values()) if site in _ANY_OUTPUT else self.removable["concentrate_grade"]
-
-
-def noise_std(experiment: Experiment, done: Run) -> dict[str, float]:
-    """Standard deviation of the noise of each measured output."""
-    return {name: float(np.std(done.noisy[name] - done.clean[name])) for name in experiment.outputs}
 
 
 def measure(experiment: Experiment, specs: Sequence[Spec], structure: Structure | None = None) -> Sized:
@@ -47,32 +42,45 @@ def measure(experiment: Experiment, specs: Sequence[Spec], structure: Structure 
         As `experiment.run`.
     """
     done = run(experiment, specs, structure)
-    noise = noise_std(experiment, done)
     base = nominal(experiment, done)
-    difference = {name: done.clean[name] - base[name] for name in noise}
+    return _sized(experiment, done, base, _slopes(experiment, done, base))
+
+
+def _slopes(experiment: Experiment, done: Run, base: Columns) -> list[Columns]:
+    """Derivatives of the outputs to ln n and ln C along a run."""
     theta = np.log(np.array([experiment.n, experiment.C]))
-    slopes = sensitivity(theta, done.inputs, done.start, base, tuple(noise))
+    return sensitivity(theta, done.inputs, done.start, base, experiment.outputs)
+
+
+def _sized(experiment: Experiment, done: Run, base: Columns, slopes: list[Columns]) -> Sized:
+    noise = {name: float(np.std(done.noisy[name] - done.clean[name])) for name in experiment.outputs}
+    difference = {name: done.clean[name] - base[name] for name in noise}
     rows = slice(BURN_IN, None)
-    shift, left = project(difference, slopes, noise, rows)
-    return Sized(
-        done, _rms(difference, noise, rows), _rms(left, noise, rows), (float(shift[0]), float(shift[1])), noise
-    )
+    left = project(difference, slopes, noise, rows)
+    return Sized(done, _rms(difference, noise, rows), _rms(left, noise, rows))
 
 
-def _rms(columns: dict[str, Array], noise: dict[str, float], rows: slice) -> dict[str, float]:
+def _rms(columns: Columns, noise: dict[str, float], rows: slice) -> dict[str, float]:
     return {name: float(np.sqrt(np.mean(columns[name][rows] ** 2))) / noise[name] for name in noise}
 
 
 def scale_to(
-    experiment: Experiment, spec: Spec, target: float, limits: tuple[float, float]
+    experiment: Experiment, spec: Spec, target: float, limits: tuple[float, float], pilot: Run
 ) -> tuple[Spec, Sized] | None:
-    """Search the amplitude that gives the target size (within 30 %); the nearest found, or None if nothing runs."""
+    """Search the amplitude that gives the target size (within 30 %); the nearest found, or None if nothing runs.
+
+    In open loop the search holds each trial against the pilot, the run without effects; the size handed back is exact.
+    """
+    slopes = _slopes(experiment, pilot, pilot.clean) if experiment.loop == "open" else None
     best: tuple[Spec, Sized] | None = None
     amplitude, roof = spec.amplitude, limits[1] if spec.amplitude > 0 else limits[0]
-    for _ in range(5):
+    for _ in range(_SEARCH):
         trial = replace(spec, amplitude=amplitude)
         try:
-            sized = measure(experiment, [trial])
+            if slopes is None:
+                sized = measure(experiment, [trial])
+            else:
+                sized = _sized(experiment, run(experiment, [trial]), pilot.clean, slopes)
         except SimulationError:
             roof = 0.7 * abs(amplitude)
             amplitude *= 0.5
@@ -80,11 +88,11 @@ def scale_to(
         size = sized.of(spec.site)
         if best is None or abs(np.log(size / target)) < abs(np.log(best[1].of(spec.site) / target)):
             best = (trial, sized)
-        if abs(np.log(size / target)) < 0.26:
-            break
-        wish = abs(amplitude) * float(np.clip(target / max(size, 1e-9), 0.1, 4.0))
-        wish = min(wish, roof)
-        if abs(wish - abs(amplitude)) < 1e-3 * abs(amplitude):
+        wish = min(abs(amplitude) * float(np.clip(target / max(size, 1e-9), 0.1, 4.0)), roof)
+        if abs(np.log(size / target)) < 0.26 or abs(wish - abs(amplitude)) < 0.05 * abs(amplitude):
             break
         amplitude = float(np.copysign(wish, amplitude))
-    return best
+    if best is None or slopes is None:
+        return best
+    done = best[1].done
+    return best[0], _sized(experiment, done, nominal(experiment, done), slopes)
