@@ -314,7 +314,7 @@ class PlantRecord:
     sample
         What is measured.
     outputs
-        True outputs (ny,), NaN in a replayed record.
+        True outputs (ny,), without what effects on sensors add; NaN in a replayed record.
     parameters
         True parameter vector (np,) during the interval, NaN in a replayed record.
     inputs

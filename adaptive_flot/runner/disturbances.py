@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.plant import Disturbances
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.scenario_file import DisturbancePart
@@ -12,8 +12,12 @@ from adaptive_flot.runner.scenario_file import DisturbancePart
 EXACT = DisturbancePart()
 
 
-def disturbances(scenario: Scenario, seed: int) -> Disturbances:
-    """Disturbances of a run, its measurement noise drawn from the seed, apart from that of the outputs."""
+def disturbances(scenario: Scenario, seed: int, model: Model | None = None) -> Disturbances:
+    """Disturbances of a run, its measurement noise drawn from the seed, apart from that of the outputs.
+
+    What is known of parameters comes as the parameter vector of `model`, that of estimator and controller; default the
+    scenario's model.
+    """
     generator = np.random.default_rng([seed, 3])
     schedule, imposed = scenario.schedule(seed), scenario.imposed
     inputs = np.full_like(schedule, np.nan)
@@ -22,19 +26,19 @@ def disturbances(scenario: Scenario, seed: int) -> Disturbances:
     for j in imposed:
         part = scenario.file.disturbances.get(scenario.model.inputs[j].column, EXACT)
         shown[:, j] = known(scenario, part, inputs[:, j], float(inputs[0, j]), generator)
-    return Disturbances(inputs, shown, _parameters(scenario, generator))
+    return Disturbances(inputs, shown, _parameters(scenario, model or scenario.model, generator))
 
 
-def _parameters(scenario: Scenario, generator: np.random.Generator) -> FloatArray | None:
+def _parameters(scenario: Scenario, model: Model, generator: np.random.Generator) -> FloatArray | None:
     inputs = [q.column for q in scenario.model.inputs]
     if not scenario.measured_parameters:
         return None
-    true, nominal = scenario.true_parameters(), scenario.model.parameter_values
+    true, nominal = scenario.true_parameters(), model.parameter_values
     found = np.tile(nominal, (len(true), 1))
     for key, part in scenario.file.disturbances.items():
         if key not in inputs:
-            i = scenario.model.index("parameters", key)
-            found[:, i] = known(scenario, part, true[:, i], float(nominal[i]), generator)
+            i, j = model.index("parameters", key), scenario.plant_model.index("parameters", key)
+            found[:, i] = known(scenario, part, true[:, j], float(nominal[i]), generator)
     return found
 
 

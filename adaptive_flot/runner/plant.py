@@ -11,6 +11,7 @@ from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import LateValue, PlantRecord, Sample
+from adaptive_flot.runner.true_outputs import TrueOutputs
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class SimulatedPlant:
         self._noise = noise
         self._disturbances = disturbances
         self._step = Stepper(model, dt, accurate=accurate).call
+        self._true = TrueOutputs(model)
 
     def init(self) -> SimulatedState:
         """Start at the initial state."""
@@ -99,7 +101,8 @@ class SimulatedPlant:
         measured[list(self._late)] = np.nan
         known, pending = self._arrived((*state.pending, *taken), now)
         sample = Sample(now, shown, measured, known, known_parameters)
-        return SimulatedState(k + 1, x, pending), PlantRecord(sample, y, p, acting)
+        true = self._true(y, now, x, acting, p)
+        return SimulatedState(k + 1, x, pending), PlantRecord(sample, true, p, acting)
 
     def _around(self, row: int, inputs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray | None]:
         """Inputs that act, inputs that are known, and known parameters."""

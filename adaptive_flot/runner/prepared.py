@@ -47,23 +47,30 @@ class Prepared:
         chosen = {name: estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
         return cls(scenario, chosen, scenario.file.controllers)
 
+    def setup(self, name: str) -> Setup:
+        """What the estimator of that name is built for; only the oracle is shown the truth, and the plant's model."""
+        s = self.scenario
+        if self.estimators[name].use != "oracle":
+            return s.setup
+        known = tuple(p for p in s.setup.parameters if p in s.plant_model.names("parameters"))
+        return replace(s.setup, model=s.plant_model, parameters=known, truth=s.true_parameters())
+
     def estimator(self, name: str) -> AnyEstimator:
-        """The estimator of that name; only the oracle is shown the truth."""
+        """The estimator of that name."""
         if name not in self._built:
             use, options = self.estimators[name].use, self.estimators[name].options
-            setup = self.scenario.setup
-            if use == "oracle":
-                setup = replace(setup, truth=self.scenario.true_parameters())
+            setup = self.setup(name)
             factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
             made = construct(factory, use, "estimator", setup, **options)
             self._built[name] = taking_late_values(made, self.scenario.longest_dead_time)
         return self._built[name]
 
-    def controller(self, name: str, seed: int) -> AnyController:
-        """A controller of that name for the run of a seed."""
+    def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
+        """A controller of that name for the run of a seed, with the model of the estimator that it listens to."""
         use, options = self.controllers[name].use, self.controllers[name].options
         s = self.scenario
-        setup = ControllerSetup(s.model, s.dt, s.plan(seed), s.setup.parameters, s.limits, s.prices)
+        told = s.setup if estimator is None else self.setup(estimator)
+        setup = ControllerSetup(told.model, s.dt, s.plan(seed), told.parameters, s.limits, s.prices)
         made: AnyController = construct(
             load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options
         )

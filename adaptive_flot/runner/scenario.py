@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from adaptive_flot.economics import Prices
 from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.processes.effect_entry import attach
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import Limits, Setup
 from adaptive_flot.resources import scenario_folder
@@ -36,9 +37,11 @@ class Scenario:
     file
         Its content.
     model
-        The nominal model.
+        The nominal model: that of estimators and controllers, the oracle's apart.
     setup
         What estimators are built for.
+    plant_model
+        The plant's own model, which may have other effects and so other states and parameters after those in common.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Scenario:
     file: ScenarioFile
     model: Model
     setup: Setup
+    plant_model: Model
 
     @property
     def dt(self) -> float:
@@ -122,10 +126,10 @@ class Scenario:
         return [self.model.index("parameters", key) for key, part in parts if key not in inputs and part.measured]
 
     def true_parameters(self) -> FloatArray:
-        """Plant parameters (N, np) in each interval."""
-        p = np.tile(self.model.parameter_values, (len(self.starts), 1))
+        """Parameters of the plant's model (N, np) in each interval."""
+        p = np.tile(self.plant_model.parameter_values, (len(self.starts), 1))
         for name, change in self.file.parameters.items():
-            p[:, self.model.index("parameters", name)] *= change.factor(self.starts)
+            p[:, self.plant_model.index("parameters", name)] *= change.factor(self.starts)
         return p
 
     @property
@@ -202,8 +206,11 @@ def load_scenario(name: Path | str) -> Scenario:
     except ValidationError as error:
         raise ScenarioError(f"{path}: {first_problem(error, ScenarioFile)}") from error
     with located(path):
-        model = make_model(file.model, cell=file.cell, folder=path.parent)
-        scenario = Scenario(path.stem, path, file, model, _setup(file, model))
+        model = attach(make_model(file.model, cell=file.cell, folder=path.parent), file.effects)
+        plant = model
+        if file.plant.effects is not None:
+            plant = attach(model.without_effects(), file.plant.effects, "plant.effects")
+        scenario = Scenario(path.stem, path, file, model, _setup(file, model), plant)
         check_scenario(scenario)
     return scenario
 

@@ -38,9 +38,10 @@ def check_scenario(scenario: Scenario) -> None:
         model.with_parameters(file.initial_estimate.guess)
     with located("parameters"):
         for name in file.parameters:
-            values = scenario.true_parameters()[:, model.index("parameters", name)]
+            plant = scenario.plant_model
+            values = scenario.true_parameters()[:, plant.index("parameters", name)]
             for extreme in (values.min(), values.max()):
-                model.with_parameters({name: float(extreme)})
+                plant.with_parameters({name: float(extreme)})
     _check_closed_loop(scenario)
     _check_initial_state(scenario)
     _check_disturbances(scenario)
@@ -80,7 +81,7 @@ def _check_disturbances(scenario: Scenario) -> None:
 
 
 def _check_initial_state(scenario: Scenario) -> None:
-    states = {q.column: q for q in scenario.model.states}
+    states = {q.column: q for q in (*scenario.plant_model.states, *scenario.model.states)}
     for key, value in scenario.file.initial_state.items():
         if key not in states:
             raise ScenarioError(f"initial_state: unknown state {key!r}; {near_match(key, states)}")

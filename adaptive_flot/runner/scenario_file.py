@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from adaptive_flot.economics import Prices
+from adaptive_flot.processes.effect_entry import EffectEntry
 from adaptive_flot.runner.faults import Fault
 from adaptive_flot.runner.profiles import InputProfile, ParameterProfile
 
@@ -40,9 +41,11 @@ class DisturbancePart(_Part):
 
 
 class PlantPart(_Part):
-    """How the plant is simulated: `fast` is the Runge-Kutta step, `accurate` IDAS on the DAE."""
+    """How the plant is simulated (`fast` is the Runge-Kutta step, `accurate` IDAS on the DAE), and its effects."""
 
     integrator: Literal["fast", "accurate"] = "fast"
+    effects: list[EffectEntry] | None = None
+    """All effects of the plant, instead of those of the model; default the plant has the effects of the model."""
 
 
 class Adapt(_Part):
@@ -106,7 +109,10 @@ class ScenarioFile(_Part):
 
     description: str
     model: str = "flotation"
+    """Model of estimators and controllers, and the plant's where `plant` says nothing else; a model file too."""
     cell: str | None = None
+    effects: list[EffectEntry] = Field(default_factory=list)
+    """Further effects of the model."""
     duration_s: float = Field(gt=0)
     sampling_s: float = Field(default=1.0, gt=0)
     seeds: list[Annotated[int, Field(ge=0)]] = Field(default=[1], min_length=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.protocols import PlantRecord
 from adaptive_flot.runner.disturbances import disturbances
@@ -12,30 +12,34 @@ from adaptive_flot.runner.plant import SimulatedPlant
 from adaptive_flot.runner.scenario import Scenario
 
 
-def make_plant(scenario: Scenario, seed: int) -> SimulatedPlant:
-    """Plant of a run, with its own drift and noise."""
+def make_plant(scenario: Scenario, seed: int, model: Model | None = None) -> SimulatedPlant:
+    """Plant of a run, with its own effects, drift and noise.
+
+    `model` is that of the estimator and the controller, whose parameters the plant's instruments tell.
+    """
     parameters = scenario.true_parameters()
-    x0 = initial_state(scenario, scenario.schedule(seed)[0], parameters[0])
+    x0 = initial_state(scenario, scenario.plant_model, scenario.schedule(seed)[0], parameters[0])
     noise = measurement_noise(scenario, seed)
     accurate = scenario.file.plant.integrator == "accurate"
     return SimulatedPlant(
-        scenario.model,
+        scenario.plant_model,
         scenario.dt,
         x0,
         parameters,
         noise,
-        disturbances=disturbances(scenario, seed),
+        disturbances=disturbances(scenario, seed, model),
         accurate=accurate,
         dead_time=scenario.dead_times,
     )
 
 
-def initial_state(scenario: Scenario, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
-    """State (nx,) in which a run starts: steady at its first inputs (nu,), but for what `initial_state` says."""
-    x0 = steady_state(scenario.model, inputs, parameters).state
-    columns = [q.column for q in scenario.model.states]
+def initial_state(scenario: Scenario, model: Model, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
+    """State (nx,) of a model in which a run starts: steady at its first inputs (nu,) but for `initial_state`."""
+    x0 = steady_state(model, inputs, parameters).state
+    columns = [q.column for q in model.states]
     for column, value in scenario.file.initial_state.items():
-        x0[columns.index(column)] = value
+        if column in columns:
+            x0[columns.index(column)] = value
     return x0
 
 

@@ -135,16 +135,21 @@ def run_one(
     scenario, plugin = prepared.scenario, prepared.estimators[estimator_name]
     schedule = scenario.schedule(seed)
     scenario.model.check_inputs(schedule, scenario.starts, where=f"inputs of seed {seed}")
-    estimator = prepared.estimator(estimator_name)
+    estimator, setup = prepared.estimator(estimator_name), prepared.setup(estimator_name)
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
-            initial["fit"] = prepared.batch.fit(record_of(scenario, steps))
+            initial["fit"] = prepared.batch.fit(record_of(scenario, scenario.setup, steps))
         prior = initial["fit"].prior(steps[-1].plant.sample.time)
-        return prior if plugin.start == "initial_estimate" else nominal_start(scenario, steps, prior)
+        if plugin.start == "initial_estimate" and setup.model is scenario.model:
+            return prior
+        return nominal_start(scenario, setup, steps, prior)
 
     plant, controller = with_faults(
-        scenario, seed, make_plant(scenario, seed), prepared.controller(controller_name, seed)
+        scenario,
+        seed,
+        make_plant(scenario, seed, setup.model),
+        prepared.controller(controller_name, seed, estimator_name),
     )
     steps = run_loop(
         plant,
@@ -154,7 +159,7 @@ def run_one(
         initial_intervals=scenario.initial_rows,
         make_prior=make_prior,
     )
-    table = time_series(scenario, steps)
+    table = time_series(scenario, steps, setup)
     counts = Counter((s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps)
     seconds = time.perf_counter() - begin
     return Run(
@@ -176,5 +181,5 @@ def _accounts(scenario: Scenario, table: pd.DataFrame) -> tuple[dict[str, float]
     if scenario.prices is None or scenario.limits is None:
         return {}, {}
     late = table[table["time_s"] > scenario.fits_after + 1e-9]
-    earned = account(late, scenario.model, scenario.dt, scenario.prices, scenario.limits.grade)
+    earned = account(late, scenario.plant_model, scenario.dt, scenario.prices, scenario.limits.grade)
     return earned, control_account(late)

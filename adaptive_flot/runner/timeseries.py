@@ -11,22 +11,23 @@ import pandas as pd
 from adaptive_flot import metrics
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.late import in_time
-from adaptive_flot.protocols import Sample, Status
+from adaptive_flot.protocols import Sample, Setup, Status
 from adaptive_flot.runner.loop import Step
 from adaptive_flot.runner.scenario import Scenario
 
 
-def time_series(scenario: Scenario, steps: Sequence[Step]) -> pd.DataFrame:
-    """Table of a run: `time_s`, inputs, and with suffixes.
+def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.DataFrame:
+    """Table of a run whose estimator was built for `setup`: `time_s`, inputs, and with suffixes.
 
     For inputs `_true` where what acted is not what was known; for outputs `_true`, `_measured`, `_predicted`,
     `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std`, for others that move or are
-    measured `_true`, `_known`; then `status` of the estimator, `control_status`, `decided_by`, the `faults` of a
-    scenario that has any, and, where a controller optimised, `solve_seconds`.
+    measured `_true`, `_known` (NaN where the plant, or the estimator's model, has no such parameter); then `status` of
+    the estimator, `control_status`, `decided_by`, the `faults` of a scenario that has any, and, where a controller
+    optimised, `solve_seconds`.
     """
     columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
-    columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps)
-    columns |= _others(scenario, steps)
+    columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps, setup)
+    columns |= _others(scenario, steps, setup)
     columns["status"] = [(s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps]
     columns["control_status"] = [s.decision.status.name.lower() for s in steps]
     columns["decided_by"] = [s.decision.decided_by for s in steps]
@@ -80,33 +81,40 @@ def _innovations(steps: Sequence[Step], unknown: FloatArray) -> list[Sample]:
     ]
 
 
-def _adapted(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
-    model, setup = scenario.model, scenario.setup
+def _adapted(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str, object]:
+    model, plant = scenario.model, scenario.plant_model.names("parameters")
     estimates = [s.estimate for s in steps]
     columns: dict[str, object] = {}
-    p_true = np.vstack([s.plant.parameters for s in steps])
     blank = np.full(len(setup.parameters), np.nan)
+    true = np.vstack([s.plant.parameters for s in steps])
     theta = np.vstack([e.parameters if e else blank for e in estimates])
     std = np.vstack([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
-    for j, i in enumerate(model.indices("parameters", setup.parameters)):
-        label = model.parameters[i].label
-        columns |= {f"{label}_true": p_true[:, i], f"{label}_estimate": theta[:, j], f"{label}_std": std[:, j]}
+    for name in scenario.setup.parameters:
+        label = model.parameters[model.index("parameters", name)].label
+        columns[f"{label}_true"] = _column(true, plant, name)
+        columns[f"{label}_estimate"] = _column(theta, setup.parameters, name)
+        columns[f"{label}_std"] = _column(std, setup.parameters, name)
     return columns
 
 
-def _others(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
+def _column(table: FloatArray, names: Sequence[str], name: str) -> FloatArray:
+    return table[:, names.index(name)] if name in names else np.full(len(table), np.nan)
+
+
+def _others(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str, object]:
     """Parameters that are not adapted but move in the plant, or are measured."""
-    model = scenario.model
-    adapted = model.indices("parameters", scenario.setup.parameters)
-    moved = set(model.indices("parameters", scenario.file.parameters))
-    known = [s.plant.sample.parameters for s in steps]
-    measured = set(scenario.measured_parameters)
+    plant, model = scenario.plant_model, setup.model
+    measured = [scenario.model.parameters[i] for i in scenario.measured_parameters]
+    moved = [plant.parameters[plant.index("parameters", name)] for name in scenario.file.parameters]
+    true = np.vstack([s.plant.parameters for s in steps])
+    blank = np.full(len(model.parameters), np.nan)
+    known = np.vstack([blank if s.plant.sample.parameters is None else s.plant.sample.parameters for s in steps])
     columns: dict[str, object] = {}
-    for i in sorted((moved | measured) - set(adapted)):
-        label = model.parameters[i].label
-        columns[f"{label}_true"] = [s.plant.parameters[i] for s in steps]
-        if i in measured:
-            columns[f"{label}_known"] = [np.nan if p is None else p[i] for p in known]
+    for p in dict.fromkeys((*moved, *measured)):
+        if p.name not in scenario.setup.parameters:
+            columns[f"{p.label}_true"] = _column(true, plant.names("parameters"), p.name)
+        if p in measured:
+            columns[f"{p.label}_known"] = _column(known, model.names("parameters"), p.name)
     return columns
 
 
