@@ -258,7 +258,7 @@ def test_initial_estimate_starts_from_the_guess_and_finds_the_truth(by_name: Run
     assert by_name["fixed", 1].table["n_estimate"].iloc[INITIAL] == 1.0
 
 
-@pytest.mark.parametrize(("name", "hint"), [("rpm", "did you mean 'rpem'"), ("kalman", "known: fixed, oracle, rpem")])
+@pytest.mark.parametrize(("name", "hint"), [("rpm", "did you mean 'rpem'"), ("kalman", "known: .*fixed, .*rpem")])
 def test_an_unknown_estimator_is_named_with_the_nearest(scenario: Scenario, name: str, hint: str) -> None:
     with pytest.raises(ScenarioError, match=f"short.yaml: unknown estimator '{name}'; {hint}"):
         run_scenario(scenario, [name])
