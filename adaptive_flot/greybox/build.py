@@ -30,6 +30,7 @@ class Built:
     tangent: ca.Function
     decay: ca.Function
     sites: tuple[Site, ...]
+    site_values: ca.Function
 
 
 def _collect(what: str, declared: Sequence[str], given: Mapping[str, ca.SX], model: str) -> ca.SX:
@@ -86,7 +87,9 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
     ode = ca.Function("ode", [t, x, u, p], [xdot, y, s, value], ["t", "x", "u", "p"], ["xdot", "y", "s", "z"], options)
     rates_of_decay = ca.vertcat(*(scope.decays.get(n, ca.SX(0)) for n in names["states"]))
     decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
-    return Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites.values()))
+    values = ca.vertcat(*scope.site_values.values()) if scope.site_values else ca.SX(0, 1)
+    site_values = ca.Function("site_values", [t, x, u, p, z], [ca.densify(values)], options)
+    return Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites.values()), site_values)
 
 
 def _tangent(dae: ca.Function, decay: ca.Function) -> ca.Function:

@@ -26,7 +26,7 @@ import numpy as np
 from adaptive_flot.errors import ModelError, RangeError, near_match
 from adaptive_flot.greybox.build import Built, build
 from adaptive_flot.greybox.effects import Effect, check_distinct
-from adaptive_flot.greybox.quantities import FloatArray, Kind, Parameter, Quantity
+from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
 from adaptive_flot.greybox.scope import Scope, Site
 
 __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
@@ -69,6 +69,8 @@ class Model:
     """A record without further knowledge is taken to start near a steady state; else near `initial_guess`."""
     drivers: tuple[str, ...] = ()
     """Quantities that effects may depend on, in the order of a search; default all inputs and states."""
+    known_effects: tuple[KnownEffect, ...] = ()
+    """What a search may call by name; when empty, every site with every driver."""
     effects: tuple[Effect, ...] = ()
     """Effects attached by `with_effects`; their parameters and states follow those of the model."""
 
@@ -218,6 +220,11 @@ class Model:
     def sites(self) -> tuple[Site, ...]:
         """Sites that the equations pass through, in their order."""
         return self._built.sites
+
+    @property
+    def site_values(self) -> ca.Function:
+        """`(t, x, u, p, z)` to the value at each site (sites,) before any effect; the first of several components."""
+        return self._built.site_values
 
     def fitted_effects(self) -> tuple[Effect, ...]:
         """Effects with the present parameter values as their coefficients."""

@@ -60,3 +60,12 @@ class Parameter:
     def label(self) -> str:
         """Symbol where there is one, else the name: what tables and plots print."""
         return self.symbol or self.name
+
+
+@dataclass(frozen=True)
+class KnownEffect:
+    """A physical effect that a model may lack: where it acts, what drives it, and what it is in words."""
+
+    site: str
+    driver: str
+    meaning: str

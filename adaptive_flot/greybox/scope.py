@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import casadi as ca
 
@@ -12,11 +13,19 @@ from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply
 from adaptive_flot.greybox.quantities import Kind
 
 
+Role = Literal["process", "sensor", "actuator", "feed"]
+
+
 @dataclass(frozen=True)
 class Site:
-    """A quantity that effects may act on: how they act by default, how often the equations pass it, and its unit."""
+    """A quantity that effects may act on.
+
+    `role` says what kind of thing it is, `mode` how effects act on it by default, `passed` how often the equations
+    pass it (once per component of a quantity), `unit` what its value is given in.
+    """
 
     name: str
+    role: Role
     mode: Mode
     passed: int
     unit: str | None = None
@@ -37,6 +46,7 @@ class Scope:
         self.signals: dict[str, ca.SX] = {}
         self.residuals: dict[str, tuple[ca.SX, ca.SX]] = {}
         self.sites: dict[str, Site] = {}
+        self.site_values: dict[str, ca.SX] = {}
 
     def _symbol(self, kind: Kind, name: str) -> ca.SX:
         table = self._symbols[kind]
@@ -64,14 +74,17 @@ class Scope:
         """Symbol of an algebraic variable; give its equation with `residual`."""
         return self._symbol("algebraic", name)
 
-    def site(self, name: str, value: ca.SX, mode: Mode = "factor", *, unit: str | None = None) -> ca.SX:
+    def site(
+        self, name: str, value: ca.SX, role: Role = "process", mode: Mode = "factor", *, unit: str | None = None
+    ) -> ca.SX:
         """Pass a physical quantity through a named site, once or once per component of the same quantity.
 
-        `mode` says how an effect acts here unless it says so itself: it multiplies the quantity by exp(g), or adds g
-        in the quantity's unit (sensors). With `unit`, what an effect here is given in can be checked.
+        `role` is the kind of thing it is: only sensors and actuators can lag. `mode` says how an effect acts here
+        unless it says so itself: it multiplies the quantity by exp(g), or adds g in the quantity's unit. With `unit`, what an effect here is given in can be checked.
         """
-        before = self.sites.get(name, Site(name, mode, 0, unit))
+        before = self.sites.get(name, Site(name, role, mode, 0, unit))
         self.sites[name] = replace(before, passed=before.passed + 1)
+        self.site_values.setdefault(name, value)
         for effect in self._effects:
             if effect.site == name:
                 if before.passed and effect.states():

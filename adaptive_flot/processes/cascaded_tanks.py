@@ -55,14 +55,14 @@ def make_model() -> Model:
 
 def _equations(m: Scope) -> None:
     upper, lower = m.state("upper_level"), m.state("lower_level")
-    pumped = m.site("pump_flow", m.parameter("pump_gain") * m.input("pump_voltage"), unit="V/s")
+    pumped = m.site("pump_flow", m.parameter("pump_gain") * m.input("pump_voltage"), "actuator", unit="V/s")
     root = ca.sqrt(ca.fmax(upper, _DRY))
     out = m.site("upper_outflow", m.parameter("upper_outflow") * root, unit="V/s")
     into = m.site("lower_inflow", m.parameter("lower_inflow") * root, unit="V/s")
     away = m.site("lower_outflow", m.parameter("lower_outflow") * ca.sqrt(ca.fmax(lower, _DRY)), unit="V/s")
     m.derivative("upper_level", pumped - out)
     m.derivative("lower_level", into - away)
-    m.output("level", m.site("level_sensor", lower, "offset", unit="V"))
+    m.output("level", m.site("level_sensor", lower, "sensor", "offset", unit="V"))
 
 
 def read_benchmark(path: Path | str) -> tuple[Dataset, Dataset]:

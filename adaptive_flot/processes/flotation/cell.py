@@ -14,6 +14,7 @@ import casadi as ca
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.processes.flotation import froth, pulp
 from adaptive_flot.processes.flotation.cell_file import default_cell
+from adaptive_flot.processes.flotation.effects import KNOWN_EFFECTS
 from adaptive_flot.processes.flotation.parameters import Cell
 
 
@@ -74,6 +75,7 @@ def make_model(cell: Cell | None = None) -> Model:
         ),
         algebraic=(Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),),
         drivers=("air_flow", "feed_flow", "level", "froth_depth", "grade", "solids", "valuable_solids"),
+        known_effects=KNOWN_EFFECTS,
         max_step_s=_max_step(cell),
         equations=lambda m: _equations(m, masses, ratios),
         initial_guess={
@@ -126,9 +128,9 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     m.signal("valuable_solids", mass[0] / v_pulp)
     m.signal("grade", mass[0] / (total_mass + TRACE))
 
-    q_air = m.site("air_flow", m.input("air_flow"), unit="m3/s")
-    q_feed = m.site("feed_flow", m.input("feed_flow"), unit="m3/s")
-    q_tails = m.site("tails_valve", m.state("tails_flow"), unit="m3/s")
+    q_air = m.site("air_flow", m.input("air_flow"), "actuator", unit="m3/s")
+    q_feed = m.site("feed_flow", m.input("feed_flow"), "feed", unit="m3/s")
+    q_tails = m.site("tails_valve", m.state("tails_flow"), "actuator", unit="m3/s")
     jg = q_air / area
 
     # Pulp
@@ -161,7 +163,7 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
 
     # Minerals: flow to the concentrate F_i and mass balance (paper, mass-balance)
     feed = m.parameter_group("feed_concentration")
-    feed[0] = m.site("feed_grade", feed[0], unit="kg/m3")
+    feed[0] = m.site("feed_grade", feed[0], "feed", unit="kg/m3")
     s_b = 6 * vg / d_int  # bubble surface area flux (Part I, 53)
     to_concentrate, graded = [], []
     for i, (mi, p_i) in enumerate(zip(mass, m.parameter_group("floatability"), strict=True)):
@@ -192,15 +194,15 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
         m.derivative(name, (1 + gas) / v_pulp * balance, decay=-vk / h_p)
 
     # Level loop on the measured level (paper, Qtails, with the stable sign)
-    level = m.site("level_sensor", h_p, "offset", unit="m")
+    level = m.site("level_sensor", h_p, "sensor", "offset", unit="m")
     gain = m.parameter("proportional_gain")
     error = level - m.input("level_setpoint")
     m.derivative("tails_flow", gain * m.time_derivative(level) + gain / m.parameter("integral_time") * error)
 
     grade = graded[0] / sum(graded[1:], graded[0])  # paper, grade
-    m.output("concentrate_grade", m.site("grade_sensor", grade, "offset", unit="-"))
+    m.output("concentrate_grade", m.site("grade_sensor", grade, "sensor", "offset", unit="-"))
     m.output("recovery", to_concentrate[0] / (feed[0] * q_feed))
-    m.output("tails_flow", m.site("tails_sensor", q_tails, unit="m3/s"))
+    m.output("tails_flow", m.site("tails_sensor", q_tails, "sensor", unit="m3/s"))
     m.output("level", level)
-    m.output("concentrate_flow", m.site("concentrate_flow_sensor", q_conc, unit="m3/s"))
-    m.output("air_recovery", m.site("air_recovery_sensor", alpha * vg * area / q_air, unit="-"))
+    m.output("concentrate_flow", m.site("concentrate_flow_sensor", q_conc, "sensor", unit="m3/s"))
+    m.output("air_recovery", m.site("air_recovery_sensor", alpha * vg * area / q_air, "sensor", unit="-"))

@@ -1,0 +1,1 @@
+"""From the residual between a model and a measured record to the physical effect that the model lacks."""

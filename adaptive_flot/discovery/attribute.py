@@ -1,0 +1,188 @@
+"""Attribute: refit the best-scored candidates in full, each with its own noise model, and rank them.
+
+A name is (site, driver); its forms compete inside it, so that no name wins or loses for the shape of one curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.parallel import parallel_map
+from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.discovery.scoring import Score, Scorer
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import Model
+
+SHORTLIST = 10
+"""Candidates that are refitted in full."""
+FORMS_EACH = 2
+LEAST_SHARE = 0.3
+"""A candidate whose first-order gain is below this share of the best one's is not refitted."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A model with one or more further effects, fitted.
+
+    Attributes
+    ----------
+    names
+        (site, driver) of each effect, in the order they were added.
+    known
+        Whether each of them may be called by name.
+    fit
+        Its fit.
+    gain
+        Drop of minus two log-likelihood against the base model.
+    delta_bic
+        Its criterion less that of the base model; negative is better.
+    """
+
+    names: tuple[tuple[str, str], ...]
+    known: tuple[bool, ...]
+    fit: Fit
+    gain: float
+    delta_bic: float
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Its effects with fitted coefficients."""
+        return self.fit.model.fitted_effects()[-len(self.names) :] if self.names else ()
+
+
+def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
+    """Candidates worth a full fit, best first.
+
+    Left out is what adds nothing to a constant at its own site, and the second of two drivers that are one another's
+    mirror (level and froth depth) unless it is the one with a name.
+    """
+    scores = scorer.scores()
+    best = scores[0].gain if scores else 0.0
+    constant = {s.candidate.site.name: s.penalised for s in scores if s.candidate.driver == "constant"}
+    kept: list[Score] = []
+    for score in scores:
+        c = score.candidate
+        if score.penalised <= 0 or score.gain < LEAST_SHARE * best:
+            continue
+        if c.driver != "constant" and score.penalised <= constant.get(c.site.name, -np.inf) + 5.0:
+            continue
+        twin = next((k for k in kept if _twins(k, score)), None)
+        if twin is not None:
+            if c.known and not twin.candidate.known:
+                kept[kept.index(twin)] = score
+            continue
+        kept.append(score)
+    return kept[:count]
+
+
+def _twins(a: Score, b: Score) -> bool:
+    """Whether two candidates at one site explain exactly the same: their drivers are functions of one another."""
+    same = a.candidate.site.name == b.candidate.site.name and a.variant.effect.form == b.variant.effect.form
+    return same and a.variant.effect.form == "curve" and abs(a.gain - b.gain) < 1e-3 * max(a.gain, 1.0)
+
+
+def refit(
+    fitter: Fitter,
+    base: Fit,
+    scorer: Scorer,
+    scores: list[Score],
+    before: Alternative | None = None,
+    processes: int = 1,
+    done: Callable[[], None] = lambda: None,
+) -> list[Alternative]:
+    """Fit each shortlisted candidate in its best forms on top of `before` (the base model by default), best first."""
+    start = before.fit if before else base
+    jobs = [(i, s) for i, score in enumerate(scores) for s in _forms(scorer, score)]
+
+    def work(job: tuple[int, Score]) -> tuple[int, Fit | None]:
+        i, score = job
+        fit = fit_variant(fitter, start, score)
+        return i, replace(fit, model=None) if fit else None  # type: ignore[arg-type]  # a model does not pickle
+
+    best: dict[int, Alternative] = {}
+    names = before.names if before else ()
+    known = before.known if before else ()
+    for (_, score), (i, bare) in zip(jobs, parallel_map(work, jobs, processes, done), strict=True):
+        if bare is None:
+            continue
+        model = start.model.with_effects([score.variant.effect])
+        values = dict(zip(bare.names, map(float, bare.values), strict=True))
+        fit = replace(bare, model=model.with_parameters(values))
+        found = Alternative(
+            (*names, score.candidate.name),
+            (*known, score.candidate.known),
+            fit,
+            base.loss - fit.loss,
+            fit.bic - base.bic,
+        )
+        if i not in best or found.fit.bic < best[i].fit.bic:
+            best[i] = found
+    return sorted(best.values(), key=lambda a: a.fit.bic)
+
+
+def _forms(scorer: Scorer, score: Score) -> list[Score]:
+    """Best variant of each form (and mode) of a candidate, if it comes near the best."""
+    found: dict[tuple[str, str | None], Score] = {}
+    for s in scorer.variant_scores(score.candidate):
+        key = s.variant.effect.form, s.variant.effect.mode
+        if key not in found and s.gain > 0.5 * score.gain:
+            found[key] = s
+    return list(found.values())[:FORMS_EACH]
+
+
+def fit_variant(fitter: Fitter, start: Fit, score: Score) -> Fit | None:
+    """Full fit of one variant, from its first-order solution and, should that not simulate, from next to nothing."""
+    effect = score.variant.effect
+    model = start.model.with_effects([effect])
+    names = tuple(effect.parameter(c.name) for c in effect.terms if c.name in free_coefficients(effect))
+    free = (*start.names, *names)
+    bounds = {effect.parameter(k): b for k, b in shape_bounds(fitter.problem).items()}
+    first = {effect.parameter(k): v for k, v in score.start.items()}
+    first |= {effect.parameter(k): v for k, v in fixed_coefficients(effect).items()}
+    found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds=2)
+    if found is None:
+        shape = {effect.parameter(k): v for k, v in score.variant.start}
+        small = {k: v if k in shape else 0.1 * v for k, v in first.items()}
+        found = fitter.fit(model, free, limited(model, effect, small), start, bounds, rounds=2)
+    return found
+
+
+def free_coefficients(effect: Effect) -> tuple[str, ...]:
+    """Coefficients that a search fits: a lag or dead time is there in full or not, its share is not fitted."""
+    names = tuple(c.name for c in effect.terms)
+    return tuple(n for n in names if n != "amplitude") if effect.driver in ("lag", "delay") else names
+
+
+def fixed_coefficients(effect: Effect) -> dict[str, float]:
+    """Coefficients that a search holds: the share of a lag or dead time."""
+    return {"amplitude": 1.0} if effect.driver in ("lag", "delay") else {}
+
+
+def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:
+    """Start values inside their ranges, and a change at a site of at most a factor of two and a half."""
+    found = {}
+    for c in effect.terms:
+        name = effect.parameter(c.name)
+        if name in start:
+            parameter = model.parameters[model.index("parameters", name)]
+            value = float(np.clip(start[name], parameter.lower, parameter.upper))
+            log_factor = c.name.startswith(("amplitude", "value")) and effect.shape.static is not None
+            found[name] = float(np.clip(value, -0.9, 0.9)) if log_factor else value
+    return found
+
+
+def shape_bounds(problem: Problem) -> dict[str, tuple[float, float]]:
+    """Ranges of shape coefficients that the record sets: an event inside it, a duration not longer than it."""
+    t = problem.record.time
+    span = float(t[-1] - t[0])
+    margin = 0.02 * span
+    return {
+        "onset": (float(t[0]) + margin, float(t[-1]) - margin),
+        "duration": (1.0, span),
+        "time_constant": (0.2 * problem.record.dt, span),
+        "dead_time": (2.0 * problem.record.dt, 0.2 * span),
+    }

@@ -1,0 +1,190 @@
+"""The catalogue of a search: for each site and driver the courses that score it and the effects to fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from adaptive_flot.discovery.responses import Course, Responses
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms import spline_basis
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.scope import Site
+
+ONSETS = 18
+"""Steps at this many onsets score an event in time."""
+TIME_KNOTS = 7
+DRIVER_KNOTS = 4
+LAGS_S = (5.0, 15.0, 45.0, 120.0)
+DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
+LEAST_RANGE = 0.02
+"""A driver that moves by less than this share of its mean tells nothing about a dependence."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to score and fit a candidate.
+
+    Attributes
+    ----------
+    effect
+        The effect at amplitude zero, with its settings.
+    courses
+        Courses at the site (r of them) whose linear combination it is near amplitude zero.
+    coefficients
+        Coefficient that each course is the derivative of; "" where there is none (see `start`).
+    start
+        Further values to start a fit from (onset, time constant).
+    """
+
+    effect: Effect
+    courses: tuple[Course, ...]
+    coefficients: tuple[str, ...]
+    start: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A site and a driver, known by name or not, with the variants that stand for it."""
+
+    site: Site
+    driver: str
+    known: bool
+    variants: tuple[Variant, ...]
+
+    @property
+    def name(self) -> tuple[str, str]:
+        """Site and driver."""
+        return self.site.name, self.driver
+
+
+def catalogue(model: Model, responses: Responses) -> list[Candidate]:
+    """All candidates of a model that the record can tell anything about.
+
+    A driver that hardly moves is left out; lag and delay are those of sensors and actuators; what the model has already
+    is not offered again, and a change that only rescales an adapted parameter neither.
+    """
+    known = {(k.site, k.driver) for k in model.known_effects}
+    taken = {(e.site, e.driver) for e in model.effects}
+    time = responses.problem.record.time
+    found = []
+    for site in model.sites:
+        for driver in ("constant", "time", *responses.drivers, "lag", "delay"):
+            if (site.name, driver) in taken or not _makes_sense(site, driver):
+                continue
+            if known and driver in ("lag", "delay") and (site.name, driver) not in known:
+                continue
+            variants = tuple(_variants(site, driver, time, responses))
+            if variants:
+                found.append(Candidate(site, driver, not known or (site.name, driver) in known, variants))
+    return found
+
+
+def _makes_sense(site: Site, driver: str) -> bool:
+    if driver in ("lag", "delay"):
+        return site.role in ("sensor", "actuator") and site.passed == 1
+    return True
+
+
+def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -> Iterator[Variant]:
+    offset = site.mode == "offset"
+    ones = np.ones(len(time))
+
+    def course(values: FloatArray) -> Course:
+        return Course(site.name, values, offset)
+
+    if driver == "constant":
+        yield Variant(Effect(site.name, driver, "shift"), (course(ones),), ("amplitude",))
+        if site.role == "sensor":  # the other kind of error: a gain where an offset is usual, an offset where a gain is
+            other = Effect(site.name, driver, "shift", mode="factor" if offset else "offset")
+            yield Variant(other, (Course(site.name, ones, not offset),), ("amplitude",))
+    elif driver == "time":
+        yield from _in_time(site, time, offset)
+    elif driver in ("lag", "delay"):
+        yield from _late(site, driver, responses)
+    else:
+        yield from _on_signal(site, driver, responses.drivers[driver], offset)
+
+
+def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:
+    low, high = float(time[0]), float(time[-1])
+    span = high - low
+    onsets = np.linspace(low, high, ONSETS + 2)[1:-1]
+    for onset in onsets:
+        step = Effect(site.name, "time", "step", settings={"width": max(2.0, span / 1000)})
+        values = (time >= onset).astype(float)
+        yield Variant(step, (Course(site.name, values, offset),), ("amplitude",), (("onset", float(onset)),))
+    for duration in (0.15 * span, 0.4 * span):
+        for onset in onsets[:-2:3]:
+            values = np.clip((time - onset) / duration, 0, 1)
+            ramp = Effect(site.name, "time", "ramp")
+            start = (("onset", float(onset)), ("duration", float(duration)))
+            yield Variant(ramp, (Course(site.name, values, offset),), ("amplitude",), start)
+    knots = tuple(float(k) for k in np.linspace(low, high, TIME_KNOTS))
+    yield _curve(site, "time", time, knots, offset)
+
+
+def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool) -> Iterator[Variant]:
+    reference = float(np.median(values))
+    spread = float(np.quantile(values, 0.98) - np.quantile(values, 0.02))
+    if not (reference > 0 and spread > LEAST_RANGE * reference):
+        return
+    ones = np.ones(len(values))
+    logs = np.log(np.maximum(values / reference, 1e-6))
+    settings = {"reference": reference}
+    columns = Course(site.name, ones, offset), Course(site.name, logs, offset)
+    yield Variant(Effect(site.name, driver, "power", settings=settings), columns, ("amplitude", "exponent"))
+    knots = _knots(values)
+    if knots is not None:
+        yield _curve(site, driver, values, knots, offset)
+
+
+def _knots(values: FloatArray) -> tuple[float, ...] | None:
+    """Knots at evenly spaced values between the ends of what the record covers."""
+    low, high = np.quantile(values, [0.02, 0.98])
+    knots = np.linspace(low, high, DRIVER_KNOTS)
+    counts = np.histogram(values, knots)[0]
+    return tuple(float(k) for k in knots) if np.all(counts > 0.02 * len(values)) else None
+
+
+def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...], offset: bool) -> Variant:
+    effect = Effect(site.name, driver, "curve", settings={"knots": knots})
+    basis = spline_values(values, knots)
+    names = tuple(f"value_{k + 1}" for k in range(len(knots)))
+    return Variant(effect, tuple(Course(site.name, b, offset) for b in basis.T), names)
+
+
+def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
+    """Cardinal natural splines (N, knots) at the values (N,): numbers from the very function the model uses."""
+    import casadi as ca
+
+    x = ca.SX.sym("x")
+    function = ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])
+    found: FloatArray = np.array(function.map(len(values))(values)).T
+    return found
+
+
+def _late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
+    v = responses.site_values[site.name]
+    dt = responses.problem.record.dt
+    scale = float(np.median(np.abs(v))) or 1.0
+    for constant in LAGS_S if driver == "lag" else DELAYS_S:
+        if driver == "lag":
+            effect = Effect(site.name, driver, "lag", settings={"scale": scale})
+            keep = float(np.exp(-dt / constant))
+            late = _first_order(v, keep)
+            name = "time_constant"
+        else:
+            effect = Effect(site.name, driver, "delay", settings={"scale": scale})
+            rows = max(1, round(constant / dt))
+            late = np.concatenate([np.full(rows, v[0]), v[:-rows]])
+            name = "dead_time"
+        yield Variant(effect, (Course(site.name, late - v, True),), ("amplitude",), ((name, constant),))
+
+
+def _first_order(v: FloatArray, keep: float) -> FloatArray:
+    filtered: FloatArray = lfilter([1 - keep], [1, -keep], v, zi=[keep * v[0]])[0]
+    return filtered

@@ -1,0 +1,140 @@
+"""What the noise of each output looks like: constant or proportional, white or autoregressive, with outliers.
+
+Every alternative gets its own noise model. A noise model that was fitted once to a suspect residual hides slow effects:
+it explains the drift as coloured noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adaptive_flot.greybox.model import FloatArray
+
+CLIP = 3.0
+"""Innovations count up to this many standard deviations (Huber): an outlier does not steer a fit."""
+_CLIPPED_VARIANCE = 0.99503
+"""E[min(z^2, CLIP^2)] of a standard normal z."""
+MOST_LAGS = 3
+FEWEST_PAIRS = 200
+"""Consecutive measured pairs that an autoregressive noise model asks for; a sparse assay has white noise."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of m outputs.
+
+    Attributes
+    ----------
+    std
+        Standard deviation of the innovations (m,), in units of the weights.
+    lags
+        Autoregressive coefficients (m, p), zero where an output needs fewer.
+    """
+
+    std: FloatArray
+    lags: FloatArray
+
+    def whiten(self, series: FloatArray) -> FloatArray:
+        """Whitened series over the innovation's standard deviation; series (N, m) or (N, m, q), weighted already."""
+        shape = (1, -1) + (1,) * (series.ndim - 2)
+        white = series.copy()
+        for i in range(self.lags.shape[1]):
+            white[i + 1 :] -= self.lags[:, i].reshape(shape) * series[: -(i + 1)]
+        scaled: FloatArray = white / self.std.reshape(shape)
+        return scaled
+
+    def stationary_std(self) -> FloatArray:
+        """Standard deviation of the noise itself (m,), from its spectrum."""
+        omega = np.linspace(0, np.pi, 2048)
+        found = []
+        for std, lags in zip(self.std, self.lags, strict=True):
+            response = 1 - sum(a * np.exp(-1j * omega * (i + 1)) for i, a in enumerate(lags))
+            found.append(std * np.sqrt(np.mean(1 / np.abs(response) ** 2)))
+        return np.array(found)
+
+
+def clipped_std(e: FloatArray) -> float:
+    """Return the standard deviation of the finite entries, each counted up to CLIP of it (Huber's proposal 2)."""
+    z = e[np.isfinite(e)]
+    if z.size == 0:
+        return float("nan")
+    std = 1.4826 * float(np.median(np.abs(z))) or float(np.sqrt(np.mean(z**2)))
+    for _ in range(30):
+        if std <= 0:
+            return 0.0
+        new = std * float(np.sqrt(np.mean(np.minimum((z / std) ** 2, CLIP**2)) / _CLIPPED_VARIANCE))
+        if abs(new - std) < 1e-6 * std:
+            return new
+        std = new
+    return std
+
+
+def fit_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray) -> Noise:
+    """Noise model of a weighted residual (N, m), fitted on the rows (N,) that are true; NaN where missing.
+
+    The order of the autoregression (0 to 3) is chosen per output by the Bayesian information criterion. `floor` (m,) is
+    the smallest standard deviation believed.
+    """
+    m = residual.shape[1]
+    lags, std = np.zeros((m, MOST_LAGS)), np.zeros(m)
+    for j in range(m):
+        std[j], lags[j] = _one_output(residual[:, j], rows)
+    return Noise(np.maximum(std, floor), lags)
+
+
+def _one_output(r: FloatArray, rows: NDArray[np.bool_]) -> tuple[float, FloatArray]:
+    nothing = np.zeros(MOST_LAGS)
+    first = clipped_std(r[rows])
+    if not first > 0:
+        return first, nothing
+    limit = CLIP * first
+    clipped = np.clip(r, -limit, limit)  # an outlier must not pose as correlation
+    past = np.column_stack([np.concatenate([np.full(i + 1, np.nan), clipped[: -(i + 1)]]) for i in range(MOST_LAGS)])
+    usable = rows & np.isfinite(r) & np.isfinite(past).all(axis=1)
+    count = int(usable.sum())
+    if count < FEWEST_PAIRS:
+        return first, nothing
+    best, chosen = np.inf, (first, nothing)
+    for order in range(MOST_LAGS + 1):
+        a = np.zeros(MOST_LAGS)
+        if order:
+            a[:order] = np.linalg.lstsq(past[usable, :order], clipped[usable], rcond=None)[0]
+            a = _stable(a)
+        std = clipped_std(r[usable] - past[usable] @ a)
+        score = 2 * count * np.log(max(std, 1e-300)) + order * np.log(count)
+        if score < best - 1e-9:
+            best, chosen = score, (std, a)
+    return chosen
+
+
+def _stable(a: FloatArray) -> FloatArray:
+    """Pull the poles inside the unit circle, so that the noise has a variance."""
+    poles = np.roots(np.concatenate([[1.0], -a]))
+    largest = np.max(np.abs(poles))
+    if largest < 0.995:
+        return a
+    pulled: FloatArray = a * (0.995 / largest) ** np.arange(1, len(a) + 1)
+    return pulled
+
+
+def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Weights (N, m): |prediction| over its mean where the noise grows with the value, else 1.
+
+    Judged on differences of the residual, in which slow model errors cancel, by the Gaussian likelihood.
+    """
+    weights = np.ones_like(predicted)
+    for j in range(predicted.shape[1]):
+        d = np.diff(residual[:, j])
+        size = np.abs(predicted[1:, j])
+        ok = np.isfinite(d) & (size > 0)
+        if ok.sum() < FEWEST_PAIRS or np.ptp(size[ok]) < 0.1 * np.mean(size[ok]):
+            continue
+        w = size / np.mean(size[ok])
+        constant = 2 * ok.sum() * np.log(clipped_std(d[ok]))
+        scaled = 2 * ok.sum() * np.log(clipped_std(d[ok] / w[ok])) + 2 * np.sum(np.log(w[ok]))
+        if scaled < constant - 10:
+            weights[:, j] = np.maximum(np.abs(predicted[:, j]) / np.mean(size[ok]), 0.05)
+    return weights

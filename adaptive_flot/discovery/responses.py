@@ -1,0 +1,153 @@
+"""How each output would answer to a small change at each site: the model linearised along a fitted free run.
+
+One pass gives the one-step Jacobians of every row; the answer to *any* time course of *any* site is then a product of
+small matrices. So a whole catalogue of effects is scored for the price of one sensitivity simulation. At amplitude zero
+this is exact: a driver's own feedback is of second order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepper import Stepper
+
+ROWS_AT_ONCE = 500
+
+
+@dataclass(frozen=True)
+class Course:
+    """A time course at a site: change of the logarithm of its value, or of the value itself where `offset`, (N,)."""
+
+    site: str
+    values: FloatArray
+    offset: bool
+
+
+class Responses:
+    """Linear answers of the measured outputs along one fitted free run.
+
+    Attributes
+    ----------
+    sites
+        Names of the sites.
+    drivers
+        Series (N,) of each quantity that an effect may depend on.
+    site_values
+        Series (N,) of the value at each site (the first component), at the times of the rows.
+    nuisance
+        Answers (N, m, r) to the parameters that are free already and to the initial state.
+    """
+
+    def __init__(self, problem: Problem, fit: Fit) -> None:
+        self.problem, self.fit = problem, fit
+        model = fit.model
+        self.sites = tuple(s.name for s in model.sites)
+        self._offset = {s.name: s.mode == "offset" for s in model.sites}
+        has = {e.label for e in model.effects}
+        probes = [Effect(s, "constant", "shift") for s in self.sites]
+        extended = model.with_effects([e for e in probes if e.label not in has])
+        p0 = np.array([q.value for q in extended.parameters])
+        stepper = Stepper(extended, problem.record.dt)
+        record = problem.record
+        run = stepper.simulate(fit.initial_state, record.inputs[1:], p0, float(record.time[0]))
+        self.states = np.vstack([fit.initial_state, run.states])
+        names = (*fit.names, *(e.parameter("amplitude") for e in probes))
+        self._jacobians(stepper, names, p0)
+        self._q = len(fit.names)
+        self._describe(extended, p0)
+        self.nuisance = self._nuisance()
+
+    def _jacobians(self, stepper: Stepper, names: tuple[str, ...], p: FloatArray) -> None:
+        function = stepper.one_step_jacobians(names)
+        record, nx, q, ny = self.problem.record, len(self.fit.initial_state), len(names), len(stepper.model.outputs)
+        n = len(record) - 1
+        self._A, self._G = np.empty((n, nx, nx)), np.empty((n, nx, q))
+        self._C, self._H = np.empty((n, ny, nx)), np.empty((n, ny, q))
+        mapped: dict[int, ca.Function] = {}
+        for start in range(0, n, ROWS_AT_ONCE):
+            rows = slice(start, min(start + ROWS_AT_ONCE, n))
+            count = rows.stop - rows.start
+            call = mapped.setdefault(count, function.map(count))
+            found = call(self.states[rows].T, record.time[rows], record.inputs[1:][rows].T, p)
+            for target, value, height, width in (
+                (self._A, found[2], nx, nx),
+                (self._G, found[3], nx, q),
+                (self._C, found[4], ny, nx),
+                (self._H, found[5], ny, q),
+            ):
+                target[rows] = np.array(value).reshape(height, count, width).transpose(1, 0, 2)
+        columns = list(self.problem.columns)
+        self._C, self._H = self._C[:, columns], self._H[:, columns]
+
+    def _describe(self, model: Model, p: FloatArray) -> None:
+        """Series of drivers and of the values at the sites."""
+        record = self.problem.record
+        z_of, value_of = model.ode.map(len(record)), model.site_values.map(len(record))
+        arguments = record.time, self.states.T, record.inputs.T, p
+        _, _, s, z = z_of(*arguments)
+        values = np.array(value_of(*arguments, z))
+        signals = np.array(s)
+        table = {q.name: record.inputs[:, j] for j, q in enumerate(model.inputs)}
+        table |= {q.name: self.states[:, j] for j, q in enumerate(model.states)}
+        table |= {q.name: signals[j] for j, q in enumerate(model.signals)}
+        names = self.fit.model.drivers or (*self.fit.model.names("inputs"), *self.fit.model.names("states"))
+        self.drivers = {name: table[name] for name in names}
+        self.site_values = {s.name: values[j] for j, s in enumerate(model.sites)}
+
+    def _nuisance(self) -> FloatArray:
+        directions = self.fit.directions
+        n, r = len(self.problem.record), directions.shape[1]
+        S = np.hstack([np.zeros((len(directions), self._q)), directions])
+        inputs = np.zeros((n - 1, self._q + r))
+        inputs[:, : self._q] = 1.0
+        return self._propagate(S, list(range(self._q)), inputs)
+
+    def _propagate(self, S: FloatArray, source: list[int], courses: FloatArray) -> FloatArray:
+        """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N - 1, r)."""
+        n, m = len(self.problem.record), len(self.problem.columns)
+        r = S.shape[1]
+        k = len(source)
+        out = np.zeros((n, m, r))
+        for i in range(n - 1):
+            drive = courses[i, :k]
+            out[i + 1] = self._C[i] @ S
+            out[i + 1][:, :k] += self._H[i][:, source] * drive
+            S = self._A[i] @ S
+            S[:, :k] += self._G[i][:, source] * drive
+        out[0] = out[1]
+        return out
+
+    def of(self, courses: list[Course]) -> FloatArray:
+        """Answers (N, m, r) of the measured outputs to r courses."""
+        source = [self._q + self.sites.index(c.site) for c in courses]
+        table = np.empty((len(self.problem.record) - 1, len(courses)))
+        for j, c in enumerate(courses):
+            v = c.values[1:]
+            default = self._offset[c.site]
+            if c.offset and not default:
+                v = v / self.site_values[c.site][1:]
+            elif default and not c.offset:
+                v = v * self.site_values[c.site][1:]
+            table[:, j] = v
+        return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table)
+
+    def adapted_sites(self) -> tuple[str, ...]:
+        """Sites whose constant change does what a change of an adapted parameter does, and nothing else.
+
+        A change in time at such a site is a drift of that parameter: what the adaptation is there for.
+        """
+        count = len(self.problem.adapted)
+        answers = self.of([Course(s, np.ones(len(self.problem.record)), self._offset[s]) for s in self.sites])
+        scale = np.maximum(np.abs(answers).max(axis=(0, 2)), 1e-300)[None, :, None]
+        a = (answers / scale).reshape(-1, len(self.sites))
+        b = (self.nuisance[:, :, :count] / scale).reshape(-1, count)
+        a, b = (x / np.maximum(np.linalg.norm(x, axis=0), 1e-300) for x in (a, b))
+        alike = np.abs(a.T @ b).max(axis=1)
+        return tuple(s for s, c in zip(self.sites, alike, strict=True) if c > 1 - 1e-6)

@@ -1,0 +1,167 @@
+"""Efficient scores: how much of the residual each candidate would explain, to first order, for one linearisation.
+
+The adapted parameters and the initial state are projected out first: what they can absorb is no evidence. The noise
+model is that of the residual after *everything in the catalogue at once* (a ridge fit), so that it is neither blind to
+coloured noise nor soaked up by the very effect that is looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.discovery.catalogue import Candidate, Variant
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.noise import CLIP, Noise, fit_noise
+from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.discovery.responses import Responses
+from adaptive_flot.greybox.model import FloatArray
+
+PRIOR_SHARE = 0.3
+"""Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """First-order evidence for one candidate: its best variant.
+
+    Attributes
+    ----------
+    candidate, variant
+        What was scored.
+    gain
+        Drop of the whitened sum of squares (minus two log-likelihood) on the estimation rows.
+    penalised
+        The same less log(number of measurements) for each coefficient.
+    start
+        Values of the coefficients to start a fit from.
+    """
+
+    candidate: Candidate
+    variant: Variant
+    gain: float
+    penalised: float
+    start: dict[str, float]
+
+
+class Scorer:
+    """Whitened, projected answers of a whole catalogue along one fit."""
+
+    def __init__(self, problem: Problem, fit: Fit, responses: Responses, candidates: list[Candidate]) -> None:
+        self.problem, self.fit, self.candidates = problem, fit, candidates
+        self.rows = problem.rows("estimate")
+        self._count = int(np.isfinite(problem.measured[self.rows]).sum())
+        variants = [v for c in candidates for v in c.variants]
+        courses = [course for v in variants for course in v.courses]
+        answers = responses.of(courses) / problem.weights[:, :, None]
+        nuisance = responses.nuisance / problem.weights[:, :, None]
+        residual = fit.residual(problem) / problem.weights
+        self._size = np.array([self._prior(c.offset, responses, c.site) for c in courses])
+        self.noise = self._clean_noise(residual, answers, nuisance, variants)
+        e = self.noise.whiten(residual)[self.rows]
+        self._present = np.isfinite(e)
+        base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self.rows][self._present])
+        self._base = base
+        columns = self.noise.whiten(answers)[self.rows][self._present]
+        columns -= base @ (base.T @ columns)
+        self._columns = columns
+        self.residual = self._project(np.clip(e[self._present], -1e3, 1e3))
+        self._slices: list[slice] = []
+        at = 0
+        for v in variants:
+            self._slices.append(slice(at, at + len(v.courses)))
+            at += len(v.courses)
+
+    @staticmethod
+    def _prior(offset: bool, responses: Responses, site: str) -> float:
+        return PRIOR_SHARE * (float(np.median(np.abs(responses.site_values[site]))) if offset else 1.0)
+
+    def _project(self, e: FloatArray) -> FloatArray:
+        projected: FloatArray = e - self._base @ (self._base.T @ e)
+        return projected
+
+    def _clean_noise(
+        self, residual: FloatArray, answers: FloatArray, nuisance: FloatArray, variants: list[Variant]
+    ) -> Noise:
+        """Noise left by a ridge fit of the constant, the slow and the power-law courses of all sites together."""
+        wanted, at = [], 0
+        for v in variants:
+            if v.effect.form in ("shift", "power") or (v.effect.form == "curve" and v.effect.driver == "time"):
+                wanted += list(range(at, at + len(v.courses)))
+            at += len(v.courses)
+        d = np.diff(residual, axis=0)
+        std = np.array([1.4826 * np.nanmedian(np.abs(c)) / np.sqrt(2) for c in d.T])
+        std = np.maximum(np.nan_to_num(std), self.problem.floor)
+        r = residual[self.rows] / std
+        present = np.isfinite(r)
+        X = (answers[self.rows][:, :, wanted] * self._size[wanted] / std[:, None])[present]
+        Z = (nuisance[self.rows] / std[:, None])[present]
+        y = r[present]
+        base, _ = np.linalg.qr(Z)
+        X -= base @ (base.T @ X)
+        y = y - base @ (base.T @ y)
+        for _ in range(2):  # the second time without what stands out
+            limit = CLIP * 1.4826 * np.median(np.abs(y)) if _ else np.inf
+            keep = np.abs(y) <= max(limit, CLIP)
+            beta = np.linalg.solve(X[keep].T @ X[keep] + np.eye(X.shape[1]), X[keep].T @ y[keep])
+            left = y - X @ beta
+        full = np.full(residual.shape, np.nan)
+        table = np.full(r.shape, np.nan)
+        table[present] = left
+        full[self.rows] = table * std
+        return fit_noise(full, self.rows, self.problem.floor)
+
+    def scores(self) -> list[Score]:
+        """Scores of all candidates, best first."""
+        found, at = [], 0
+        for candidate in self.candidates:
+            best: Score | None = None
+            for variant in candidate.variants:
+                score = self._score(candidate, variant, self._slices[at])
+                at += 1
+                if best is None or score.penalised > best.penalised:
+                    best = score
+            assert best is not None  # a candidate has variants
+            found.append(best)
+        return sorted(found, key=lambda s: -s.penalised)
+
+    def variant_scores(self, candidate: Candidate) -> list[Score]:
+        """Scores of all variants of one candidate, best first."""
+        at = sum(len(c.variants) for c in self.candidates[: self.candidates.index(candidate)])
+        found = [self._score(candidate, v, self._slices[at + i]) for i, v in enumerate(candidate.variants)]
+        return sorted(found, key=lambda s: -s.penalised)
+
+    def _score(self, candidate: Candidate, variant: Variant, columns: slice) -> Score:
+        X = self._columns[:, columns] * self._size[columns]
+        A = X.T @ X
+        A += 1e-9 * np.trace(A) / len(A) * np.eye(len(A)) + 1e-30 * np.eye(len(A))
+        b = X.T @ self.residual
+        beta = np.linalg.solve(A, b)
+        gain = float(b @ beta)
+        shapes = len(variant.start)
+        penalty = (len(variant.courses) + shapes) * float(np.log(self._count))
+        values = beta * self._size[columns]
+        start = {n: float(v) for n, v in zip(variant.coefficients, values, strict=True) if n}
+        return Score(candidate, variant, gain, gain - penalty, {**start, **dict(variant.start)})
+
+    def null_gains(self, draws: int, seed: int) -> FloatArray:
+        """Largest penalised score (draws,) of the catalogue on white noise: the null law of the search.
+
+        Parametric bootstrap: the whitened residual is drawn as white Gaussian noise and projected like the real one.
+        """
+        rng = np.random.default_rng(seed)
+        E = rng.standard_normal((self._columns.shape[0], draws))
+        E -= self._base @ (self._base.T @ E)
+        best = np.full(draws, -np.inf)
+        at = 0
+        for candidate in self.candidates:
+            for variant in candidate.variants:
+                X = self._columns[:, self._slices[at]]
+                at += 1
+                Q, R = np.linalg.qr(X)
+                good = np.abs(np.diag(R)) > 1e-9 * max(np.abs(np.diag(R)).max(), 1e-30)
+                gain = np.sum((Q[:, good].T @ E) ** 2, axis=0)
+                penalty = (X.shape[1] + len(variant.start)) * np.log(self._count)
+                best = np.maximum(best, gain - penalty)
+        return best

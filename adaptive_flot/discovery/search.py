@@ -1,0 +1,198 @@
+"""The search: rounds of score, refit and compare, until nothing of substance is left to explain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.discovery.attribute import Alternative, refit, shortlist
+from adaptive_flot.discovery.catalogue import catalogue
+from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.discovery.responses import Responses
+from adaptive_flot.discovery.scoring import Score, Scorer
+from adaptive_flot.discovery.verify import Verification, verify
+
+MOST_EFFECTS = 3
+NULL_DRAWS = 200
+NULL_QUANTILE = 0.99
+LEAST_EVIDENCE = 10.0
+"""Drop of the information criterion that an effect must bring."""
+SUBSTANCE = 0.1
+"""A further effect must remove at least this share of the excess error that the base model has on the confirm share."""
+BEAM = 2
+"""Alternatives of one round that the next extends."""
+SHORTLIST_FURTHER = 5
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round: what was scored on top of which alternative, what was fitted, and what it left.
+
+    Attributes
+    ----------
+    scores
+        First-order scores of the whole catalogue, best first.
+    threshold
+        Penalised score that noise alone passes once in a hundred records.
+    alternatives
+        Full fits, best first.
+    """
+
+    scores: tuple[Score, ...]
+    threshold: float
+    alternatives: tuple[Alternative, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """Everything a search found.
+
+    Attributes
+    ----------
+    base
+        Fit of the model as it is.
+    rounds
+        The rounds, in order.
+    alternatives
+        All full fits of the accepted number of effects, best first; empty when nothing was found.
+    verification
+        Of the best of them, on the confirm share.
+    left
+        First-order gain that the best alternative leaves on the table: what it still lacks.
+    left_threshold
+        The same quantity that noise alone would show once in a hundred records.
+    adapted_sites
+        Sites whose constant change is that of an adapted parameter.
+    """
+
+    base: Fit
+    rounds: tuple[Round, ...]
+    alternatives: tuple[Alternative, ...]
+    verification: Verification | None
+    left: float
+    left_threshold: float
+    adapted_sites: tuple[str, ...]
+
+
+def search(
+    problem: Problem, base: Fit, *, processes: int = 1, progress: Callable[[str], None] = lambda stage: None
+) -> Search:
+    """Search effects on top of a base fit.
+
+    Parameters
+    ----------
+    problem, base
+        The record and the fit of the model as it is, on the estimation share.
+    processes
+        Fits that run at once.
+    progress
+        Called with a word for each stage.
+    """
+    fitter = Fitter(problem)
+    progress("score")
+    scorer, sites = _scorer(problem, base)
+    first = _round(problem, fitter, base, scorer, [None], processes, progress)
+    rounds = [first]
+    best = _accepted(problem, base, first, None)
+    if best is None:
+        return Search(base, tuple(rounds), (), None, *_left(scorer, first.threshold), sites)
+    chosen = first
+    while True:
+        progress("what is left")
+        scorer, _ = _scorer(problem, best.fit)
+        threshold = _threshold(scorer)
+        left = scorer.scores()
+        done = not left or left[0].penalised < threshold or len(best.names) == MOST_EFFECTS
+        if done or not _worth_extending(problem, base, best, scorer, left):
+            break
+        further = _round(problem, fitter, base, scorer, _beam(chosen, best), processes, progress)
+        rounds.append(further)
+        better = _accepted(problem, base, further, best)
+        if better is None:
+            break
+        best, chosen = better, further
+    return Search(
+        base,
+        tuple(rounds),
+        chosen.alternatives,
+        verify(problem, base, best.fit),
+        *_left(scorer, threshold),
+        sites,
+    )
+
+
+def _scorer(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
+    responses = Responses(problem, fit)
+    return Scorer(problem, fit, responses, catalogue(fit.model, responses)), responses.adapted_sites()
+
+
+def _threshold(scorer: Scorer) -> float:
+    return max(LEAST_EVIDENCE, float(np.quantile(scorer.null_gains(NULL_DRAWS, seed=0), NULL_QUANTILE)))
+
+
+def _left(scorer: Scorer, threshold: float) -> tuple[float, float]:
+    scores = scorer.scores()
+    return (scores[0].gain if scores else 0.0), threshold
+
+
+def _round(
+    problem: Problem,
+    fitter: Fitter,
+    base: Fit,
+    scorer: Scorer,
+    beam: list[Alternative | None],
+    processes: int,
+    progress: Callable[[str], None],
+) -> Round:
+    threshold = _threshold(scorer)
+    scores = tuple(scorer.scores())
+    found: list[Alternative] = []
+    for k, before in enumerate(beam):
+        if before is not None and k:
+            scorer, _ = _scorer(problem, before.fit)
+        wanted = shortlist(scorer, SHORTLIST_FURTHER) if before else shortlist(scorer)
+        wanted = [s for s in wanted if s.penalised > threshold]
+        progress("fit")
+        found += refit(fitter, base, scorer, wanted, before, processes, lambda: progress("fit"))
+    unique: dict[frozenset[tuple[str, str]], Alternative] = {}
+    for a in sorted(found, key=lambda a: a.fit.bic):
+        unique.setdefault(frozenset(a.names), a)
+    return Round(scores, threshold, tuple(unique.values()))
+
+
+def _beam(last: Round, best: Alternative) -> list[Alternative | None]:
+    others = [a for a in last.alternatives if a is not best]
+    return [best, *others[: BEAM - 1]]
+
+
+def _accepted(problem: Problem, base: Fit, found: Round, before: Alternative | None) -> Alternative | None:
+    """Best alternative of a round, if it brings evidence and stands on the confirm share."""
+    if not found.alternatives:
+        return None
+    best = found.alternatives[0]
+    reference = before.fit if before else base
+    if best.fit.bic > reference.bic - found.threshold:
+        return None
+    if before is not None and _excess(problem, reference, best.fit) < SUBSTANCE * _excess(problem, base, best.fit):
+        return None
+    return best if verify(problem, reference, best.fit).confirmed else None
+
+
+def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
+    """Mean squared error on the confirm share in units of the better fit's noise, less that of the better fit."""
+    rows = problem.rows("confirm")
+    size = problem.weights * better.noise.stationary_std()
+    old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2) for f in (fit, better))
+    return float(old - new)
+
+
+def _worth_extending(problem: Problem, base: Fit, best: Alternative, scorer: Scorer, left: list[Score]) -> bool:
+    """Whether what is left is a substantial share of what there was, judged by first-order gains on one noise."""
+    del scorer
+    size = problem.weights * best.fit.noise.std
+    rows = problem.rows("estimate")
+    removed = np.nansum(((base.residual(problem) / size) ** 2 - (best.fit.residual(problem) / size) ** 2)[rows])
+    return left[0].gain > SUBSTANCE / 2 * float(removed)

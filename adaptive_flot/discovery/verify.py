@@ -1,0 +1,130 @@
+"""Verify, once, on rows that chose nothing: is the error smaller, everywhere, by more than chance?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import bootstrap
+from statsmodels.stats.diagnostic import acorr_ljungbox
+
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.problem import BoolArray, Problem
+from adaptive_flot.greybox.model import FloatArray
+
+BLOCK_ROWS = 20
+"""Rows of a block of the paired block bootstrap: longer than the noise remembers."""
+DRAWS = 500
+WORSE = 0.02
+"""Share by which no output's error may grow."""
+LAGS = 20
+
+
+@dataclass(frozen=True)
+class OutputChange:
+    """Free-run error of one output on one share: before, after, its noise, and a 95 % interval of the reduction."""
+
+    output: str
+    unit: str
+    before: float
+    after: float
+    noise: float
+    reduction95: tuple[float, float]
+
+    def __str__(self) -> str:
+        low, high = (100 * r for r in self.reduction95)
+        return (
+            f"{self.output}: {self.before:.3g} -> {self.after:.3g} {self.unit} "
+            f"(noise {self.noise:.3g}; reduction {low:.0f} to {high:.0f} %)"
+        )
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Whether an alternative stands on the confirm share.
+
+    Attributes
+    ----------
+    reduction, reduction95
+        Drop of the root mean square error over all outputs, in units of their noise, and its 95 % interval.
+    worse
+        Outputs whose error grew.
+    confirmed
+        Interval above zero and no output worse.
+    """
+
+    reduction: float
+    reduction95: tuple[float, float]
+    worse: tuple[str, ...]
+    confirmed: bool
+
+    def __str__(self) -> str:
+        low, high = (100 * r for r in self.reduction95)
+        word = "confirmed" if self.confirmed else "not confirmed"
+        return f"{word}: error {100 * self.reduction:.0f} % smaller ({low:.0f} to {high:.0f} %) on the confirm share"
+
+
+def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
+    """Compare two fits of the estimation share on the confirm share, in units of the noise of the better one."""
+    rows = problem.rows("confirm")
+    size = problem.weights * after.noise.stationary_std()
+    old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
+    reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1))
+    worse = []
+    for j, c in enumerate(problem.columns):
+        ratio = np.sqrt(np.nanmean(new[:, j]) / max(np.nanmean(old[:, j]), 1e-300)) if old[:, j].size else 1.0
+        if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j])[1][1] < 0:
+            worse.append(after.model.outputs[c].name)
+    return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)
+
+
+def changes(problem: Problem, before: Fit, after: Fit, share: str) -> tuple[OutputChange, ...]:
+    """Free-run error of each measured output on one share of the record, before and after."""
+    rows = problem.rows(share)
+    ones = np.ones_like(problem.weights)
+    old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
+    noise = after.noise.stationary_std()
+    found = []
+    for j, c in enumerate(problem.columns):
+        q = after.model.outputs[c]
+        if not np.isfinite(old[:, j]).any():
+            continue
+        a, b = (float(np.sqrt(np.nanmean(s[:, j]))) for s in (old, new))
+        sigma = float(noise[j] * np.sqrt(np.mean(problem.weights[rows, j] ** 2)))
+        found.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j])[1]))
+    return tuple(found)
+
+
+def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> FloatArray:
+    squares: FloatArray = ((fit.residual(problem) / size) ** 2)[rows]
+    return squares
+
+
+def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, float]]:
+    """1 - RMS(new) / RMS(old) with a paired block-bootstrap interval (scipy, percentile)."""
+    ok = np.isfinite(old) & np.isfinite(new)
+    count = int(ok.sum()) // BLOCK_ROWS
+    if count < 4 or not old[ok].sum() > 0:
+        return 0.0, (float("-inf"), float("inf"))
+    a, b = (s[ok][: count * BLOCK_ROWS].reshape(count, -1).sum(axis=1) for s in (old, new))
+
+    def statistic(x: FloatArray, y: FloatArray, axis: int = -1) -> FloatArray:
+        value: FloatArray = 1 - np.sqrt(np.sum(y, axis=axis) / np.maximum(np.sum(x, axis=axis), 1e-300))
+        return value
+
+    found = bootstrap(
+        (a, b), statistic, paired=True, vectorized=True, n_resamples=DRAWS, method="percentile", rng=0
+    ).confidence_interval
+    return float(statistic(a, b)), (float(found.low), float(found.high))
+
+
+def whiteness(problem: Problem, fit: Fit, *, raw: bool) -> dict[str, float]:
+    """Ljung-Box p value of each measured output: of the weighted residual (`raw`) or of the whitened innovations."""
+    series = fit.residual(problem) / problem.weights if raw else fit.innovations
+    found = {}
+    for j, c in enumerate(problem.columns):
+        e = series[problem.rows(), j]
+        e = e[np.isfinite(e)]
+        if len(e) > 3 * LAGS:
+            found[fit.model.outputs[c].name] = float(acorr_ljungbox(e, lags=[LAGS])["lb_pvalue"].iloc[0])
+    return found
