@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import MOST_STEPS, Fit, Fitter
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer
@@ -20,6 +20,9 @@ from adaptive_flot.greybox.model import Model
 SHORTLIST = 10
 """Candidates that are refitted in full."""
 FORMS_EACH = 2
+FIRST_STEPS = 3
+"""Gauss-Newton steps of the first heat, in which every candidate runs."""
+FINALISTS = 4
 LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
 
@@ -94,34 +97,42 @@ def refit(
     processes: int = 1,
     done: Callable[[], None] = lambda: None,
 ) -> list[Alternative]:
-    """Fit each shortlisted candidate in its best forms on top of `before` (the base model by default), best first."""
+    """Fit each shortlisted candidate on top of `before` (the base model by default), best first.
+
+    In two heats: all in their best form with a few steps, then the finalists in several forms to the end.
+    """
     start = before.fit if before else base
-    jobs = [(i, s) for i, score in enumerate(scores) for s in _forms(scorer, score)]
 
-    def work(job: tuple[int, Score]) -> tuple[int, Fit | None]:
-        i, score = job
-        fit = fit_variant(fitter, start, score)
-        return i, replace(fit, model=None) if fit else None  # type: ignore[arg-type]  # a model does not pickle
+    def work(job: tuple[Score, int]) -> Fit | None:
+        fit = fit_variant(fitter, start, job[0], job[1])
+        return replace(fit, model=None) if fit else None  # type: ignore[arg-type]  # a model does not pickle
 
-    best: dict[int, Alternative] = {}
-    names = before.names if before else ()
-    known = before.known if before else ()
-    for (_, score), (i, bare) in zip(jobs, parallel_map(work, jobs, processes, done), strict=True):
-        if bare is None:
-            continue
-        model = start.model.with_effects([score.variant.effect])
-        values = dict(zip(bare.names, map(float, bare.values), strict=True))
-        fit = replace(bare, model=model.with_parameters(values))
-        found = Alternative(
-            (*names, score.candidate.name),
-            (*known, score.candidate.known),
-            fit,
-            base.loss - fit.loss,
-            fit.bic - base.bic,
-        )
-        if i not in best or found.fit.bic < best[i].fit.bic:
-            best[i] = found
+    def heat(jobs: list[Score], steps: int) -> list[Alternative]:
+        fits = parallel_map(work, [(s, steps) for s in jobs], processes, done)
+        found = [_alternative(base, start, s, f, before) for s, f in zip(jobs, fits, strict=True) if f]
+        return sorted(found, key=lambda a: a.fit.bic)
+
+    first = heat(scores, FIRST_STEPS)
+    finalists = [a.names[-1] for a in first[:FINALISTS]]
+    jobs = [f for s in scores if s.candidate.name in finalists for f in _forms(scorer, s)]
+    best: dict[tuple[tuple[str, str], ...], Alternative] = {}
+    for a in sorted([*heat(jobs, MOST_STEPS), *first], key=lambda a: a.fit.bic):
+        best.setdefault(a.names, a)
     return sorted(best.values(), key=lambda a: a.fit.bic)
+
+
+def _alternative(base: Fit, start: Fit, score: Score, bare: Fit, before: Alternative | None) -> Alternative:
+    model = start.model.with_effects([score.variant.effect])
+    held = {score.variant.effect.parameter(k): v for k, v in fixed_coefficients(score.variant.effect).items()}
+    values = dict(zip(bare.names, map(float, bare.values), strict=True))
+    fit = replace(bare, model=model.with_parameters({**held, **values}))
+    return Alternative(
+        (*(before.names if before else ()), score.candidate.name),
+        (*(before.known if before else ()), score.candidate.known),
+        fit,
+        base.loss - fit.loss,
+        fit.bic - base.bic,
+    )
 
 
 def _forms(scorer: Scorer, score: Score) -> list[Score]:
@@ -134,27 +145,22 @@ def _forms(scorer: Scorer, score: Score) -> list[Score]:
     return list(found.values())[:FORMS_EACH]
 
 
-def fit_variant(fitter: Fitter, start: Fit, score: Score) -> Fit | None:
+def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int) -> Fit | None:
     """Full fit of one variant, from its first-order solution and, should that not simulate, from next to nothing."""
     effect = score.variant.effect
-    model = start.model.with_effects([effect])
-    names = tuple(effect.parameter(c.name) for c in effect.terms if c.name in free_coefficients(effect))
+    held = fixed_coefficients(effect)
+    model = start.model.with_effects([replace(effect, coefficients=held)])
+    names = tuple(effect.parameter(c.name) for c in effect.terms if c.name not in held)
     free = (*start.names, *names)
     bounds = {effect.parameter(k): b for k, b in shape_bounds(fitter.problem).items()}
-    first = {effect.parameter(k): v for k, v in score.start.items()}
-    first |= {effect.parameter(k): v for k, v in fixed_coefficients(effect).items()}
-    found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds=2)
+    first = {effect.parameter(k): v for k, v in {**score.start, **held}.items()}
+    rounds = 1 if steps < MOST_STEPS else 2
+    found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps)
     if found is None:
-        shape = {effect.parameter(k): v for k, v in score.variant.start}
+        shape = {effect.parameter(k) for k, _ in score.variant.start} | {effect.parameter(k) for k in held}
         small = {k: v if k in shape else 0.1 * v for k, v in first.items()}
-        found = fitter.fit(model, free, limited(model, effect, small), start, bounds, rounds=2)
+        found = fitter.fit(model, free, limited(model, effect, small), start, bounds, rounds, steps)
     return found
-
-
-def free_coefficients(effect: Effect) -> tuple[str, ...]:
-    """Coefficients that a search fits: a lag or dead time is there in full or not, its share is not fitted."""
-    names = tuple(c.name for c in effect.terms)
-    return tuple(n for n in names if n != "amplitude") if effect.driver in ("lag", "delay") else names
 
 
 def fixed_coefficients(effect: Effect) -> dict[str, float]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 from scipy.signal import lfilter
 
@@ -159,12 +161,15 @@ def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...]
 
 def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
     """Cardinal natural splines (N, knots) at the values (N,): numbers from the very function the model uses."""
-    import casadi as ca
-
-    x = ca.SX.sym("x")
-    function = ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])
+    function = _spline_function(tuple(knots))
     found: FloatArray = np.array(function.map(len(values))(values)).T
     return found
+
+
+@lru_cache(maxsize=64)
+def _spline_function(knots: tuple[float, ...]) -> ca.Function:
+    x = ca.SX.sym("x")
+    return ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])
 
 
 def _late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:

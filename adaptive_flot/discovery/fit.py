@@ -112,6 +112,7 @@ class Fitter:
         like: Fit | None = None,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         rounds: int = NOISE_ROUNDS,
+        steps: int = MOST_STEPS,
     ) -> Fit | None:
         """Fit the adapted parameters, the initial state and the parameters `free`.
 
@@ -129,17 +130,19 @@ class Fitter:
             Narrower ranges by full name: an onset inside the record.
         rounds
             How often the noise model is fitted again.
+        steps
+            Most Gauss-Newton steps for one noise model.
 
         Returns
         -------
         Fit or None
             None when the model can not simulate the record from the start values.
         """
-        return _Search(self, model, free, dict(start or {}), like, bounds or {}).run(rounds, like)
+        return _Search(self, model, free, dict(start or {}), like, bounds or {}).run(rounds, steps, like)
 
 
 class _Search:
-    """One search. Unknowns z are the free parameters over their scale, then the free directions of the initial state."""
+    """One search. Unknowns z: the free parameters over their scale, then the free directions of the initial state."""
 
     def __init__(
         self,
@@ -244,7 +247,7 @@ class _Search:
 
     # -- search --------------------------------------------------------------------------------------------------------
 
-    def run(self, rounds: int, like: Fit | None) -> Fit | None:
+    def run(self, rounds: int, steps: int, like: Fit | None) -> Fit | None:
         if like is None:
             self._turn(self._telling_directions())
         z = self.centre.copy()
@@ -253,7 +256,7 @@ class _Search:
             return None
         noise = self._first_noise()
         for turn in range(rounds):
-            z, predicted, slope = self._descend(z, predicted, slope, noise)
+            z, predicted, slope = self._descend(z, predicted, slope, noise, steps)
             if turn < rounds - 1:
                 before = noise
                 noise = loss_of(self.problem, predicted, self.fitter.rows)[1]
@@ -286,11 +289,11 @@ class _Search:
         return Noise(np.maximum(3 * self._white_std(), self.problem.floor), np.zeros((len(self.problem.columns), 1)))
 
     def _descend(
-        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
+        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise, steps: int
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         value = self._objective(z, predicted, noise)
         damping = 1e-3
-        for _ in range(MOST_STEPS):
+        for _ in range(steps):
             step_of = self._step(z, predicted, slope, noise)
             accepted = False
             while damping < 1e8:

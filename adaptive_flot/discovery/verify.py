@@ -1,4 +1,4 @@
-"""Verify, once, on rows that chose nothing: is the error smaller, everywhere, by more than chance?"""
+"""Verify, once, on rows that chose nothing: the error must be smaller by more than chance, and nowhere larger."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1))
     worse = []
     for j, c in enumerate(problem.columns):
-        ratio = np.sqrt(np.nanmean(new[:, j]) / max(np.nanmean(old[:, j]), 1e-300)) if old[:, j].size else 1.0
+        ratio = float(np.sqrt(np.nanmean(new[:, j]) / np.maximum(np.nanmean(old[:, j]), 1e-300)))
         if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j])[1][1] < 0:
             worse.append(after.model.outputs[c].name)
     return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)

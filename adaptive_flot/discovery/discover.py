@@ -1,0 +1,221 @@
+"""Discover: a record and a model in, a verdict out. The stages of the search, one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.gate import Gate, gate
+from adaptive_flot.discovery.noise import proportional
+from adaptive_flot.discovery.problem import Problem, make_problem
+from adaptive_flot.discovery.search import Search, search
+from adaptive_flot.discovery.verdict import Judgement, NamedEffect, Verdict, judge
+from adaptive_flot.discovery.verify import changes, whiteness
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+
+BURN_IN_ROWS = 30
+GUARD_ROWS = 5
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """The verdict and everything behind it.
+
+    Attributes
+    ----------
+    verdict
+        What to tell.
+    model
+        The model with what was named (or the unnamed curve) added, fitted; the plain fitted model else.
+    gate, problem, search, judgement
+        The stages; None from the one that was not reached.
+    before, after
+        Fits of the plain and of the extended model to the estimation and confirm shares.
+    """
+
+    verdict: Verdict
+    model: Model
+    gate: Gate
+    problem: Problem | None = None
+    search: Search | None = None
+    judgement: Judgement | None = None
+    before: Fit | None = None
+    after: Fit | None = None
+
+
+def discover(
+    model: Model,
+    record: Dataset,
+    *,
+    adapted: Sequence[str] = (),
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Discovery:
+    """Find what physical effect a model lacks, from a measured record.
+
+    Parameters
+    ----------
+    model
+        The model, with sites; its parameters of role "estimated" are free in every alternative.
+    record
+        Measured record, from `read_dataset`.
+    adapted
+        Names of the free parameters instead of those of role "estimated".
+    processes
+        Fits that run at once.
+    progress
+        Called with a word for each stage.
+
+    Returns
+    -------
+    Discovery
+        The verdict, the extended model and all stages.
+
+    Raises
+    ------
+    ModelError
+        No site, or no parameter of that name.
+    """
+    began = time.perf_counter()
+    if not model.sites:
+        raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
+    names = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
+    progress("check the data")
+    checked = gate(record, model)
+    if checked.reasons:
+        return Discovery(_insufficient(checked, began), model, checked)
+    progress("fit the model as it is")
+    prepared = _prepare(checked.record, model, names)
+    if prepared is None:
+        reason = f"the model can not simulate the record: check the units of its columns and the model '{model.name}'"
+        return Discovery(_insufficient(replace(checked, reasons=(reason,)), began), model, checked)
+    problem, base = prepared
+    found = search(problem, base, processes=processes, progress=progress)
+    judgement = judge(found)
+    progress("fit once more, without the report share")
+    before, after = _final(problem, base, judgement.best)
+    verdict = _verdict(problem, checked, found, judgement, before, after)
+    extended = after.model if judgement.word in ("named", "class", "unnamed") else before.model
+    verdict = replace(verdict, seconds=time.perf_counter() - began)
+    return Discovery(verdict, extended, checked, problem, found, judgement, before, after)
+
+
+def _prepare(record: Dataset, model: Model, adapted: tuple[str, ...]) -> tuple[Problem, Fit] | None:
+    """Split the record and fit the model as it is, twice: the first residual shows how the noise grows."""
+    burn_in = min(BURN_IN_ROWS, len(record) // 20)
+    problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS)
+    first = Fitter(problem).fit(model, rounds=1)
+    if first is None:
+        return None
+    problem = problem.with_weights(proportional(first.residual(problem), first.predicted))
+    base = Fitter(problem).fit(first.model, like=first, rounds=2)
+    return (problem, base) if base else None
+
+
+def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:
+    fitter = Fitter(problem, ("estimate", "confirm"))
+    before = fitter.fit(base.model, like=base, rounds=2) or base
+    if best is None:
+        return before, before
+    after = fitter.fit(best.fit.model, best.fit.names, like=best.fit, rounds=2) or best.fit
+    return before, after
+
+
+def _insufficient(checked: Gate, began: float) -> Verdict:
+    reason = "The record does not say enough: " + "; ".join(checked.reasons) + "."
+    return Verdict("insufficient", reason, notes=checked.notes, seconds=time.perf_counter() - began)
+
+
+def _verdict(problem: Problem, checked: Gate, found: Search, judgement: Judgement, before: Fit, after: Fit) -> Verdict:
+    tells = judgement.word in ("named", "class", "unnamed")
+    final = after if tells or judgement.best is not None else before
+    labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
+    count = len(labels)
+    absorbed = {
+        k: float(b / a - 1) for k, b, a in zip(labels, before.values[:count], final.values[:count], strict=True)
+    }
+    tests = {f"ljung_box_before_{k}": p for k, p in whiteness(problem, before, raw=True).items()}
+    tests |= {f"ljung_box_after_{k}": p for k, p in whiteness(problem, final, raw=True).items()}
+    first = before.model.outputs[problem.columns[0]].name
+    tests |= {f"ljung_box_{k}": tests.get(f"ljung_box_{k}_{first}", float("nan")) for k in ("before", "after")}
+    effects = _effects(judgement, after) if tells else ()
+    drift = _drift(judgement, after) if judgement.word == "none" and judgement.best else ()
+    error = changes(problem, before, final, "report")
+    return Verdict(
+        word=judgement.word,
+        reason=_reason(judgement, found, effects, drift),
+        effects=effects,
+        members=judgement.members,
+        error=error,
+        tests=tests,
+        parameters=dict(zip(labels, map(float, final.values[:count]), strict=True)),
+        drift=drift,
+        absorbed=absorbed,
+        notes=checked.notes,
+    )
+
+
+def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
+    assert judgement.best is not None  # a verdict that names has an alternative
+    model, best = after.model, judgement.best
+    std = dict(zip(after.names, after.std(), strict=True))
+    meanings = {(k.site, k.driver): k.meaning for k in model.known_effects}
+    found = []
+    for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
+        own = best.names[i]
+        others = tuple(
+            (a.names[i][0], a.names[i][1], a.fit.bic - best.fit.bic)
+            for a in judgement.rivals
+            if len(a.names) == len(best.names) and a.names[i] != own
+        )
+        interval = {
+            c: (v - 1.96 * std[effect.parameter(c)], v + 1.96 * std[effect.parameter(c)])
+            for c, v in effect.coefficients.items()
+            if effect.parameter(c) in std
+        }
+        found.append(NamedEffect(effect, meanings.get(own, "an effect without a name"), interval, others))
+    return tuple(found)
+
+
+def _drift(judgement: Judgement, after: Fit) -> tuple[str, ...]:
+    assert judgement.best is not None  # drift is a kind of alternative
+    said = []
+    for effect in after.model.fitted_effects()[-len(judgement.best.names) :]:
+        values = [v for k, v in effect.coefficients.items() if k.startswith(("amplitude", "value"))]
+        change = max(values, key=abs) if len(values) == 1 else max(values) - min(values)
+        said.append(f"{effect.site} changes by about {100 * (np.exp(change) - 1):+.0f} % ({effect.form} in time)")
+    return tuple(said)
+
+
+def _reason(judgement: Judgement, found: Search, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
+    if judgement.word == "none" and drift:
+        return (
+            "The model lacks no effect that this record shows: a drift of its adapted parameters explains the residual "
+            f"({'; '.join(drift)}), and tracking them is the estimator's work."
+        )
+    if judgement.word == "none":
+        return (
+            "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
+            "noise would, or what it removes does not stand on rows that did not choose it."
+        )
+    evidence = f"{found.verification}" if found.verification else ""
+    said = "; and ".join(f"{e.effect.site} depends on {e.effect.driver} ({e.meaning})" for e in effects)
+    if judgement.word == "named":
+        return f"The model lacks this: {said}. {evidence}."
+    if judgement.word == "class":
+        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
+        return f"The model lacks one of these, which this record can not tell apart: {members}. {evidence}."
+    if judgement.word == "unnamed":
+        return f"The model lacks something without a known name: {said}. {evidence}."
+    close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
+    return (
+        "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
+        f"none explains it well ({close}). {evidence}."
+    )

@@ -1,0 +1,155 @@
+"""The verdict: one of six words, what stands behind it, and how it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.search import Search
+from adaptive_flot.discovery.verify import OutputChange
+from adaptive_flot.greybox.effects import Effect
+
+Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
+
+LEAST_MARGIN = 10.0
+"""Alternatives whose information criterion is worse by less are not told apart."""
+LARGEST_CLASS = 3
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect of the verdict: the fitted effect, 95 % intervals of its coefficients, and the next best names."""
+
+    effect: Effect
+    meaning: str
+    interval95: Mapping[str, tuple[float, float]]
+    alternatives: tuple[tuple[str, str, float], ...]
+    """(site, driver, how much worse its criterion is)."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Entry of the machine-readable verdict."""
+        return {
+            **self.effect.as_dict(),
+            "parameters": {k: float(v) for k, v in self.effect.coefficients.items()},
+            "meaning": self.meaning,
+            "interval95": {k: list(v) for k, v in self.interval95.items()},
+            "alternatives": [{"site": s, "driver": d, "delta_bic": round(v, 1)} for s, d, v in self.alternatives],
+        }
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a record says about what the model lacks.
+
+    Attributes
+    ----------
+    word
+        `none`, `named`, `class`, `unnamed`, `insufficient` or `abstain`.
+    reason
+        One paragraph of plain words.
+    effects
+        What was named, or the unnamed curve, best first.
+    members
+        (site, driver) of each member of a class.
+    error
+        Free-run error of each output on the share that chose nothing.
+    tests
+        Ljung-Box p values of the grade (the first output) before and after, and other tests.
+    parameters
+        Adapted parameters in the final fit, by label.
+    drift
+        Change of adapted parameters with time, in words, where that explains the record.
+    absorbed
+        Change of each adapted parameter that the plain fit needed to mimic the effect, as a share, by label.
+    notes
+        What was left out or stays open.
+    seconds
+        Wall-clock time.
+    """
+
+    word: Word
+    reason: str
+    effects: tuple[NamedEffect, ...] = ()
+    members: tuple[tuple[str, str], ...] = ()
+    error: tuple[OutputChange, ...] = ()
+    block: str = "report"
+    tests: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    drift: tuple[str, ...] = ()
+    absorbed: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the machine-readable verdict."""
+        return {
+            "verdict": self.word,
+            "reason": self.reason,
+            "effects": [e.as_dict() for e in self.effects],
+            "class": [{"site": s, "driver": d} for s, d in self.members],
+            "error": {
+                c.output: {
+                    "unit": c.unit,
+                    "before": c.before,
+                    "after": c.after,
+                    "noise": c.noise,
+                    "reduction95": list(c.reduction95),
+                    "block": self.block,
+                }
+                for c in self.error
+            },
+            "tests": dict(self.tests),
+            "parameters": dict(self.parameters),
+            "drift": list(self.drift),
+            "absorbed": dict(self.absorbed),
+            "notes": list(self.notes),
+            "seconds": round(self.seconds, 2),
+        }
+
+    def __str__(self) -> str:
+        return "\n".join([f"verdict: {self.word}", self.reason, *(f"  {c}" for c in self.error), *self.notes])
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the alternatives of a search amount to, before the words."""
+
+    word: Word
+    best: Alternative | None
+    members: tuple[tuple[str, str], ...]
+    rivals: tuple[Alternative, ...]
+    margin: float
+
+
+def judge(found: Search) -> Judgement:
+    """Turn the ranked alternatives into a word.
+
+    The margin of a name is what noise can give (10) or, if larger, what the best alternative itself still leaves
+    unexplained: an alternative that is worse by less than the best one's own shortcoming is not told apart from it.
+    """
+    if not found.alternatives:
+        return Judgement("none", None, (), (), LEAST_MARGIN)
+    best = found.alternatives[0]
+    shortcoming = found.left - found.left_threshold
+    margin = max(LEAST_MARGIN, shortcoming)
+    close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < margin]
+    named = [a for a in close if all(a.known)]
+    rivals = tuple(found.alternatives[1:6])
+    if _only_drift(best, found.adapted_sites):
+        return Judgement("none", best, (), rivals, margin)
+    if not named:
+        return Judgement("unnamed" if len(close) == 1 else "abstain", best, (), rivals, margin)
+    best = named[0]
+    names = tuple(dict.fromkeys(tuple(sorted(a.names)) for a in named))
+    if len(names) == 1:
+        return Judgement("named", best, (), rivals, margin)
+    if len(names) <= LARGEST_CLASS:
+        members = tuple(dict.fromkeys(n for group in names for n in group))
+        return Judgement("class", best, members, rivals, margin)
+    return Judgement("abstain", best, (), rivals, margin)
+
+
+def _only_drift(a: Alternative, adapted: tuple[str, ...]) -> bool:
+    return all(site in adapted and driver == "time" for site, driver in a.names)
