@@ -234,7 +234,7 @@ class _Search:
         """Predictions (N, m) and their derivatives (N, m, unknowns)."""
         p, x0 = self._unpack(z)
         gradient = np.hstack([np.zeros((len(x0), self.q)), self.directions])
-        y, dy = self.simulator.sensitivities(self.problem.record, x0, p, self.names, gradient)
+        y, dy, _ = self.simulator.sensitivities(self.problem.record, x0, p, self.names, gradient)
         columns = list(self.problem.columns)
         dy[:, :, : self.q] *= self.scale
         return y[:, columns], dy[:, columns, :]

@@ -12,7 +12,6 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply
 from adaptive_flot.greybox.quantities import Kind
 
-
 Role = Literal["process", "sensor", "actuator", "feed"]
 
 
@@ -80,7 +79,8 @@ class Scope:
         """Pass a physical quantity through a named site, once or once per component of the same quantity.
 
         `role` is the kind of thing it is: only sensors and actuators can lag. `mode` says how an effect acts here
-        unless it says so itself: it multiplies the quantity by exp(g), or adds g in the quantity's unit. With `unit`, what an effect here is given in can be checked.
+        unless it says so itself: it multiplies the quantity by exp(g), or adds g in the quantity's unit. With
+        `unit`, what an effect here is given in can be checked.
         """
         before = self.sites.get(name, Site(name, role, mode, 0, unit))
         self.sites[name] = replace(before, passed=before.passed + 1)
