@@ -5,12 +5,13 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
 from adaptive_flot.errors import AdaptiveFlotError
 
+T = TypeVar("T")
 USER_ERROR = 2
 
 app = typer.Typer(
@@ -45,6 +46,9 @@ CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML)
 def run(
     scenario: Annotated[str, typer.Argument(help="Scenario file, or the name of a shipped scenario.")],
     estimator: Annotated[list[str] | None, typer.Option(help="Estimator (repeatable); default the scenario's.")] = None,
+    controller: Annotated[
+        list[str] | None, typer.Option(help="Controller (repeatable); default the scenario's.")
+    ] = None,
     seed: Annotated[
         list[int] | None, typer.Option(min=0, help="Noise seed (repeatable); default the scenario's.")
     ] = None,
@@ -59,10 +63,10 @@ def run(
     from adaptive_flot.runner.study import run_scenario
 
     loaded = load_scenario(scenario)
-    combinations = loaded.combinations(estimator or list(loaded.file.estimators))
-    count = len(combinations) * len(seed or loaded.file.seeds)
+    who = _once(estimator), _once(controller)
+    count = len(loaded.combinations(*who)) * len(_once(seed) or set(loaded.file.seeds))
     with progress_bar(loaded.name, count) as advance:
-        runs = run_scenario(loaded, estimator or (), seed or (), advance)
+        runs = run_scenario(loaded, who[0], _once(seed), advance, who[1])
     folder = out or Path("results") / loaded.name
     write_runs(runs, folder, ".parquet" if parquet else ".csv")
     summary = run_summary(loaded, runs)
@@ -169,14 +173,16 @@ def compare(
 
     found = comparison.compare(read_runs(results))
     tables = [compare_tables.compare_tables(c) for c in found]
+    overview = [table for table in (compare_tables.overview_table(found),) if table is not None]
     if json is not None:
         write_json(json, {"comparisons": [c.summary() for c in found]})
     if markdown is not None:
-        write_text(markdown, "\n".join(compare_tables.markdown(t) for ts in tables for t in ts))
+        write_text(markdown, "\n".join(compare_tables.markdown(t) for ts in (overview, *tables) for t in ts))
     if out is not None:
         write_compare_report(found, out / "comparison.html", command=_command())
     for one, shown in zip(found, tables, strict=True):
         print_comparison(shown, findings(one))
+    print_comparison(overview, [])
     if out is not None:
         typer.echo(f"Report: {out / 'comparison.html'}")
 
@@ -199,6 +205,11 @@ def main() -> None:
     except AdaptiveFlotError as error:
         sys.stderr.write(f"adaptive-flot: {' '.join(str(error).split())}\n")
         sys.exit(USER_ERROR)
+
+
+def _once(given: list[T] | None) -> list[T]:
+    """What a repeatable option was given, each once."""
+    return list(dict.fromkeys(given or ()))
 
 
 def _command() -> str:

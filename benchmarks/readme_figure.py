@@ -1,4 +1,4 @@
-"""Draw the README's picture: `python -m benchmarks.readme_figure` writes docs/paper_scenario_1.png."""
+"""Draw the README's pictures: `python -m benchmarks.readme_figure` writes them to docs/."""
 
 from __future__ import annotations
 
@@ -8,23 +8,35 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from adaptive_flot.files import replace_path
-from adaptive_flot.report import figures, series
+from adaptive_flot.report import closed_loop, figures, series
 from adaptive_flot.runner.scenario import load_scenario
 from adaptive_flot.runner.study import run_scenario
 
-TARGET = Path(__file__).parents[1] / "docs" / "paper_scenario_1.png"
+FOLDER = Path(__file__).parents[1] / "docs"
+CLOSED_LOOP = ("air flow", "concentrate grade", "recovery")
 
 
-def draw() -> Figure:
+def draw_paper_scenario() -> Figure:
     """Scenario 1, seed 1: adapted parameters and grade, with truth, constant parameters and RPEM."""
     scenario = load_scenario("paper_scenario_1")
     (case,) = series.cases([(scenario, run_scenario(scenario, seeds=[1]))])
     return figures.time_figure([*series.parameter_panels(case), series.output_panels(case)[0]])
 
 
+def draw_closed_loop() -> Figure:
+    """closed_loop_drift, seed 1, economic MPC: air flow, grade and recovery with RPEM, fixed and true parameters."""
+    scenario = load_scenario("closed_loop_drift")
+    case = series.cases([(scenario, run_scenario(scenario, seeds=[1]))])[0]
+    assert case.controller == "economic_mpc"
+    return figures.time_figure([p for p in closed_loop.operation_panels(case) if p.label in CLOSED_LOOP])
+
+
+PICTURES = {"paper_scenario_1.png": draw_paper_scenario, "closed_loop_drift.png": draw_closed_loop}
+
 if __name__ == "__main__":
-    stream = io.BytesIO()
-    draw().savefig(stream, format="png", dpi=130, bbox_inches="tight")
-    with replace_path(TARGET) as temporary:
-        temporary.write_bytes(stream.getvalue())
-    print(TARGET.relative_to(Path.cwd()) if TARGET.is_relative_to(Path.cwd()) else TARGET)
+    for name, draw in PICTURES.items():
+        stream = io.BytesIO()
+        draw().savefig(stream, format="png", dpi=130, bbox_inches="tight")
+        with replace_path(FOLDER / name) as temporary:
+            temporary.write_bytes(stream.getvalue())
+        print(f"docs/{name}")

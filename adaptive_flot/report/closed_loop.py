@@ -12,12 +12,13 @@ from adaptive_flot.protocols import Limits
 from adaptive_flot.report.plotdata import Panel, Role, Trace
 from adaptive_flot.report.series import Case, changes
 from adaptive_flot.report.strips import Strip
+from adaptive_flot.runner.comparison import ORACLE
 from adaptive_flot.runner.study import Run
 
 
 def colours(case: Case) -> dict[str, tuple[Role, int]]:
     """A colour for each estimator, whether its estimates move or not: here it stands for a course of the plant."""
-    return {who: (Role.ESTIMATE, j) for j, who in enumerate(case.first)}
+    return {who: (Role.KNOWING if who == ORACLE else Role.ESTIMATE, j) for j, who in enumerate(case.first)}
 
 
 def operation_panels(case: Case) -> list[Panel]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from adaptive_flot.files import write_text
 from adaptive_flot.report import distributions
 from adaptive_flot.report.compare_findings import findings
-from adaptive_flot.report.compare_tables import compare_tables, spread_text
+from adaptive_flot.report.compare_tables import compare_tables, overview_table, spread_text
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Role, Spread
 from adaptive_flot.report.tables import seed_list
@@ -57,7 +57,7 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
         contents=[(c.anchor, c.title) for c in chapters],
         made=made_by(command),
     )
-    return render("compare.html", page, chapters=chapters)
+    return render("compare.html", page, overview=overview_table(comparisons), chapters=chapters)
 
 
 def compare_chapter(comparison: Comparison, anchor: str, album: Album) -> Chapter:

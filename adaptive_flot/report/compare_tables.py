@@ -45,6 +45,23 @@ def outcome_table(comparison: Comparison) -> Table | None:
     return _table(comparison, caption, columns)
 
 
+def overview_table(comparisons: Sequence[Comparison]) -> Table | None:
+    """The outcomes of all scenarios in one table; None unless there are several with economics."""
+    parts = [(c, table) for c in comparisons if (table := outcome_table(c)) is not None]
+    if len(parts) < 2:
+        return None
+    header = list(dict.fromkeys(heading for _, table in parts for heading in table.header))
+    rows = [
+        (comparison.scenario, *(dict(zip(table.header, row, strict=True)).get(heading, "–") for heading in header))
+        for comparison, table in parts
+        for row in table.rows
+    ]
+    same = len({spread_text(c) for c, _ in parts}) == 1
+    caption = f"All scenarios. {spread_text(parts[0][0]) if same else 'Medians, and ranges, over the seeds of each.'}"
+    words = 1 + max(table.words for _, table in parts)
+    return Table(caption, ("Scenario", *header), tuple(rows), words)
+
+
 def value_table(comparison: Comparison) -> Table | None:
     """Economic value by named term; None without economics."""
     terms = [

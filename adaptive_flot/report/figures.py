@@ -89,6 +89,8 @@ def look(role: Role, index: int) -> dict[str, Any]:
         return {"color": style.TRUTH, "lw": 1.1, "zorder": 3, "ls": ("-", "--", ":", "-.")[index % 4]}
     if role is Role.CONSTANT:
         return {"color": style.CONSTANT, "lw": 1.5, "zorder": 2, "ls": (0, (5, 1.5))}
+    if role is Role.KNOWING:
+        return {"color": style.TRUTH, "lw": 1.1, "zorder": 6, "ls": (0, (4, 3))}
     if role is Role.FOLLOWED:
         return {"color": style.colour(index), "lw": 1.0, "zorder": 3, "ls": ":"}
     if role is Role.PLAN:

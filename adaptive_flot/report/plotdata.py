@@ -15,6 +15,7 @@ class Role(Enum):
     TRUTH = "truth"
     CONSTANT = "constant"
     ESTIMATE = "estimate"
+    KNOWING = "knowing"  # what perfect knowledge would do
     FOLLOWED = "followed"
     PLAN = "plan"
 

@@ -36,16 +36,17 @@ class Prepared:
     _built: dict[str, AnyEstimator] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, scenario: Scenario, estimators: Sequence[str] = ()) -> Prepared:
-        """The estimators named (default all of the scenario) and the scenario's controllers.
+    def of(cls, scenario: Scenario, estimators: Sequence[str] = (), controllers: Sequence[str] = ()) -> Prepared:
+        """The estimators and controllers named, default all of the scenario.
 
         Raises
         ------
         ScenarioError
-            Unknown estimator.
+            Unknown estimator or controller.
         """
         chosen = {name: estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
-        return cls(scenario, chosen, scenario.file.controllers)
+        moved = {name: controller_plugin(scenario, name) for name in controllers} or dict(scenario.file.controllers)
+        return cls(scenario, chosen, moved)
 
     def setup(self, name: str) -> Setup:
         """What the estimator of that name is built for; only the oracle is shown the truth, and the plant's model."""
@@ -94,8 +95,23 @@ def estimator_plugin(scenario: Scenario, name: str) -> Plugin:
     ScenarioError
         None of these; the message holds the nearest name.
     """
-    if name in scenario.file.estimators:
-        return scenario.file.estimators[name]
-    if name in ESTIMATORS or ":" in name:
+    return _plugin(name, "estimator", scenario.file.estimators, ESTIMATORS)
+
+
+def controller_plugin(scenario: Scenario, name: str) -> Plugin:
+    """Plug-in behind a name: of the scenario, a shipped one or `my_file:MyController`.
+
+    Raises
+    ------
+    ScenarioError
+        None of these; the message holds the nearest name.
+    """
+    return _plugin(name, "controller", scenario.file.controllers, CONTROLLERS)
+
+
+def _plugin(name: str, what: str, own: Mapping[str, Plugin], shipped: Mapping[str, str]) -> Plugin:
+    if name in own:
+        return own[name]
+    if name in shipped or ":" in name:
         return Plugin(use=name)
-    raise ScenarioError(f"unknown estimator {name!r}; {near_match(name, {*scenario.file.estimators, *ESTIMATORS})}")
+    raise ScenarioError(f"unknown {what} {name!r}; {near_match(name, {*own, *shipped})}")

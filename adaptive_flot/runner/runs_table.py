@@ -110,6 +110,8 @@ def _read(found: Path, path: Path) -> pd.DataFrame:
 
 
 def _read_summary(file: Path, path: Path) -> pd.DataFrame:
+    if file.suffix != ".json":
+        raise ResultError(f"{path}: neither a folder nor a summary (.json, .parquet); give the folder that `run` wrote")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

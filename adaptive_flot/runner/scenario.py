@@ -94,11 +94,20 @@ class Scenario:
             return None
         return Prices(part.metal_per_kg, part.treatment_per_kg, part.air_per_m3, part.reagent_per_m3)
 
-    def combinations(self, estimators: Sequence[str]) -> list[tuple[str, str]]:
-        """(controller, estimator) to run: the cases of the scenario, or every controller with every estimator."""
-        if self.file.cases:
-            return [(c.controller, c.estimator) for c in self.file.cases if c.estimator in estimators]
-        return [(controller, name) for controller in self.file.controllers for name in estimators]
+    def combinations(self, estimators: Sequence[str] = (), controllers: Sequence[str] = ()) -> list[tuple[str, str]]:
+        """(controller, estimator) to run: the scenario's cases, or of these the ones with the names given.
+
+        Where both are given, or the scenario has no cases, every controller runs with every estimator. An estimator in
+        no case runs with the scenario's first controller, a controller in no case with every estimator.
+        """
+        file = self.file
+        every, moved = list(estimators or file.estimators), list(controllers or file.controllers)
+        if not file.cases or (estimators and controllers):
+            return [(controller, name) for controller in moved for name in every]
+        cases = [(c.controller, c.estimator) for c in file.cases]
+        apart = [(moved[0], name) for name in estimators if name not in {e for _, e in cases}]
+        apart += [(c, name) for c in controllers if c not in {known for known, _ in cases} for name in every]
+        return [case for case in cases if case[0] in moved and case[1] in every] + apart
 
     def schedule(self, seed: int) -> FloatArray:
         """Planned inputs (N, nu) of a run."""

@@ -88,8 +88,9 @@ def run_scenario(
     estimators: Sequence[str] = (),
     seeds: Sequence[int] = (),
     progress: Progress = lambda: None,
+    controllers: Sequence[str] = (),
 ) -> list[Run]:
-    """Run every combination of estimator, controller and seed.
+    """Run combinations of estimator and controller (see `Scenario.combinations`), each with every seed.
 
     Parameters
     ----------
@@ -101,6 +102,8 @@ def run_scenario(
         Noise seeds; default those of the scenario.
     progress
         Called after each run.
+    controllers
+        Names among the scenario's controllers, shipped names or `my_file:MyController`; default those of the scenario.
 
     Raises
     ------
@@ -109,11 +112,11 @@ def run_scenario(
     """
     runs: list[Run] = []
     with located(scenario.path):
-        prepared = Prepared.of(scenario, estimators)
-        for seed in seeds or scenario.file.seeds:
+        prepared = Prepared.of(scenario, estimators, controllers)
+        for seed in dict.fromkeys(seeds or scenario.file.seeds):
             # before it starts, no estimator has touched a run: one fit for all with the same controller
             initial: dict[str, dict[str, BatchFit]] = {}
-            for controller, name in scenario.combinations(list(prepared.estimators)):
+            for controller, name in scenario.combinations(estimators, controllers):
                 runs.append(run_one(prepared, name, controller, seed, initial.setdefault(controller, {})))
                 progress()
     return runs

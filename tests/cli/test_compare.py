@@ -42,7 +42,7 @@ def test_closed_loops_of_several_results(call: Call, tmp_path: Path) -> None:
         (["nowhere"], "nowhere: no such file or folder"),
         (["empty"], "empty: no results in this folder"),
         (["."], ".: no results in this folder (no summary.json, no Parquet table of runs); its folders r1, r2 have"),
-        (["page.html"], "page.html: not a JSON summary"),
+        (["page.html"], "page.html: neither a folder nor a summary"),
         (["r1", "r1/summary.json"], "give each once"),
         (["r1", "r2"], "r2: scenario 'drift' differs from that of r1"),
         (["r1", "--out", "page.html"], "page.html"),

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from adaptive_flot.report.compare import compare_report
 from adaptive_flot.report.compare_findings import findings
-from adaptive_flot.report.compare_tables import compare_tables, markdown
+from adaptive_flot.report.compare_tables import compare_tables, markdown, overview_table
 from adaptive_flot.report.page import Table
 from adaptive_flot.runner.comparison import Comparison, compare
+from benchmarks.readme_table import BEGIN, END, README, put
 from tests.report.test_run_report import Links
 
 VALUES = {("mpc", "rpem"): 11.5, ("mpc", "fixed"): 10.0, ("mpc", "oracle"): 12.0, ("pi", "fixed"): 9.0}
@@ -68,6 +71,24 @@ def test_tables_hold_medians_and_ranges_in_the_units_of_their_headings() -> None
     assert column(fits, "n [%]") == ["97.00"] * 4
     for table in (outcome, value, decisions, fits):
         assert all(len(row) == len(table.header) for row in table.rows)
+
+
+def test_the_overview_joins_scenarios_and_keeps_columns_in_their_place() -> None:
+    """One scenario has an oracle and so a share, the other has none: its cell is a dash, not the next column's."""
+    first, second = comparison(), replace(comparison(), scenario="feed")
+    second = replace(second, contenders=tuple(c for c in second.contenders if c.estimator != "oracle"))
+    assert overview_table([first]) is None
+    table = overview_table([first, second])
+    assert table is not None
+    assert [row[0] for row in table.rows] == ["drift"] * 4 + ["feed"] * 3
+    assert column(table, "Share of oracle's gain [%]") == ["75.0", "0.0", "100.0", "–", "–", "–", "–"]
+    assert column(table, "Below limit [% of time]")[3::3] == ["30.0", "30.0"]
+
+
+def test_the_table_of_the_readme_is_replaced_between_its_marks() -> None:
+    text = f"before\n{BEGIN}\nold\n{END}\nafter\n"
+    assert put(text, "| new |") == f"before\n{BEGIN}\n\n| new |\n\n{END}\nafter\n"
+    assert BEGIN in README.read_text() and END in README.read_text()
 
 
 def test_markdown_is_a_table_a_renderer_takes() -> None:
