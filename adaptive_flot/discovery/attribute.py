@@ -19,7 +19,7 @@ from adaptive_flot.greybox.model import Model
 
 SHORTLIST = 10
 """Candidates that are refitted in full."""
-FORMS_EACH = 2
+FORMS_EACH = 3
 FIRST_STEPS = 3
 """Gauss-Newton steps of the first heat, in which every candidate runs."""
 FINALISTS = 4

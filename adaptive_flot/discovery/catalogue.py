@@ -125,6 +125,11 @@ def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:
             ramp = Effect(site.name, "time", "ramp")
             start = (("onset", float(onset)), ("duration", float(duration)))
             yield Variant(ramp, (Course(site.name, values, offset),), ("amplitude",), start)
+    for onset in onsets[:-2:3]:
+        values = 1 - np.exp(-np.maximum(time - onset, 0) / (0.1 * span))
+        washout = Effect(site.name, "time", "washout")
+        start = (("onset", float(onset)), ("time_constant", 0.1 * span))
+        yield Variant(washout, (Course(site.name, values, offset),), ("amplitude",), start)
     knots = tuple(float(k) for k in np.linspace(low, high, TIME_KNOTS))
     yield _curve(site, "time", time, knots, offset)
 

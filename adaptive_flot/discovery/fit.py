@@ -12,7 +12,7 @@ from typing import cast
 
 import numpy as np
 
-from adaptive_flot.discovery.noise import CLIP, Noise, fit_noise
+from adaptive_flot.discovery.noise import CLIP, MOST_LAGS, Noise, fit_noise
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -89,7 +89,7 @@ def loss_of(
 ) -> tuple[float, Noise]:
     """Minus two log-likelihood on some rows; with the noise model given, or fitted to these rows."""
     weighted = (problem.measured - predicted) / problem.weights
-    noise = noise or fit_noise(weighted, rows, problem.floor)
+    noise = noise or fit_noise(weighted, rows, problem.floor, MOST_LAGS if problem.whiten else 0)
     e = noise.whiten(weighted)[rows]
     present = np.isfinite(e)
     squares = np.minimum(np.where(present, e, 0) ** 2, CLIP**2)

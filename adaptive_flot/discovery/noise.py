@@ -72,20 +72,20 @@ def clipped_std(e: FloatArray) -> float:
     return std
 
 
-def fit_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray) -> Noise:
+def fit_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray, orders: int = MOST_LAGS) -> Noise:
     """Noise model of a weighted residual (N, m), fitted on the rows (N,) that are true; NaN where missing.
 
-    The order of the autoregression (0 to 3) is chosen per output by the Bayesian information criterion. `floor` (m,) is
-    the smallest standard deviation believed.
+    The order of the autoregression (0 to `orders`) is chosen per output by the Bayesian information criterion. `floor`
+    (m,) is the smallest standard deviation believed.
     """
     m = residual.shape[1]
     lags, std = np.zeros((m, MOST_LAGS)), np.zeros(m)
     for j in range(m):
-        std[j], lags[j] = _one_output(residual[:, j], rows)
+        std[j], lags[j] = _one_output(residual[:, j], rows, orders)
     return Noise(np.maximum(std, floor), lags)
 
 
-def _one_output(r: FloatArray, rows: NDArray[np.bool_]) -> tuple[float, FloatArray]:
+def _one_output(r: FloatArray, rows: NDArray[np.bool_], orders: int) -> tuple[float, FloatArray]:
     nothing = np.zeros(MOST_LAGS)
     first = clipped_std(r[rows])
     if not first > 0:
@@ -98,7 +98,7 @@ def _one_output(r: FloatArray, rows: NDArray[np.bool_]) -> tuple[float, FloatArr
     if count < FEWEST_PAIRS:
         return first, nothing
     best, chosen = np.inf, (first, nothing)
-    for order in range(MOST_LAGS + 1):
+    for order in range(orders + 1):
         a = np.zeros(MOST_LAGS)
         if order:
             a[:order] = np.linalg.lstsq(past[usable, :order], clipped[usable], rcond=None)[0]

@@ -37,6 +37,9 @@ class Problem:
         Relative size of the noise of each measured output (N, m).
     floor
         Smallest noise believed (m,).
+    whiten
+        Whether residuals are whitened. Not where model error outweighs the noise by far: there a noise model would
+        explain the error away, and what counts is the free run.
     """
 
     record: Dataset
@@ -45,6 +48,7 @@ class Problem:
     blocks: NDArray[np.str_]
     weights: FloatArray
     floor: FloatArray
+    whiten: bool = True
 
     @property
     def measured(self) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,34 +94,35 @@ def search(
     fitter = Fitter(problem)
     progress("score")
     scorer, sites = _scorer(problem, base)
-    first = _round(problem, fitter, base, scorer, [None], processes, progress)
-    rounds = [first]
-    best = _accepted(problem, base, first, None)
-    if best is None:
-        return Search(base, tuple(rounds), (), None, *_left(scorer, first.threshold), sites)
-    chosen = first
-    while True:
+    rounds = [_round(problem, fitter, base, scorer, [None], processes, progress)]
+    accepted: list[Round] = []
+    best: Alternative | None = None
+    left = _left(scorer, rounds[0].threshold)
+    while _better(problem, base, best, rounds[-1]):
+        accepted.append(rounds[-1])
+        best = rounds[-1].alternatives[0]
         progress("what is left")
         scorer, _ = _scorer(problem, best.fit)
-        threshold = _threshold(scorer)
-        left = scorer.scores()
-        done = not left or left[0].penalised < threshold or len(best.names) == MOST_EFFECTS
-        if done or not _worth_extending(problem, base, best, scorer, left):
+        left = _left(scorer, _threshold(scorer))
+        if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left):
             break
-        further = _round(problem, fitter, base, scorer, _beam(chosen, best), processes, progress)
-        rounds.append(further)
-        better = _accepted(problem, base, further, best)
-        if better is None:
-            break
-        best, chosen = better, further
-    return Search(
-        base,
-        tuple(rounds),
-        chosen.alternatives,
-        verify(problem, base, best.fit),
-        *_left(scorer, threshold),
-        sites,
-    )
+        rounds.append(_round(problem, fitter, base, scorer, _beam(rounds[-1], best), processes, progress))
+    return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites), accepted)
+
+
+def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:
+    """Keep the largest model that stands on the confirm share; failing that, the evidence of the largest."""
+    for r in reversed(accepted):
+        verification = verify(problem, found.base, r.alternatives[0].fit)
+        if verification.confirmed or r is accepted[0]:
+            last = r is accepted[-1]
+            left = found.left if last else max(found.left, r.alternatives[0].fit.bic - _best_bic(accepted))
+            return replace(found, alternatives=r.alternatives, verification=verification, left=left)
+    return found
+
+
+def _best_bic(rounds: list[Round]) -> float:
+    return min(a.fit.bic for r in rounds for a in r.alternatives)
 
 
 def _scorer(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
@@ -168,17 +169,14 @@ def _beam(last: Round, best: Alternative) -> list[Alternative | None]:
     return [best, *others[: BEAM - 1]]
 
 
-def _accepted(problem: Problem, base: Fit, found: Round, before: Alternative | None) -> Alternative | None:
-    """Best alternative of a round, if it brings evidence and stands on the confirm share."""
+def _better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:
+    """Whether the best alternative of a round brings evidence and, as a further effect, substance."""
     if not found.alternatives:
-        return None
-    best = found.alternatives[0]
-    reference = before.fit if before else base
+        return False
+    best, reference = found.alternatives[0], before.fit if before else base
     if best.fit.bic > reference.bic - found.threshold:
-        return None
-    if before is not None and _excess(problem, reference, best.fit) < SUBSTANCE * _excess(problem, base, best.fit):
-        return None
-    return best if verify(problem, reference, best.fit).confirmed else None
+        return False
+    return before is None or _excess(problem, reference, best.fit) > SUBSTANCE * _excess(problem, base, best.fit)
 
 
 def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
@@ -189,10 +187,12 @@ def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
     return float(old - new)
 
 
-def _worth_extending(problem: Problem, base: Fit, best: Alternative, scorer: Scorer, left: list[Score]) -> bool:
+def _worth_extending(problem: Problem, base: Fit, best: Alternative, left: tuple[float, float]) -> bool:
     """Whether what is left is a substantial share of what there was, judged by first-order gains on one noise."""
-    del scorer
+    gain, threshold = left
+    if gain < threshold:
+        return False
     size = problem.weights * best.fit.noise.std
     rows = problem.rows("estimate")
     removed = np.nansum(((base.residual(problem) / size) ** 2 - (best.fit.residual(problem) / size) ** 2)[rows])
-    return left[0].gain > SUBSTANCE / 2 * float(removed)
+    return gain > SUBSTANCE / 2 * float(removed)

@@ -16,6 +16,8 @@ Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 LARGEST_CLASS = 3
+SLOW_S = 120.0
+"""A change of an adapted parameter over at least this long is a drift, which adaptation is there to follow."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,11 @@ def judge(found: Search) -> Judgement:
     if not found.alternatives:
         return Judgement("none", None, (), (), LEAST_MARGIN)
     best = found.alternatives[0]
+    if found.verification and not found.verification.confirmed:
+        sure = found.verification.reduction95[0] > 0  # smaller, but not everywhere: something else is the matter
+        return Judgement(
+            "abstain" if sure else "none", best if sure else None, (), found.alternatives[1:6], LEAST_MARGIN
+        )
     shortcoming = found.left - found.left_threshold
     margin = max(LEAST_MARGIN, shortcoming)
     close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < margin]
@@ -152,4 +159,10 @@ def judge(found: Search) -> Judgement:
 
 
 def _only_drift(a: Alternative, adapted: tuple[str, ...]) -> bool:
-    return all(site in adapted and driver == "time" for site, driver in a.names)
+    """Whether adapted parameters that change slowly are all there is; a change at an onset is an event with a cause."""
+    slow = all(site in adapted and driver == "time" for site, driver in a.names)
+    return slow and all(_slow(e) for e in a.effects)
+
+
+def _slow(effect: Effect) -> bool:
+    return effect.form == "curve" or (effect.form == "ramp" and effect.coefficients["duration"] >= SLOW_S)

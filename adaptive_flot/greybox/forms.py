@@ -203,7 +203,7 @@ def _softplus(x: ca.SX, width: float) -> ca.SX:
 
 def _overflow(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     del m
-    return value + c["gain"] * _softplus(driver - c["threshold"], number(s, "width"))
+    return value + c["slope"] * driver + c["gain"] * _softplus(driver - c["threshold"], number(s, "width"))
 
 
 def _extra_linear(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
@@ -332,8 +332,9 @@ FORMS: Mapping[str, Form] = {
         ),
         Form(
             "overflow",
-            "what stands above a threshold of the driver spills",
+            "a further flow in proportion to the driver, and what stands above a threshold of it spills",
             _fixed(
+                Coefficient("slope", unit="value/driver", scale=0.01),
                 Coefficient("gain", 0.0, 0.0, scale=0.1, unit="value/driver"),
                 Coefficient("threshold", 0.0, scale=1.0, unit="driver", shape=True),
             ),
