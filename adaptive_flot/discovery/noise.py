@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from adaptive_flot.greybox.model import FloatArray
 
@@ -18,6 +19,9 @@ CLIP = 3.0
 _CLIPPED_VARIANCE = 0.99503
 """E[min(z^2, CLIP^2)] of a standard normal z."""
 MOST_LAGS = 3
+MEMORY = 2.0
+"""Noise is at most this many times as large as its innovations: what is slower and smoother is no measurement noise but
+physics that is missing, and a noise model that may be as slow as it likes would explain it away."""
 FEWEST_PAIRS = 200
 """Consecutive measured pairs that an autoregressive noise model asks for; a sparse assay has white noise."""
 
@@ -102,7 +106,7 @@ def _one_output(r: FloatArray, rows: NDArray[np.bool_], orders: int) -> tuple[fl
         a = np.zeros(MOST_LAGS)
         if order:
             a[:order] = np.linalg.lstsq(past[usable, :order], clipped[usable], rcond=None)[0]
-            a = _stable(a)
+            a = _short(a)
         std = clipped_std(r[usable] - past[usable] @ a)
         score = 2 * count * np.log(max(std, 1e-300)) + order * np.log(count)
         if score < best - 1e-9:
@@ -110,14 +114,28 @@ def _one_output(r: FloatArray, rows: NDArray[np.bool_], orders: int) -> tuple[fl
     return chosen
 
 
-def _stable(a: FloatArray) -> FloatArray:
-    """Pull the poles inside the unit circle, so that the noise has a variance."""
-    poles = np.roots(np.concatenate([[1.0], -a]))
-    largest = np.max(np.abs(poles))
-    if largest < 0.995:
+def _short(a: FloatArray) -> FloatArray:
+    """Pull the poles in until the noise is at most MEMORY times as large as its innovations."""
+    low, high = 0.0, 1.0
+    if _memory(a) <= MEMORY:
         return a
-    pulled: FloatArray = a * (0.995 / largest) ** np.arange(1, len(a) + 1)
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _memory(_pulled(a, middle)) <= MEMORY else (low, middle)
+    return _pulled(a, low)
+
+
+def _pulled(a: FloatArray, share: float) -> FloatArray:
+    pulled: FloatArray = a * share ** np.arange(1, len(a) + 1)
     return pulled
+
+
+def _memory(a: FloatArray) -> float:
+    """Standard deviation of an autoregression over that of its innovations; infinite when it is not stable."""
+    if np.max(np.abs(np.roots(np.concatenate([[1.0], -a])))) >= 1:
+        return float("inf")
+    response = lfilter([1.0], np.concatenate([[1.0], -a]), np.concatenate([[1.0], np.zeros(500)]))
+    return float(np.sqrt(np.sum(response**2)))
 
 
 def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:
