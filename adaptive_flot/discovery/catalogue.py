@@ -22,6 +22,8 @@ TIME_KNOTS = 7
 DRIVER_KNOTS = 4
 LAGS_S = (5.0, 15.0, 45.0, 120.0)
 DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
+SPILL_QUANTILES = (0.5, 0.7, 0.85, 0.95)
+"""A spill is scored with its edge at these quantiles of the level."""
 LEAST_RANGE = 0.02
 """A driver that moves by less than this share of its mean tells nothing about a dependence."""
 
@@ -108,7 +110,7 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
     elif driver in ("lag", "delay"):
         yield from _late(site, driver, responses)
     else:
-        yield from _on_signal(site, driver, responses.drivers[driver], offset)
+        yield from _on_signal(site, driver, responses.drivers[driver], offset, responses.fit.model.names("states"))
 
 
 def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:
@@ -134,7 +136,7 @@ def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:
     yield _curve(site, "time", time, knots, offset)
 
 
-def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool) -> Iterator[Variant]:
+def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states: Sequence[str]) -> Iterator[Variant]:
     reference = float(np.median(values))
     spread = float(np.quantile(values, 0.98) - np.quantile(values, 0.02))
     if not (reference > 0 and spread > LEAST_RANGE * reference):
@@ -147,6 +149,18 @@ def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool) -> Ite
     knots = _knots(values)
     if knots is not None:
         yield _curve(site, driver, values, knots, offset)
+    if site.role == "flow" and driver in states:
+        yield from _spills(site, driver, values)
+
+
+def _spills(site: Site, driver: str, values: FloatArray) -> Iterator[Variant]:
+    """A flow from a store may be larger than its law says, and take what stands above an edge."""
+    effect = Effect(site.name, driver, "overflow")
+    for share in SPILL_QUANTILES:
+        edge = float(np.quantile(values, share))
+        above = np.maximum(values - edge, 0)
+        courses = Course(site.name, values, True), Course(site.name, above, True)
+        yield Variant(effect, courses, ("slope", "gain"), (("threshold", edge),))
 
 
 def _knots(values: FloatArray) -> tuple[float, ...] | None:

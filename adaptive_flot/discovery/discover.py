@@ -12,13 +12,14 @@ from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.fit import Fit, Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.noise import proportional
-from adaptive_flot.discovery.problem import Problem, make_problem
+from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
 from adaptive_flot.discovery.verdict import Judgement, NamedEffect, Verdict, judge
 from adaptive_flot.discovery.verify import changes, whiteness
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.record import RecordSimulator
 
 BURN_IN_ROWS = 30
 GUARD_ROWS = 5
@@ -55,6 +56,7 @@ def discover(
     record: Dataset,
     *,
     adapted: Sequence[str] = (),
+    report_record: Dataset | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
@@ -68,6 +70,9 @@ def discover(
         Measured record, from `read_dataset`.
     adapted
         Names of the free parameters instead of those of role "estimated".
+    report_record
+        A further record of the same process that starts in the same (unknown) state. It reports the error before and
+        after and is used for nothing else; the whole of `record` can then be used to search.
     processes
         Fits that run at once.
     progress
@@ -92,7 +97,7 @@ def discover(
     if checked.reasons:
         return Discovery(_insufficient(checked, began), model, checked)
     progress("fit the model as it is")
-    prepared = _prepare(checked.record, model, names)
+    prepared = _prepare(checked.record, model, names, CYCLE if report_record is None else WITHOUT_REPORT)
     if prepared is None:
         reason = f"the model can not simulate the record: check the units of its columns and the model '{model.name}'"
         return Discovery(_insufficient(replace(checked, reasons=(reason,)), began), model, checked)
@@ -101,16 +106,18 @@ def discover(
     judgement = judge(found)
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)
-    verdict = _verdict(problem, checked, found, judgement, before, after)
+    verdict = _verdict(problem, checked, found, judgement, before, after, report_record)
     extended = after.model if judgement.word in ("named", "class", "unnamed") else before.model
     verdict = replace(verdict, seconds=time.perf_counter() - began)
     return Discovery(verdict, extended, checked, problem, found, judgement, before, after)
 
 
-def _prepare(record: Dataset, model: Model, adapted: tuple[str, ...]) -> tuple[Problem, Fit] | None:
+def _prepare(
+    record: Dataset, model: Model, adapted: tuple[str, ...], cycle: Sequence[str]
+) -> tuple[Problem, Fit] | None:
     """Split the record and fit the model as it is, twice: the first residual shows how the noise grows."""
     burn_in = min(BURN_IN_ROWS, len(record) // 20)
-    problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS)
+    problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS, cycle=cycle)
     first = Fitter(problem).fit(model, rounds=1)
     if first is None:
         return None
@@ -128,12 +135,34 @@ def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, 
     return before, after
 
 
+def on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tuple[Problem, Fit, Fit]:
+    """Free runs of fits over another record from their own initial state: its problem and the fits with them."""
+    n, columns = len(record), list(problem.columns)
+    everywhere = np.full(n, "report", dtype="<U8")
+    weights = np.ones((n, len(columns)))
+    there = replace(problem, record=record, blocks=everywhere, weights=weights)
+
+    def run(fit: Fit) -> Fit:
+        free = RecordSimulator(fit.model, record.dt).outputs(record, fit.initial_state, fit.model.parameter_values)
+        return replace(fit, predicted=free[:, columns])
+
+    return there, run(before), run(after)
+
+
 def _insufficient(checked: Gate, began: float) -> Verdict:
     reason = "The record does not say enough: " + "; ".join(checked.reasons) + "."
     return Verdict("insufficient", reason, notes=checked.notes, seconds=time.perf_counter() - began)
 
 
-def _verdict(problem: Problem, checked: Gate, found: Search, judgement: Judgement, before: Fit, after: Fit) -> Verdict:
+def _verdict(
+    problem: Problem,
+    checked: Gate,
+    found: Search,
+    judgement: Judgement,
+    before: Fit,
+    after: Fit,
+    report: Dataset | None,
+) -> Verdict:
     tells = judgement.word in ("named", "class", "unnamed")
     final = after if tells or judgement.best is not None else before
     labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
@@ -148,6 +177,9 @@ def _verdict(problem: Problem, checked: Gate, found: Search, judgement: Judgemen
     effects = _effects(judgement, after) if tells else ()
     drift = _drift(judgement, after) if judgement.word == "none" and judgement.best else ()
     error = changes(problem, before, final, "report")
+    if report is not None:
+        there, old, new = on_record(problem, report, before, final)
+        error = changes(there, old, new, "report")
     return Verdict(
         word=judgement.word,
         reason=_reason(judgement, found, effects, drift),

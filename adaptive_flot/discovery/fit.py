@@ -92,7 +92,7 @@ def loss_of(
     noise = noise or fit_noise(weighted, rows, problem.floor, MOST_LAGS if problem.whiten else 0)
     e = noise.whiten(weighted)[rows]
     present = np.isfinite(e)
-    squares = np.minimum(np.where(present, e, 0) ** 2, CLIP**2)
+    squares = np.minimum(np.abs(np.where(present, e, 0)), CLIP) ** 2
     return float(np.sum(squares) + 2 * np.sum(np.log(noise.std) * present.sum(axis=0))), noise
 
 

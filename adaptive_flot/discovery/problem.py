@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -16,6 +17,8 @@ BoolArray = NDArray[np.bool_]
 CYCLE = ("estimate", "estimate", "confirm", "estimate", "report")
 """Shares of the record, in turn: 60 % to estimate, 20 % to confirm, 20 % to report. Blocks are interleaved in time, so
 that an event at any time has rows of each kind around it."""
+WITHOUT_REPORT = ("estimate", "estimate", "confirm", "estimate")
+"""The same where a record of its own reports."""
 CYCLES = 4
 
 
@@ -67,7 +70,14 @@ class Problem:
 
 
 def make_problem(
-    record: Dataset, model: Model, adapted: tuple[str, ...], *, burn_in: int, guard: int, cycles: int = CYCLES
+    record: Dataset,
+    model: Model,
+    adapted: tuple[str, ...],
+    *,
+    burn_in: int,
+    guard: int,
+    cycles: int = CYCLES,
+    cycle: Sequence[str] = CYCLE,
 ) -> Problem:
     """Split a record.
 
@@ -81,16 +91,18 @@ def make_problem(
         Rows at the start that no share gets, because the initial state is not known.
     guard
         Rows left out at each border between shares.
+    cycle
+        Shares of one cycle.
     cycles
         How often the pattern of shares repeats.
     """
     n = len(record)
     columns = tuple(model.index("outputs", name) for name in record.measured(model))
     blocks = np.full(n, "", dtype="<U8")
-    edges = np.linspace(burn_in, n, cycles * len(CYCLE) + 1).round().astype(int)
+    edges = np.linspace(burn_in, n, cycles * len(cycle) + 1).round().astype(int)
     for k, (start, stop) in enumerate(pairwise(edges)):
-        share = CYCLE[k % len(CYCLE)]
-        same = k > 0 and CYCLE[(k - 1) % len(CYCLE)] == share
+        share = cycle[k % len(cycle)]
+        same = k > 0 and cycle[(k - 1) % len(cycle)] == share
         blocks[start + (0 if same or k == 0 else guard) : stop] = share
     scale = np.array([model.outputs[c].scale for c in columns])
     return Problem(record, columns, adapted, blocks, np.ones((n, len(columns))), 1e-7 * scale)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.attribute import Alternative, refit, shortlist
+from adaptive_flot.discovery.attribute import SHORTLIST, Alternative, refit, shortlist
 from adaptive_flot.discovery.catalogue import catalogue
 from adaptive_flot.discovery.fit import Fit, Fitter
 from adaptive_flot.discovery.problem import Problem
@@ -22,9 +22,12 @@ LEAST_EVIDENCE = 10.0
 """Drop of the information criterion that an effect must bring."""
 SUBSTANCE = 0.1
 """A further effect must remove at least this share of the excess error that the base model has on the confirm share."""
+SHORTLIST_FURTHER = 5
 BEAM = 2
 """Alternatives of one round that the next extends."""
-SHORTLIST_FURTHER = 5
+COSTLY = 600_000
+"""Rows times squared states of a record at which the search is this narrow; a smaller one is searched more widely."""
+WIDEST = 5
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,8 @@ def search(
         left = _left(scorer, _threshold(scorer))
         if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left):
             break
-        rounds.append(_round(problem, fitter, base, scorer, _beam(rounds[-1], best), processes, progress))
+        beam = _beam(rounds[-1], best, BEAM * _width(problem, base))
+        rounds.append(_round(problem, fitter, base, scorer, beam, processes, progress))
     return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites), accepted)
 
 
@@ -154,8 +158,9 @@ def _round(
     for k, before in enumerate(beam):
         if before is not None and k:
             scorer, _ = _scorer(problem, before.fit)
-        wanted = shortlist(scorer, SHORTLIST_FURTHER) if before else shortlist(scorer)
-        wanted = [s for s in wanted if s.penalised > threshold]
+        wanted = shortlist(scorer, (SHORTLIST_FURTHER if before else SHORTLIST) * _width(problem, base))
+        # a further effect must have a name: a pair of curves without one would explain anything
+        wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
         progress("fit")
         found += refit(fitter, base, scorer, wanted, before, processes, lambda: progress("fit"))
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
@@ -164,9 +169,15 @@ def _round(
     return Round(scores, threshold, tuple(unique.values()))
 
 
-def _beam(last: Round, best: Alternative) -> list[Alternative | None]:
-    others = [a for a in last.alternatives if a is not best]
-    return [best, *others[: BEAM - 1]]
+def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None]:
+    others = [a for a in last.alternatives if a is not best and all(a.known)]
+    return [best, *others[: width - 1]]
+
+
+def _width(problem: Problem, base: Fit) -> int:
+    """How much wider than the narrowest a search of this record can afford to be."""
+    cost = len(problem.record) * len(base.initial_state) ** 2
+    return int(np.clip(COSTLY // (2 * max(cost, 1)), 1, WIDEST))
 
 
 def _better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:

@@ -12,7 +12,7 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply
 from adaptive_flot.greybox.quantities import Kind
 
-Role = Literal["process", "sensor", "actuator", "feed"]
+Role = Literal["process", "sensor", "actuator", "feed", "flow"]
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,9 @@ class Scope:
     ) -> ca.SX:
         """Pass a physical quantity through a named site, once or once per component of the same quantity.
 
-        `role` is the kind of thing it is: only sensors and actuators can lag. `mode` says how an effect acts here
-        unless it says so itself: it multiplies the quantity by exp(g), or adds g in the quantity's unit. With
-        `unit`, what an effect here is given in can be checked.
+        `role` is the kind of thing it is: only sensors and actuators can lag, only a flow can spill. `mode` says how an
+        effect acts here unless it says so itself: it multiplies the quantity by exp(g), or adds g in the quantity's
+        unit. With `unit`, what an effect here is given in can be checked.
         """
         before = self.sites.get(name, Site(name, role, mode, 0, unit))
         self.sites[name] = replace(before, passed=before.passed + 1)

@@ -15,11 +15,29 @@ import numpy as np
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
+from adaptive_flot.greybox.quantities import KnownEffect
 from adaptive_flot.greybox.tables import numeric_column, read_table
 
 BENCHMARK_COLUMNS = ("uEst", "uVal", "yEst", "yVal", "Ts")
 _DRY = 1e-6
 """Level [V] below which the outflow is that of this level: keeps the square root and its slope finite."""
+
+
+KNOWN_EFFECTS = (
+    KnownEffect("upper_outflow", "upper_level", "outflow law of the upper tank, and what spills over its edge"),
+    KnownEffect("lower_inflow", "upper_level", "what of the upper tank's outflow and spill reaches the lower tank"),
+    KnownEffect("lower_outflow", "lower_level", "outflow law of the lower tank, and what spills over its edge"),
+    KnownEffect("pump_flow", "pump_voltage", "pump characteristic"),
+    KnownEffect("pump_flow", "time", "pump that wears or clogs"),
+    KnownEffect("pump_flow", "lag", "slow pump"),
+    KnownEffect("pump_flow", "delay", "dead time of the pump line"),
+    *(KnownEffect(f"{name}_outflow", "time", f"hole of the {name} tank that clogs") for name in ("upper", "lower")),
+    KnownEffect("level_sensor", "constant", "level sensor with an offset or gain error"),
+    KnownEffect("level_sensor", "lower_level", "level sensor that is not linear"),
+    KnownEffect("level_sensor", "time", "level sensor that drifts"),
+    KnownEffect("level_sensor", "lag", "slow level sensor"),
+)
+"""What may be missing in such a plant: any textbook's list, with no number in it."""
 
 
 def make_model() -> Model:
@@ -47,6 +65,7 @@ def make_model() -> Model:
         ),
         outputs=(Quantity("level", "V", "measured level of the lower tank", 0.0, 12.0, 1.0),),
         max_step_s=2.0,
+        known_effects=KNOWN_EFFECTS,
         equations=_equations,
         initial_guess={"upper_level": 5.0, "lower_level": 5.0},
         starts_steady=False,
@@ -57,9 +76,9 @@ def _equations(m: Scope) -> None:
     upper, lower = m.state("upper_level"), m.state("lower_level")
     pumped = m.site("pump_flow", m.parameter("pump_gain") * m.input("pump_voltage"), "actuator", unit="V/s")
     root = ca.sqrt(ca.fmax(upper, _DRY))
-    out = m.site("upper_outflow", m.parameter("upper_outflow") * root, unit="V/s")
-    into = m.site("lower_inflow", m.parameter("lower_inflow") * root, unit="V/s")
-    away = m.site("lower_outflow", m.parameter("lower_outflow") * ca.sqrt(ca.fmax(lower, _DRY)), unit="V/s")
+    out = m.site("upper_outflow", m.parameter("upper_outflow") * root, "flow", unit="V/s")
+    into = m.site("lower_inflow", m.parameter("lower_inflow") * root, "flow", unit="V/s")
+    away = m.site("lower_outflow", m.parameter("lower_outflow") * ca.sqrt(ca.fmax(lower, _DRY)), "flow", unit="V/s")
     m.derivative("upper_level", pumped - out)
     m.derivative("lower_level", into - away)
     m.output("level", m.site("level_sensor", lower, "sensor", "offset", unit="V"))
