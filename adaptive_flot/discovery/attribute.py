@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adaptive_flot.discovery.catalogue import finer
 from adaptive_flot.discovery.fit import MOST_STEPS, Fit, Fitter
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
@@ -142,7 +143,13 @@ def _forms(scorer: Scorer, score: Score) -> list[Score]:
         key = s.variant.effect.form, s.variant.effect.mode
         if key not in found and s.gain > 0.5 * score.gain:
             found[key] = s
-    return list(found.values())[:FORMS_EACH]
+    forms = list(found.values())[:FORMS_EACH]
+    for s in forms:
+        fine = finer(s.variant, s.start)
+        if fine is not None:
+            forms.append(replace(s, variant=fine[0], start=fine[1]))
+            break
+    return forms
 
 
 def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int) -> Fit | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,6 +20,8 @@ ONSETS = 18
 """Steps at this many onsets score an event in time."""
 TIME_KNOTS = 7
 DRIVER_KNOTS = 4
+FINE_KNOTS = 8
+"""Knots of the curve of a finalist: a hard limit or a threshold must not be told apart from its site by its shape."""
 LAGS_S = (5.0, 15.0, 45.0, 120.0)
 DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
 SPILL_QUANTILES = (0.5, 0.7, 0.85, 0.95)
@@ -71,7 +73,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     A driver that hardly moves is left out; lag and delay are those of sensors and actuators; what the model has already
     is not offered again, and a change that only rescales an adapted parameter neither.
     """
-    known = {(k.site, k.driver) for k in model.known_effects}
+    known = {(k.site, k.driver): k for k in model.known_effects}
     taken = {(e.site, e.driver) for e in model.effects}
     time = responses.problem.record.time
     found = []
@@ -79,11 +81,10 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
         for driver in ("constant", "time", *responses.drivers, "lag", "delay"):
             if (site.name, driver) in taken or not _makes_sense(site, driver):
                 continue
-            if known and driver in ("lag", "delay") and (site.name, driver) not in known:
-                continue
             variants = tuple(_variants(site, driver, time, responses))
             if variants:
-                found.append(Candidate(site, driver, not known or (site.name, driver) in known, variants))
+                nameable = (site.name, driver) in known or _nameable(site, driver, bool(known))
+                found.append(Candidate(site, driver, nameable, variants))
     return found
 
 
@@ -91,6 +92,18 @@ def _makes_sense(site: Site, driver: str) -> bool:
     if driver in ("lag", "delay"):
         return site.role in ("sensor", "actuator") and site.passed == 1
     return True
+
+
+def _nameable(site: Site, driver: str, table: bool) -> bool:
+    """Whether a pair that no table lists may be named all the same.
+
+    A quantity of the process may depend on anything in it. A sensor, an actuator or a feed has no reason to depend on
+    the state of the cell; such a dependence is reported as a curve without a name. So is that of a flow, whose law is
+    a matter of its own store, where the model has a table.
+    """
+    if driver in ("constant", "time", "lag", "delay"):
+        return True
+    return site.role == "process" or (site.role == "flow" and not table)
 
 
 def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -> Iterator[Variant]:
@@ -169,6 +182,19 @@ def _knots(values: FloatArray) -> tuple[float, ...] | None:
     knots = np.linspace(low, high, DRIVER_KNOTS)
     counts = np.histogram(values, knots)[0]
     return tuple(float(k) for k in knots) if np.all(counts > 0.02 * len(values)) else None
+
+
+def finer(variant: Variant, start: Mapping[str, float]) -> tuple[Variant, dict[str, float]] | None:
+    """The same curve with more knots, and the start values that draw the coarse one; None for other forms."""
+    effect = variant.effect
+    if effect.form != "curve" or effect.driver == "time":
+        return None
+    coarse = [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
+    knots = tuple(float(k) for k in np.linspace(coarse[0], coarse[-1], FINE_KNOTS))
+    values = spline_values(np.array(knots), coarse) @ [start[f"value_{k + 1}"] for k in range(len(coarse))]
+    fine = Effect(effect.site, effect.driver, "curve", settings={"knots": knots}, mode=effect.mode)
+    names = tuple(f"value_{k + 1}" for k in range(FINE_KNOTS))
+    return Variant(fine, (), names), dict(zip(names, map(float, values), strict=True))
 
 
 def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...], offset: bool) -> Variant:
