@@ -20,10 +20,10 @@ from adaptive_flot.greybox.model import Model
 
 SHORTLIST = 10
 """Candidates that are refitted in full."""
-FORMS_EACH = 3
+FORMS_EACH = 2
 FIRST_STEPS = 3
 """Gauss-Newton steps of the first heat, in which every candidate runs."""
-FINALISTS = 4
+FINALISTS = 3
 LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
 
@@ -143,12 +143,10 @@ def _forms(scorer: Scorer, score: Score) -> list[Score]:
         key = s.variant.effect.form, s.variant.effect.mode
         if key not in found and s.gain > 0.5 * score.gain:
             found[key] = s
-    forms = list(found.values())[:FORMS_EACH]
-    for s in forms:
+    forms = []
+    for s in list(found.values())[:FORMS_EACH]:
         fine = finer(s.variant, s.start)
-        if fine is not None:
-            forms.append(replace(s, variant=fine[0], start=fine[1]))
-            break
+        forms.append(replace(s, variant=fine[0], start=fine[1]) if fine else s)
     return forms
 
 

@@ -27,6 +27,8 @@ MOST_DIRECTIONS = 4
 """Combinations of the initial state that are free: those that the record tells most about."""
 TELLING = 3.0
 """A combination counts when a change by one scale moves the outputs by this many standard deviations in all."""
+SLOW = 2e-3
+"""Or one that improves it by less than this share of what the search has gained so far."""
 DIRECTION_PRIOR = 5.0
 """Standard deviation of the weak prior of a direction of the initial state, in units of the states' scales."""
 PRIOR_SCALES = 20.0
@@ -291,7 +293,7 @@ class _Search:
     def _descend(
         self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise, steps: int
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        value = self._objective(z, predicted, noise)
+        value = first = self._objective(z, predicted, noise)
         damping = 1e-3
         for _ in range(steps):
             step_of = self._step(z, predicted, slope, noise)
@@ -308,7 +310,7 @@ class _Search:
                 break
             gained, z, value, predicted = value - new, trial, new, there
             damping = max(damping / 10, 1e-9)
-            if gained < TOLERANCE:
+            if gained < max(TOLERANCE, SLOW * (first - value)):
                 break
             predicted, fresh = self._jacobian(z)
             if not np.isfinite(fresh).all():
