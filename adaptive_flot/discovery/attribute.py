@@ -100,9 +100,10 @@ def refit(
 ) -> list[Alternative]:
     """Fit each shortlisted candidate on top of `before` (the base model by default), best first.
 
-    In two heats: all in their best form with a few steps, then the finalists in several forms to the end.
+    The searches start from the fit that the scorer was linearised along. In two heats: all in their best form with a
+    few steps, then the finalists in several forms to the end.
     """
-    start = before.fit if before else base
+    start = scorer.fit
 
     def work(job: tuple[Score, int]) -> Fit | None:
         fit = fit_variant(fitter, start, job[0], job[1])

@@ -102,7 +102,7 @@ def discover(
         reason = f"the model can not simulate the record: check the units of its columns and the model '{model.name}'"
         return Discovery(_insufficient(replace(checked, reasons=(reason,)), began), model, checked)
     problem, base = prepared
-    found = search(problem, base, processes=processes, progress=progress)
+    found = search(problem, base, model, processes=processes, progress=progress)
     judgement = judge(found)
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)

@@ -14,8 +14,11 @@ from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.discovery.scoring import Score, Scorer
 from adaptive_flot.discovery.verify import Verification, verify
+from adaptive_flot.greybox.model import Model
 
 MOST_EFFECTS = 3
+NEAR = 0.25
+"""Share of its own value within which an adapted parameter counts as near: more than the drifts that are known."""
 NULL_DRAWS = 200
 NULL_QUANTILE = 0.99
 LEAST_EVIDENCE = 10.0
@@ -81,7 +84,12 @@ class Search:
 
 
 def search(
-    problem: Problem, base: Fit, *, processes: int = 1, progress: Callable[[str], None] = lambda stage: None
+    problem: Problem,
+    base: Fit,
+    nominal: Model,
+    *,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
 ) -> Search:
     """Search effects on top of a base fit.
 
@@ -89,6 +97,8 @@ def search(
     ----------
     problem, base
         The record and the fit of the model as it is, on the estimation share.
+    nominal
+        The model with the parameter values it came with.
     processes
         Fits that run at once.
     progress
@@ -98,6 +108,10 @@ def search(
     progress("score")
     scorer, sites = _scorer(problem, base)
     rounds = [_round(problem, fitter, base, scorer, [None], processes, progress)]
+    near = _near(fitter, base, nominal)
+    if near is not None:
+        again, _ = _scorer(problem, near)
+        rounds = [_merged(rounds[0], _round(problem, fitter, base, again, [None], processes, progress))]
     accepted: list[Round] = []
     best: Alternative | None = None
     left = _left(scorer, rounds[0].threshold)
@@ -112,6 +126,28 @@ def search(
         beam = _beam(rounds[-1], best, BEAM * _width(problem, base))
         rounds.append(_round(problem, fitter, base, scorer, beam, processes, progress))
     return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites), accepted)
+
+
+def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
+    """A fit whose adapted parameters stay near the model's own, where those of the base fit have run away.
+
+    A missing effect can drive them far off; the answers along such a run say little about the effects of the plant.
+    """
+    names = fitter.problem.adapted
+    own = {n: nominal.parameters[nominal.index("parameters", n)].value for n in names}
+    far = [abs(v / own[n] - 1) > NEAR for n, v in zip(names, base.values, strict=False) if own[n]]
+    if not any(far) or not nominal.starts_steady:
+        return None
+    bounds = {n: (v * (1 - NEAR), v * (1 + NEAR)) for n, v in own.items()}
+    return fitter.fit(nominal, bounds=bounds, rounds=2)
+
+
+def _merged(a: Round, b: Round) -> Round:
+    """Best fit of each name of two rounds, and the scores of the second."""
+    best: dict[frozenset[tuple[str, str]], Alternative] = {}
+    for alternative in sorted([*a.alternatives, *b.alternatives], key=lambda x: x.fit.bic):
+        best.setdefault(frozenset(alternative.names), alternative)
+    return Round(b.scores, max(a.threshold, b.threshold), tuple(best.values()))
 
 
 def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:

@@ -152,8 +152,8 @@ def judge(found: Search) -> Judgement:
     names = tuple(dict.fromkeys(tuple(sorted(a.names)) for a in named))
     if len(names) == 1:
         return Judgement("named", best, (), rivals, margin)
-    if len(names) <= LARGEST_CLASS:
-        members = tuple(dict.fromkeys(n for group in names for n in group))
+    members = tuple(dict.fromkeys(n for group in names for n in group))
+    if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
 
