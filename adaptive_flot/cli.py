@@ -152,6 +152,42 @@ def estimate(
     typer.echo(f"Report: {folder / 'report.html'}")
 
 
+@app.command(epilog="Example: adaptive-flot discover record.csv --json verdict.json --save-model extended.yaml")
+def discover(
+    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
+    model: ModelOption = "flotation",
+    cell: CellOption = None,
+    json: Annotated[Path | None, typer.Option("--json", help="Write the verdict here too.")] = None,
+    out: Out = None,
+    save_model: Annotated[Path | None, typer.Option(help="Write the extended model as a model file (YAML).")] = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Fits that run at once; default as many as there are cores.")
+    ] = None,
+) -> None:
+    """Find what physical effect a model lacks, from a measured record, and show the error before and after."""
+    from adaptive_flot.console import print_discovery, stage_bar
+    from adaptive_flot.discovery.parallel import available_processes
+    from adaptive_flot.processes.registry import make_model
+    from adaptive_flot.runner.discover import check_model_path, discover_file, save_discovered
+    from adaptive_flot.runner.results import write_json
+
+    check_model_path(save_model)
+    made = make_model(model, cell=cell, folder=data.parent)
+    with stage_bar(data.stem) as progress:
+        found = discover_file(data, made, processes=processes or available_processes(), progress=progress)
+    folder = out or Path("results") / data.stem
+    for target in filter(None, (folder / "verdict.json", json)):
+        write_json(target, found.verdict.as_dict())
+    print_discovery(found)
+    if save_model is not None:
+        saved = save_discovered(found, data, save_model, base=model, cell=cell, folder=data.parent)
+        typer.echo(f"Model: {save_model}" if saved else f"Model: {save_model} not written, nothing was fitted")
+    from adaptive_flot.report.discovery import write_discovery_report
+
+    write_discovery_report(found, data.stem, folder / "report.html", command=_command())
+    typer.echo(f"Report: {folder / 'report.html'}")
+
+
 @app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift --out results/comparison")
 def compare(
     results: Annotated[

@@ -8,9 +8,10 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.report import compare_tables
 from adaptive_flot.report import page as report
 from adaptive_flot.report.compare_findings import findings
@@ -28,6 +29,35 @@ def progress_bar(label: str, total: int) -> Iterator[Callable[[], None]]:
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(label, total=total)
         yield lambda: progress.advance(task)
+
+
+@contextmanager
+def stage_bar(label: str) -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows the stage it is given and counts how often it was called; nobody knows the end."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(label, total=None)
+        yield lambda stage: progress.update(task, advance=1, description=f"{label}: {stage}")
+
+
+def print_discovery(found: Discovery) -> None:
+    """Print the verdict in words and the error of each output before and after."""
+    console = Console(width=None if Console().is_terminal else 140)
+    verdict = found.verdict
+    console.print(f"[bold]{verdict.word}[/bold]: {escape(verdict.reason)}", highlight=False)
+    for note in verdict.notes:
+        console.print(f"- {note}", highlight=False, markup=False)
+    if verdict.error:
+        title = f"Free-run root mean square error, {verdict.block} share of the record"
+        table = Table(title=title, title_justify="left")
+        for heading in ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval"):
+            table.add_column(heading, justify="left" if heading in ("output", "unit") else "right")
+        for c in verdict.error:
+            low, high = (report.number(100 * r, ".0f") for r in c.reduction95)
+            table.add_row(c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
+        console.print(table)
+    console.file.flush()
 
 
 def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
