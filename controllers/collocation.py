@@ -18,6 +18,7 @@ import numpy as np
 
 from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.sensors import without_sensor_effects
 
 DEGREE = 2
 MOVED = ("air_flow", "level_setpoint")
@@ -50,6 +51,8 @@ class Arguments:
     prices
         Metal, treatment, air, reagent; then the cost of a squared scaled move and the penalty on a scaled slack second
         (for the level: on its square).
+    time
+        Time now [s], for a model that depends on it.
     """
 
     state: FloatArray
@@ -59,10 +62,11 @@ class Arguments:
     grade_limit: float
     grade_bias: float
     prices: FloatArray
+    time: float = 0.0
 
     def vector(self) -> FloatArray:
         """All of it, in the order of the NLP's parameters."""
-        scalars = [self.grade_limit, self.grade_bias]
+        scalars = [self.time, self.grade_limit, self.grade_bias]
         return np.concatenate(
             [self.state, self.previous, self.parameters, self.disturbances, scalars, np.asarray(self.prices)]
         )
@@ -162,10 +166,11 @@ class Problem:
         model = self.model
         nx, nz, nu, npar = len(model.states), len(model.algebraic), len(MOVED), len(model.parameters)
         others = len(model.inputs) - nu
-        sizes = [nx, nu, npar, others, 1, 1, 6]
+        sizes = [nx, nu, npar, others, 1, 1, 1, 6]
         p = ca.SX.sym("p", sum(sizes))
-        x_now, u_before, theta, disturbances, limit, bias, prices = ca.vertsplit(p, list(np.cumsum([0, *sizes])))
-        coefficients = ca.collocation_coeff(ca.collocation_points(DEGREE, "radau"))
+        x_now, u_before, theta, disturbances, t_now, limit, bias, prices = ca.vertsplit(p, list(np.cumsum([0, *sizes])))
+        taus = ca.collocation_points(DEGREE, "radau")
+        coefficients = ca.collocation_coeff(taus)
         slopes, weights = np.array(coefficients[0]), np.array(coefficients[2]).ravel()
 
         variables: list[ca.SX] = []
@@ -180,6 +185,9 @@ class Problem:
             self.equality += [equation] * len(names)
             self.names += names
 
+        true = without_sensor_effects(model)
+        true_states = model.indices("states", true.names("states"))
+        true_parameters = model.indices("parameters", true.names("parameters"))
         states, moves, level = model.names("states"), list(MOVED), model.index("states", "level")
         x = ca.SX.sym("x_0", nx + nu)
         for k in range(self.horizon):
@@ -195,7 +203,10 @@ class Problem:
             held = self._inputs(u * self.u_scale, disturbances)
             grades = []
             for j, (xj, zj) in enumerate(points):
-                rates, residual, y, _ = model.dae(0.0, xj * self.x_scale, held, theta, zj * self.z_scale)
+                t, state, z = t_now + (k + taus[j]) * self.move_s, xj * self.x_scale, zj * self.z_scale
+                rates, residual, y, _ = model.dae(t, state, held, theta, z)
+                if true is not model:  # limit and prices hold for the concentrate, not for what an analyser shows
+                    y = true.dae(t, state[true_states], held, theta[true_parameters], z)[2]
                 slope = slopes[0, j] * x[:nx] + sum(slopes[r + 1, j] * points[r][0] for r in range(DEGREE))
                 constrain(slope - self.move_s * rates / self.x_scale, True, [f"d{n}/dt {at}" for n in states])
                 constrain(residual / self.z_scale, True, [f"{n} {at}" for n in model.names("algebraic")])

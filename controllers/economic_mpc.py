@@ -168,7 +168,9 @@ class EconomicMpc:
         model, moved = self.setup.model, self.problem.moved
         theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
         others = np.delete(held, moved)
-        now = Arguments(estimate.state, held[moved], theta, others, self.grade_limit, state.bias, self._prices).vector()
+        now = Arguments(
+            estimate.state, held[moved], theta, others, self.grade_limit, state.bias, self._prices, estimate.time
+        ).vector()
         solution, status = self._solve(state, now, held, estimate, theta)
         if solution.verdict is Verdict.VALID:
             plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)

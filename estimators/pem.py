@@ -156,7 +156,10 @@ class Pem:
         guess = np.array([model.initial_guess.get(q.name, q.scale) for q in model.states])
         if self.initial_state == "estimated" and not model.starts_steady:
             return guess
-        return steady_state(model, record.inputs[0]).state
+        return steady_state(model, record.inputs[0], time=float(record.time[0])).state
+
+    def _steady(self, record: Dataset, p: FloatArray, guess: FloatArray) -> FloatArray:
+        return steady_state(self.setup.model, record.inputs[0], p, guess, float(record.time[0])).state
 
     def _unpack(self, record: Dataset, problem: _Problem, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Parameter vector (np,) and initial state (nx,)."""
@@ -164,7 +167,7 @@ class Pem:
         q = len(self.setup.parameters)
         p = full_parameters(self.setup.model, self.setup.parameters, values[:q])
         if self.initial_state == "steady":
-            return p, steady_state(self.setup.model, record.inputs[0], p, problem.steady).state
+            return p, self._steady(record, p, problem.steady)
         x0 = problem.steady.copy()
         x0[self._free] = values[q:]
         return p, x0
@@ -208,7 +211,9 @@ class Pem:
         names, q = self.setup.parameters, len(self.setup.parameters)
         x0_gradient = np.zeros((x0.size, len(problem.centre)))
         if self.initial_state == "steady":
-            x0_gradient[:, :q] = steady_state_gradient(self.setup.model, x0, record.inputs[0], p, names)
+            x0_gradient[:, :q] = steady_state_gradient(
+                self.setup.model, x0, record.inputs[0], p, names, float(record.time[0])
+            )
         x0_gradient[self._free, q + np.arange(len(self._free))] = 1.0
         _, gradient, last = self._simulator.sensitivities(record, x0, p, names, x0_gradient)
         return gradient[:, self._columns, :] * problem.scale, last * problem.scale

@@ -192,7 +192,7 @@ def _hinge(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     return c["slope"] * _softplus((driver - c["threshold"]) / reference, number(s, "width"))
 
 
-def _softplus(x: ca.SX, width: float) -> ca.SX:
+def _softplus(x: ca.SX, width: float | ca.SX) -> ca.SX:
     """Smooth max(x, 0): width log(1 + exp(x / width)), without overflow."""
     positive: ca.SX = ca.fmax(x, 0) + width * ca.log1p(ca.exp(-ca.fabs(x) / width))
     return positive
@@ -238,13 +238,19 @@ def _delay(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> 
     return value + c["amplitude"] * (x * scale - value)
 
 
+BAND_CORNER = 0.05
+"""Corners of a dead band are rounded over this share of it: past sharp ones an optimiser finds no way (ipopt and fatrop
+give up on the air valve). Half way out of the band the position then creeps by 1e-6 of the band a second."""
+
+
 def _stiction(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     del driver
     scale, follow = number(s, "scale"), number(s, "follow_s")
     x = m.own_state("position")
     error = value / scale - x
     band = c["band"] / scale
-    moved = ca.fmax(error - band, 0) + ca.fmin(error + band, 0)
+    width = BAND_CORNER * (band + 1e-9)
+    moved = _softplus(error - band, width) - _softplus(-error - band, width)
     m.own_derivative("position", moved / follow)
     return value + c["amplitude"] * (x * scale - value)
 

@@ -30,7 +30,11 @@ class SteadyState:
 
 
 def steady_state(
-    model: Model, inputs: FloatArray, parameters: FloatArray | None = None, guess: FloatArray | None = None
+    model: Model,
+    inputs: FloatArray,
+    parameters: FloatArray | None = None,
+    guess: FloatArray | None = None,
+    time: float = 0.0,
 ) -> SteadyState:
     """Solve dx/dt = 0 for held inputs by Newton's method in scaled states (scipy's hybrid Powell, exact Jacobian).
 
@@ -44,6 +48,8 @@ def steady_state(
         Parameter vector (np,); default the model's values.
     guess
         First guess (nx,).
+    time
+        Time [s] at which a model that depends on time is taken; it stands still there.
 
     Raises
     ------
@@ -58,11 +64,11 @@ def steady_state(
     slope = _jacobian(model, "x")
 
     def scaled_rate(s: FloatArray) -> FloatArray:
-        scaled: FloatArray = rate(0.0, s * scale, u, p)[0] / scale
+        scaled: FloatArray = rate(time, s * scale, u, p)[0] / scale
         return scaled
 
     def scaled_slope(s: FloatArray) -> FloatArray:
-        scaled: FloatArray = slope(0.0, s * scale, u, p)[0] * scale[None, :] / scale[:, None]
+        scaled: FloatArray = slope(time, s * scale, u, p)[0] * scale[None, :] / scale[:, None]
         return scaled
 
     def solve(start: FloatArray) -> tuple[FloatArray, float]:
@@ -71,7 +77,7 @@ def steady_state(
 
     state, residual = solve(start)
     if not residual < CONVERGED:  # let the process itself come near to where it settles, then try again
-        settled = Stepper(model, model.max_step_s).simulate(start, np.tile(u, (SETTLING_STEPS, 1)), p).states[-1]
+        settled = Stepper(model, model.max_step_s).simulate(start, np.tile(u, (SETTLING_STEPS, 1)), p, time).states[-1]
         if np.isfinite(settled).all():
             state, residual = solve(settled)
     lower = np.array([q.lower for q in model.states])
@@ -86,16 +92,35 @@ def steady_state(
 
 
 def steady_state_gradient(
-    model: Model, state: FloatArray, inputs: FloatArray, parameters: FloatArray, wrt: Sequence[str]
+    model: Model,
+    state: FloatArray,
+    inputs: FloatArray,
+    parameters: FloatArray,
+    wrt: Sequence[str],
+    time: float = 0.0,
 ) -> FloatArray:
     """d(steady state)/d(parameters) (nx, q) by the implicit function theorem, at a steady state."""
-    by_state = _jacobian(model, "x")(0.0, state, inputs, parameters)[0]
-    by_parameters = _jacobian(model, "p")(0.0, state, inputs, parameters)[0]
+    by_state = _jacobian(model, "x")(time, state, inputs, parameters)[0]
+    by_parameters = _jacobian(model, "p")(time, state, inputs, parameters)[0]
     columns = model.indices("parameters", wrt)
     scale = np.array([q.scale for q in model.states])
     scaled = by_state * scale[None, :] / scale[:, None]
-    moved = np.linalg.solve(scaled, by_parameters[:, columns] / scale[:, None])
+    moved = _solved(scaled, by_parameters[:, columns] / scale[:, None])
     return cast(FloatArray, -moved * scale[:, None])
+
+
+def _solved(slope: FloatArray, by_parameters: FloatArray) -> FloatArray:
+    """Solve slope @ moved = by_parameters; where a valve within its band leaves a state free, that state stays.
+
+    Should the others then have no solution (a stuck valve within a control loop), the smallest move is taken.
+    """
+    free = np.flatnonzero(~slope.any(axis=1))
+    held = slope.copy()
+    held[free, free] = 1.0
+    try:
+        return cast(FloatArray, np.linalg.solve(held, by_parameters))
+    except np.linalg.LinAlgError:
+        return cast(FloatArray, np.linalg.lstsq(slope, by_parameters)[0])
 
 
 def _jacobian(model: Model, wrt: Literal["x", "p"]) -> FastCall:

@@ -56,7 +56,7 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     _check_parameters(record, model)
     x0 = record.initial_state
     if x0 is None:
-        x0 = steady_state(model, record.inputs[0], p[0]).state
+        x0 = steady_state(model, record.inputs[0], p[0], time=float(record.time[0])).state
     stepper = Stepper(model, record.dt, accurate=accurate)
     run = stepper.simulate(x0, record.inputs[1:], p[1:], record.time[0])
     states = np.vstack([x0, run.states])

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
-
-SENSOR = "_sensor"
-"""A site whose name ends so is an instrument: an effect there changes what is shown."""
+from adaptive_flot.greybox.sensors import without_sensor_effects
 
 
 class TrueOutputs:
@@ -19,10 +17,9 @@ class TrueOutputs:
     """
 
     def __init__(self, model: Model) -> None:
-        kept = [effect for effect in model.effects if not effect.site.endswith(SENSOR)]
         self._ode = None
-        if len(kept) < len(model.effects):
-            clean = model.without_effects().with_effects(kept)
+        clean = without_sensor_effects(model)
+        if clean is not model:
             self._states = model.indices("states", clean.names("states"))
             self._parameters = model.indices("parameters", clean.names("parameters"))
             self._ode = FastCall(clean.ode)

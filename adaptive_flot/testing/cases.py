@@ -27,6 +27,7 @@ from adaptive_flot.protocols import (
     Status,
 )
 
+ADAPTED = ("growth_exponent", "coalescence_rate")
 ROWS = 40
 NOISE_STD = 1e-3
 
@@ -50,9 +51,19 @@ class ControllerCase:
     estimates: tuple[Estimate, ...]
 
 
-def estimator_case(factory: Callable[..., AnyEstimator], seed: int = 1, **options: Any) -> EstimatorCase:
-    """Build a case for an estimator class or factory, called as `factory(setup, **options)`."""
-    setup = Setup(_cell(), dt=1.0)
+def estimator_case(
+    factory: Callable[..., AnyEstimator],
+    seed: int = 1,
+    *,
+    model: Model | None = None,
+    parameters: Sequence[str] = ADAPTED,
+    **options: Any,
+) -> EstimatorCase:
+    """Build a case for an estimator class or factory, called as `factory(setup, **options)`.
+
+    `model` is the laboratory cell unless given: a cell with effects, say; `parameters` are those to adapt.
+    """
+    setup = Setup(model or _cell(), 1.0, tuple(parameters))
     inputs, samples, _ = _record(setup, seed)
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     prior = Prior(
@@ -65,9 +76,11 @@ def estimator_case(factory: Callable[..., AnyEstimator], seed: int = 1, **option
     return EstimatorCase(factory(setup, **options), prior, samples)
 
 
-def controller_case(factory: Callable[..., AnyController], seed: int = 1, **options: Any) -> ControllerCase:
-    """Build a case for a controller class or factory, called as `factory(setup, **options)`."""
-    setup = Setup(_cell(), dt=1.0)
+def controller_case(
+    factory: Callable[..., AnyController], seed: int = 1, *, model: Model | None = None, **options: Any
+) -> ControllerCase:
+    """Build a case for a controller class or factory, called as `factory(setup, **options)`; `model` as above."""
+    setup = Setup(model or _cell(), dt=1.0)
     inputs, samples, states = _record(setup, seed)
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     limits = Limits(

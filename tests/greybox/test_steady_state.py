@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.fastcall import FastCall
-from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
 from benchmarks import scipy_reference as reference
 
@@ -91,3 +92,41 @@ def test_failure_is_a_range_error_that_names_the_inputs(model: Model, u: list[fl
     with pytest.raises(RangeError, match="'flotation' has no steady state within its physical range") as error:
         steady_state(model, np.array(u))
     assert where in str(error.value)
+
+
+def test_a_model_that_depends_on_time_is_taken_at_a_time(model: Model) -> None:
+    """Before the onset of a step the nominal steady state, after it that of a constant shift of the same size."""
+    stepped = model.with_effects([Effect("coalescence", "time", "step", {"amplitude": 0.2, "onset": 1000.0})])
+    shifted = model.with_effects([Effect("coalescence", "constant", "shift", {"amplitude": 0.2})])
+    for time, expected in ((0.0, model), (2000.0, shifted)):
+        found = steady_state(stepped, NOMINAL, time=time).state
+        np.testing.assert_allclose(found, steady_state(expected, NOMINAL).state, rtol=1e-9)
+    found, expected_gradient = (
+        steady_state_gradient(m, steady_state(shifted, NOMINAL).state, NOMINAL, m.parameter_values, ["n"], 2000.0)
+        for m in (stepped, shifted)
+    )
+    np.testing.assert_allclose(found, expected_gradient, rtol=1e-9)
+
+
+@pytest.mark.parametrize("looped", [False, True])
+def test_a_state_that_nothing_moves_stays(looped: bool) -> None:
+    """A valve s within its band: x = k s with s held; in a loop that asks for x = 1, s is what can give way."""
+
+    def equations(m: Scope) -> None:
+        x, s, w = m.state("x"), m.state("s"), m.state("w")
+        m.derivative("x", m.parameter("k") * s - x)
+        m.derivative("s", 0 * s)
+        m.derivative("w", x - 1 if looped else s - w)
+        m.output("y", x)
+
+    names = ("x", "s", "w")
+    own = Model(
+        "valve",
+        tuple(Quantity(n, "-", "") for n in names),
+        (Quantity("u", "-", ""),),
+        (Parameter("k", 0.5, "-", ""),),
+        (Quantity("y", "-", ""),),
+        equations,
+    )
+    gradient = steady_state_gradient(own, np.array([1.0, 2.0, 2.0]), np.zeros(1), np.array([0.5]), ["k"])[:, 0]
+    np.testing.assert_allclose(gradient, [0.0, -4.0, 0.0] if looped else [2.0, 0.0, 0.0], atol=1e-12)
