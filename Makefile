@@ -15,10 +15,10 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check format bench lock clean
+.PHONY: help install demo test check format bench bench-discovery bench-discovery-quick lock clean
 
 help: ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 install: $(READY) ## Create .venv with the pinned dependencies and this project
 	@echo "Installed: run $(BIN)/adaptive-flot --help"
@@ -41,6 +41,12 @@ format: $(READY) ## Format the code and apply ruff's safe fixes
 
 bench: $(READY) ## Run the benchmarks
 	@$(BIN)/python -m benchmarks
+
+bench-discovery: $(READY) ## Judge 300 records with a hidden effect, rivals beside it (hours)
+	@$(BIN)/python -m benchmarks.hidden_effects full $(BENCH_ARGS)
+
+bench-discovery-quick: $(READY) ## The same on the first 30 records (minutes)
+	@$(BIN)/python -m benchmarks.hidden_effects full --count 30 --method correlation $(BENCH_ARGS)
 
 lock: ## Pin the dependencies again in requirements.lock (uv, in a throw-away environment)
 	@$(require_python)

@@ -93,15 +93,15 @@ def collect(folder: Path) -> dict[str, dict[str, Any]]:
     return answers
 
 
-def load_answers(folder: Path) -> dict[str, dict[str, Any]]:
-    """Answers of a folder by record name.
+def load_answers(folder: Path, count: int | None = None) -> dict[str, dict[str, Any]]:
+    """Answers of a folder (of its first records) by record name.
 
     Raises
     ------
     DataError
         There are none.
     """
-    files = sorted((folder / "answers").glob("record_*.json"))
+    files = sorted((folder / "answers").glob("record_*.json"))[:count]
     if not files:
         raise DataError(
             f"{folder}: no answers/record_*.json; make some with `python -m benchmarks.hidden_effects generate`"

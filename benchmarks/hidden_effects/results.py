@@ -1,0 +1,98 @@
+"""One row a record: truth, verdict, outcome, error removed, time."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from adaptive_flot.files import replace_file
+from benchmarks.hidden_effects.generate import load_answers
+from benchmarks.hidden_effects.outcome import Answer, classify
+from benchmarks.hidden_effects.verdict import Verdict, read_verdict
+
+REMOVABLE = 1.5  # base error over oracle error on the report block, from which there is something to remove
+
+
+def main_output(answer: Answer) -> str | None:
+    """Output with most to remove on the report block; None where no output has anything to remove."""
+    ratio = {
+        name: answer["base_error"][name]["report"] / max(answer["oracle_error"][name]["report"], 1e-15)
+        for name in answer["base_error"]
+    }
+    ratio = {name: r for name, r in ratio.items() if math.isfinite(r)}
+    if not ratio:
+        return None
+    # The grade is what the model is for: it counts wherever it has something to remove.
+    if ratio.get("concentrate_grade", 0.0) >= REMOVABLE:
+        return "concentrate_grade"
+    name = max(ratio, key=ratio.__getitem__)
+    return name if ratio[name] >= REMOVABLE else None
+
+
+def removed_share(answer: Answer, verdict: Verdict | None) -> float:
+    """Error removed on the report block (last 20 %) as a share of an oracle's, in the output with most to remove.
+
+    The base and the oracle are the benchmark's own; of the verdict only `error.<output>.after` is used. No verdict or
+    none of its error: nothing was removed (0). NaN where there is nothing to remove. Not above 1, not below -1.
+    """
+    name = main_output(answer)
+    if name is None:
+        return math.nan
+    block = verdict.error.get(name) if verdict else None
+    if block is None or block.after is None or not math.isfinite(block.after):
+        return 0.0
+    base, oracle = answer["base_error"][name]["report"], answer["oracle_error"][name]["report"]
+    return max(-1.0, min(1.0, float((base - block.after) / (base - oracle))))
+
+
+def result_row(answer: Answer, verdict: Verdict | str, meta: dict[str, Any]) -> dict[str, Any]:
+    """One row; `meta` tells how the command ended (status, seconds)."""
+    found = verdict if isinstance(verdict, Verdict) else None
+    status = meta.get("status", "ok")
+    if found is None:
+        outcome = {"timeout": "timeout", "refused": "abstained"}.get(status, "failed")
+        if status == "refused" and "insufficient" in answer["right_verdicts"]:
+            outcome = "right"
+    else:
+        outcome = classify(answer, found)
+    said = [] if found is None else (found.members if found.verdict == "class" else found.effects)
+    return {
+        "record": answer["record"],
+        "category": answer["category"],
+        "truth": "+".join(f"{e['site']}:{e['driver']}" for e in answer["effects"]) or answer["note"],
+        "ordinary": answer["ordinary"],
+        "size": max(answer["size"].values(), default=0.0),
+        "loop": answer["loop"],
+        "noise": answer["noise"]["kind"],
+        "verdict": found.verdict if found else status,
+        "said": "+".join(f"{n.site}:{n.driver}" for n in said),
+        "outcome": outcome,
+        "removed_share": removed_share(answer, found),
+        "output": main_output(answer) or "",
+        "seconds": meta.get("seconds", math.nan),
+        "problem": verdict if isinstance(verdict, str) else "",
+    }
+
+
+def results_table(folder: Path, label: str, count: int | None = None) -> pd.DataFrame:
+    """Results of a run so far; records without a verdict yet are left out."""
+    rows = []
+    run = folder / "runs" / label
+    for name, answer in load_answers(folder, count).items():
+        meta = run / "verdicts" / f"{name}.meta.json"
+        if meta.is_file():
+            verdict = read_verdict(run / "verdicts" / f"{name}.json")
+            rows.append(result_row(answer, verdict, json.loads(meta.read_text())))
+    return pd.DataFrame(rows)
+
+
+def write_results(folder: Path, label: str, table: pd.DataFrame) -> Path:
+    """Write the rows beside the verdicts."""
+    path = folder / "runs" / label / "results.csv"
+    with replace_file(path) as stream:
+        table.to_csv(stream, index=False, float_format="%.4g", lineterminator="\n")
+    return path
