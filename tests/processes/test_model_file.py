@@ -106,12 +106,12 @@ def test_paths_are_relative_to_the_model_file(tmp_path: Path, monkeypatch: pytes
     save_model(cell.with_effects(EFFECTS[:1]), tmp_path / "a.yaml", cell="cell.yaml", folder=tmp_path / "own")
     address = "model_file_tanks:make_model"
     tanks = make_model(address, folder=tmp_path / "own")
-    spill = Effect("lower_inflow", "upper_level", "overflow", {"gain": 0.1, "threshold": 9.0})
+    spill = Effect("lower_inflow", "upper_level", "overflow", {"slope": 0.0, "gain": 0.1, "threshold": 9.0})
     save_model(tanks.with_effects([spill]), tmp_path / "b.yaml", base=address, folder=tmp_path / "own")
     monkeypatch.chdir(tmp_path / "elsewhere")
     again = make_model("../a.yaml")
     assert again.parameter_values[again.index("parameters", "C")] == 6e-4
-    assert make_model(str(tmp_path / "b.yaml")).effects[0].coefficients == {"gain": 0.1, "threshold": 9.0}
+    assert make_model(str(tmp_path / "b.yaml")).effects[0] == spill
 
 
 def test_a_model_that_can_not_be_saved_leaves_the_file_as_it_was(model: Model, tmp_path: Path) -> None:
@@ -139,10 +139,14 @@ def test_a_unit_that_nobody_knows_is_not_asked_for(tmp_path: Path) -> None:
         " equations)\n"
     )
     own = make_model("unitless:make_model", folder=tmp_path)
-    spill = Effect("outflow", "x", "overflow", {"gain": 0.5, "threshold": 2.0})
+    spill = Effect("outflow", "x", "overflow", {"slope": 0.1, "gain": 0.5, "threshold": 2.0})
     save_model(own.with_effects([spill]), tmp_path / "m.yaml", base="unitless:make_model", folder=tmp_path)
     (entry,) = yaml.safe_load((tmp_path / "m.yaml").read_text())["effects"]
-    assert entry["coefficients"] == {"gain": 0.5, "threshold": {"value": 2.0, "unit": "kg"}}
+    assert entry["coefficients"] == {
+        "slope": 0.1,
+        "gain": 0.5,
+        "threshold": {"value": 2.0, "unit": "kg"},
+    }
     assert make_model("m.yaml", folder=tmp_path).effects[0].coefficients == spill.coefficients
 
 
