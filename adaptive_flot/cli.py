@@ -230,8 +230,10 @@ def scenarios() -> None:
 
     from adaptive_flot.runner.scenario import shipped_scenarios
 
-    for name, path in shipped_scenarios().items():
-        typer.echo(f"{name:26} {yaml.safe_load(path.read_text())['description']}")
+    shipped = shipped_scenarios()
+    width = max(map(len, shipped), default=0)
+    for name, path in shipped.items():
+        typer.echo(f"{name:{width}}  {yaml.safe_load(path.read_text())['description']}")
 
 
 def main() -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Literal
 
+from rich.box import HORIZONTALS
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -19,6 +21,9 @@ from adaptive_flot.runner.comparison import compare_runs
 from adaptive_flot.runner.estimate import RecordEstimate
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
+
+PIPE_WIDTH = 140
+"""Letters a line where standard output is no terminal."""
 
 
 @contextmanager
@@ -76,7 +81,7 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
             cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
             shown = f"{name} ({controller})" if several else name
             table.add_row(scenario.name, shown, str(len(own)), *cells)
-    console = Console(width=None if Console().is_terminal else 140)
+    console = Console(width=None if Console().is_terminal else PIPE_WIDTH)
     console.print(table)
     console.file.flush()  # a reader on a pipe sees the result before the report is drawn
 
@@ -99,7 +104,7 @@ def print_estimate(result: RecordEstimate) -> None:
         for e in replay.errors:
             p = f"{e.ljung_box_p:.2g}"
             table.add_row(replay.estimator, e.block, e.output, f"{e.one_step:.4g}", f"{e.free_run:.4g}", e.unit, p)
-    console = Console(width=None if Console().is_terminal else 140)
+    console = Console(width=None if Console().is_terminal else PIPE_WIDTH)
     console.print(table)
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
@@ -111,17 +116,20 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
     if not any(run.account for run in runs):
         return
     comparison = compare_runs(scenario, runs)
-    found = (compare_tables.outcome_table(comparison), compare_tables.decision_table(comparison))
+    makers = (compare_tables.outcome_table, compare_tables.status_table, compare_tables.time_table)
+    found = [make(comparison) for make in makers]
     print_comparison([table for table in found if table is not None], findings(comparison))
 
 
 def print_comparison(tables: Sequence[report.Table], sentences: Sequence[str]) -> None:
     """Print the tables of a comparison and what follows from them."""
-    console = Console(width=None if Console().is_terminal else 140)
+    console = Console(width=None if Console().is_terminal else PIPE_WIDTH)
     for content in tables:
-        table = Table(caption=escape(content.caption), caption_justify="left", show_lines=True)
+        table = Table(caption=escape(content.caption), caption_justify="left", show_lines=True, box=HORIZONTALS)
         for j, heading in enumerate(content.header):
-            table.add_column(escape(heading), justify="left" if j < content.words else "right")
+            words = " ".join([heading, *(row[j] for row in content.rows)]).split()
+            side: Literal["left", "right"] = "left" if j < content.words else "right"
+            table.add_column(escape(heading), justify=side, min_width=max(map(len, words)))  # never cut a number
         for row in content.rows:
             table.add_row(*(escape(cell) for cell in row))
         console.print(table)

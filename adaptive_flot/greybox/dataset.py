@@ -126,6 +126,8 @@ def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path)
         raise DataError(
             f"{file}: column {other!r} has the wrong unit suffix; convert it to {unit} and name it {column!r}"
         )
+    if f"{column}_measured" in columns:
+        raise DataError(f"{file}: column {column!r} is missing; of a time series of `run`, rename '{column}_measured'")
     raise DataError(f"{file}: column {column!r} is missing; add it ({near_match(column, columns)})")
 
 

@@ -94,7 +94,9 @@ class Model:
         for i, quantity in enumerate(getattr(self, kind)):
             if name == quantity.name or (isinstance(quantity, Parameter) and name == quantity.symbol):
                 return i
-        raise ModelError(f"model '{self.name}' has no {name!r} among its {kind}; {near_match(name, self.names(kind))}")
+        symbols = (q.symbol for q in getattr(self, kind) if isinstance(q, Parameter) and q.symbol)
+        known = near_match(name, (*self.names(kind), *symbols))
+        raise ModelError(f"model '{self.name}' has no {name!r} among its {kind}; {known}")
 
     def indices(self, kind: Kind, names: Iterable[str]) -> list[int]:
         """Positions of several quantities."""

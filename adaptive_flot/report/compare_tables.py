@@ -90,25 +90,33 @@ def fits_table(comparison: Comparison) -> Table | None:
     return _table(comparison, caption, columns)
 
 
-def decision_table(comparison: Comparison) -> Table:
-    """Solve times, statuses and who decided."""
-    columns = [
-        _column("Solves", "solves", ".0f"),
-        _column("Solve, median [ms]", "solve_median_s", ".1f", 1e3),
-        _column("Solve, p99 [ms]", "solve_p99_s", ".1f", 1e3),
-        _column("Run [s]", "seconds", ".1f"),
-    ]
+def status_table(comparison: Comparison) -> Table:
+    """Statuses and who decided."""
     words = {
         "Estimates": lambda c: _counts({k: n for k, n in c.counts("status").items() if k != "initialising"}),
         "Decisions": lambda c: _counts(c.counts("control")),
         "Decided by": lambda c: _counts(c.counts("decided"), share=True),
     }
     caption = (
-        f"{comparison.scenario}: statuses of estimates and decisions, all seeds together (a decision is an "
-        "optimisation, or another interval that did not go well); who decided, in share of time; wall-clock time of a "
-        f"solve within a run (median and 99th percentile) and of the run. {spread_text(comparison)}"
+        f"{comparison.scenario}: statuses of estimates and of decisions, all seeds together (a decision is an "
+        "optimisation, or another interval that did not go well); who decided, in share of time."
     )
-    return _table(comparison, caption, columns, words)
+    return _table(comparison, caption, (), words)
+
+
+def time_table(comparison: Comparison) -> Table:
+    """Wall-clock times of solves and runs."""
+    columns = [
+        _column("Solves", "solves", ".0f"),
+        _column("Solve, median [ms]", "solve_median_s", ".1f", 1e3),
+        _column("Solve, p99 [ms]", "solve_p99_s", ".1f", 1e3),
+        _column("Run [s]", "seconds", ".1f"),
+    ]
+    caption = (
+        f"{comparison.scenario}: wall-clock time of a solve within a run (median and 99th percentile), and of the run. "
+        f"{spread_text(comparison)}"
+    )
+    return _table(comparison, caption, columns)
 
 
 def spread_text(comparison: Comparison) -> str:
@@ -121,7 +129,7 @@ def spread_text(comparison: Comparison) -> str:
 
 def compare_tables(comparison: Comparison) -> list[Table]:
     """All tables of a comparison that hold something."""
-    makers = (outcome_table, value_table, decision_table, fits_table)
+    makers = (outcome_table, value_table, status_table, time_table, fits_table)
     return [table for make in makers if (table := make(comparison)) is not None]
 
 

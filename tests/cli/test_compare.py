@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from adaptive_flot import console
 from adaptive_flot.runner.results import write_json
 from tests.cli.conftest import Call, WriteScenario
 from tests.runner.test_runs_table import closed_loop_summary
@@ -59,3 +60,11 @@ def test_a_mistake_is_one_line_and_nothing_is_written(call: Call, tmp_path: Path
     assert result.code == 2 and result.out == "" and len(result.err.splitlines()) == 1
     assert result.err.startswith("adaptive-flot: ") and says in result.err
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_narrow_terminal_cuts_no_number(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a table does not fit, cells are broken between words: 0.81… would be of no use."""
+    write_json(tmp_path / "r" / "summary.json", closed_loop_summary(1))
+    monkeypatch.setattr(console, "PIPE_WIDTH", 72)
+    result = call("compare", "r")
+    assert result.code == 0 and "…" not in result.out and "economic_mpc" in result.out and "11.000" in result.out
