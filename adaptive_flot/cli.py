@@ -13,6 +13,7 @@ from adaptive_flot.errors import AdaptiveFlotError
 
 T = TypeVar("T")
 USER_ERROR = 2
+INTERRUPTED = 130
 
 app = typer.Typer(
     help="Froth flotation: simulate the cell, track its parameters, report.",
@@ -221,6 +222,35 @@ def compare(
     print_comparison(overview, [])
     if out is not None:
         typer.echo(f"Report: {out / 'comparison.html'}")
+
+
+@app.command(epilog="Example: adaptive-flot sweep paper_1000 --workers 2 --out results/paper_1000")
+def sweep(
+    study: Annotated[str, typer.Argument(help="Study file, or the name of a shipped study.")],
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; default one a core.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler to run on instead, tcp://host:8786.")
+    ] = None,
+    out: Out = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed runs again.")] = False,
+) -> None:
+    """Run a study of many runs. Interrupted, the same command goes on where it was."""
+    from adaptive_flot.studies.progress import live, print_study
+    from adaptive_flot.studies.study_file import load_study
+    from adaptive_flot.studies.sweep import sweep as run_study
+
+    loaded = load_study(study)
+    folder = out or Path("results") / loaded.name
+    try:
+        with live(loaded.name) as progress:
+            outcome = run_study(
+                loaded, folder, workers=workers, scheduler=scheduler, retry_failed=retry_failed, progress=progress
+            )
+    except KeyboardInterrupt:
+        sys.stderr.write(f"adaptive-flot: interrupted; results so far are in {folder}, the same command goes on\n")
+        sys.exit(INTERRUPTED)
+    print_study(outcome.table)
+    typer.echo(f"{len(outcome.table)} runs, {outcome.found} of them from before: {folder / 'runs.parquet'}")
 
 
 @app.command(epilog="Example: adaptive-flot scenarios")

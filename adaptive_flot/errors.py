@@ -42,6 +42,10 @@ class ResultError(AdaptiveFlotError):
     """Results can not be compared: none there, not written by this program, or of scenarios that differ."""
 
 
+class StudyError(AdaptiveFlotError):
+    """A study can not be run: wrong study file, results of another study in its folder, cluster lost."""
+
+
 class PluginError(AdaptiveFlotError):
     """An estimator, controller or model named in a file or on the command line can not be loaded."""
 

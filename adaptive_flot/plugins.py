@@ -80,9 +80,9 @@ def _import(name: str, folder: Path | None) -> ModuleType:
     return importlib.import_module(name)
 
 
-def module_file(name: str, folder: Path | None = None) -> Path | None:
-    """File of a user's module, beside the file that names it or here; None for an installed one."""
-    for place in (folder, Path.cwd()):
+def module_file(name: str, *folders: Path | None) -> Path | None:
+    """File of a user's module, in one of the folders or here; None for an installed one."""
+    for place in (*folders, Path.cwd()):
         file = (place or Path()) / f"{name.removesuffix('.py')}.py"
         if place is not None and file.is_file():
             return file

@@ -56,6 +56,10 @@ class Prepared:
         known = tuple(p for p in s.setup.parameters if p in s.plant_model.names("parameters"))
         return replace(s.setup, model=s.plant_model, parameters=known, truth=s.true_parameters())
 
+    def shares_fit(self, name: str) -> bool:
+        """Whether runs with this estimator see the same first part as all others: not where its model is another."""
+        return self.setup(name).model is self.scenario.model
+
     def estimator(self, name: str) -> AnyEstimator:
         """The estimator of that name."""
         if name not in self._built:

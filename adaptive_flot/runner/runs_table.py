@@ -131,7 +131,9 @@ def _read_parts(folder: Path, path: Path) -> pd.DataFrame:
         inside = sorted(f.parent.name for f in folder.glob(f"*/{SUMMARY}"))
         hint = f"its folders {', '.join(inside)} have: give those" if inside else "give what `adaptive-flot run` wrote"
         raise ResultError(f"{path}: no results in this folder (no {SUMMARY}, no Parquet table of runs); {hint}")
-    return pd.concat([pd.read_parquet(part) for part in parts], ignore_index=True)
+    table = pd.concat([pd.read_parquet(part) for part in parts], ignore_index=True)
+    # a study that was killed while it merged its parts holds some runs twice, the same to the bit
+    return table.drop_duplicates("run", ignore_index=True) if "run" in table else table
 
 
 def _is_table_of_runs(file: Path) -> bool:

@@ -12,10 +12,11 @@ import pandas as pd
 
 from adaptive_flot.batch import BatchFit
 from adaptive_flot.errors import located
-from adaptive_flot.protocols import Prior, Status
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.protocols import AnyController, AnyEstimator, Prior, Status
 from adaptive_flot.runner.accounts import account, control_account
 from adaptive_flot.runner.injection import with_faults
-from adaptive_flot.runner.loop import Step, run_loop
+from adaptive_flot.runner.loop import MakePrior, Step, run_loop
 from adaptive_flot.runner.plans import plan_table
 from adaptive_flot.runner.prepared import Prepared
 from adaptive_flot.runner.scenario import Scenario
@@ -114,10 +115,11 @@ def run_scenario(
     with located(scenario.path):
         prepared = Prepared.of(scenario, estimators, controllers)
         for seed in dict.fromkeys(seeds or scenario.file.seeds):
-            # before it starts, no estimator has touched a run: one fit for all with the same controller
-            initial: dict[str, dict[str, BatchFit]] = {}
+            # before it starts, no estimator has touched a run: one fit for all with the same controller (and model)
+            initial: dict[tuple[str, bool], dict[str, BatchFit]] = {}
             for controller, name in scenario.combinations(estimators, controllers):
-                runs.append(run_one(prepared, name, controller, seed, initial.setdefault(controller, {})))
+                fitted = initial.setdefault((controller, prepared.shares_fit(name)), {})
+                runs.append(run_one(prepared, name, controller, seed, fitted))
                 progress()
     return runs
 
@@ -136,8 +138,6 @@ def run_one(
     """
     begin = time.perf_counter()
     scenario, plugin = prepared.scenario, prepared.estimators[estimator_name]
-    schedule = scenario.schedule(seed)
-    scenario.model.check_inputs(schedule, scenario.starts, where=f"inputs of seed {seed}")
     estimator, setup = prepared.estimator(estimator_name), prepared.setup(estimator_name)
 
     def make_prior(steps: list[Step]) -> Prior:
@@ -148,20 +148,8 @@ def run_one(
             return prior
         return nominal_start(scenario, setup, steps, prior)
 
-    plant, controller = with_faults(
-        scenario,
-        seed,
-        make_plant(scenario, seed, setup.model),
-        prepared.controller(controller_name, seed, estimator_name),
-    )
-    steps = run_loop(
-        plant,
-        estimator,
-        controller,
-        len(schedule),
-        initial_intervals=scenario.initial_rows,
-        make_prior=make_prior,
-    )
+    controller = prepared.controller(controller_name, seed, estimator_name)
+    steps = _steps(scenario, seed, setup.model, controller, estimator, len(scenario.starts), make_prior)
     table = time_series(scenario, steps, setup)
     counts = Counter((s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps)
     seconds = time.perf_counter() - begin
@@ -177,6 +165,36 @@ def run_one(
         *_accounts(scenario, table),
         dict(Counter(fault for s in steps for fault in (*s.plant.faults, *s.decision.faults))),
         plans=plan_table(scenario.model, steps),
+    )
+
+
+def initial_fit(prepared: Prepared, controller_name: str, seed: int) -> BatchFit:
+    """Batch fit of the start of a run, before an estimator touches it: to the bit what `run_one` finds."""
+    scenario = prepared.scenario
+
+    def never(steps: list[Step]) -> Prior:
+        raise AssertionError(f"an estimator started after {len(steps)} of {scenario.initial_rows} intervals")
+
+    untouched = prepared.estimator(next(iter(prepared.estimators)))
+    controller = prepared.controller(controller_name, seed)
+    steps = _steps(scenario, seed, scenario.model, controller, untouched, scenario.initial_rows, never)
+    return prepared.batch.fit(record_of(scenario, scenario.setup, steps))
+
+
+def _steps(
+    scenario: Scenario,
+    seed: int,
+    model: Model,
+    controller: AnyController,
+    estimator: AnyEstimator,
+    intervals: int,
+    make_prior: MakePrior,
+) -> list[Step]:
+    """The first intervals of a run with an estimator of that model."""
+    scenario.model.check_inputs(scenario.schedule(seed), scenario.starts, where=f"inputs of seed {seed}")
+    plant, controller = with_faults(scenario, seed, make_plant(scenario, seed, model), controller)
+    return run_loop(
+        plant, estimator, controller, intervals, initial_intervals=scenario.initial_rows, make_prior=make_prior
     )
 
 

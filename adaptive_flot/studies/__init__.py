@@ -1,0 +1,1 @@
+"""Studies: a grid of runs on several processes or machines, kept on disk as it grows."""

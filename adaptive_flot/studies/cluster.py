@@ -1,0 +1,93 @@
+"""Where runs are computed: an embedded cluster of processes on this machine, or a real one behind a scheduler."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+
+import dask
+from distributed import Client, LocalCluster
+
+from adaptive_flot.errors import StudyError
+
+CONNECT_S = 15.0
+"""Longest wait for a scheduler to answer and for its first worker to be there."""
+
+
+def core_count() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def connected(workers: int | None, scheduler: str | None) -> Iterator[Client]:
+    """Client of a cluster.
+
+    Parameters
+    ----------
+    workers
+        Processes of the embedded cluster, each with one thread; default one a core.
+    scheduler
+        Address of a scheduler instead, `tcp://host:8786`.
+
+    Raises
+    ------
+    StudyError
+        No scheduler answers there, or it has no worker.
+    """
+    # what the cluster has to say of a killed worker is of no use to a reader: the run is simply done again
+    for name in (*logging.root.manager.loggerDict, "distributed", "asyncio", "tornado"):
+        if name.partition(".")[0] in ("distributed", "asyncio", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}):
+        if scheduler is None:
+            with _embedded(workers or core_count()) as cluster, Client(cluster) as client:
+                yield client
+        else:
+            with _remote(scheduler) as client:
+                yield client
+
+
+def _embedded(workers: int) -> LocalCluster:
+    """Processes on this machine, one thread each.
+
+    Ctrl-C goes to all of them: it is held back while the cluster starts, in this thread, and for good in the threads
+    and processes that it starts (they inherit the mask), so that this process alone decides how a sweep ends.
+    """
+    resource_tracker.ensure_running()  # to start it later would lift the mask
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+@contextmanager
+def _remote(address: str) -> Iterator[Client]:
+    try:
+        client = Client(address, timeout=CONNECT_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise StudyError(
+            f"--scheduler {address}: no scheduler answers there ({reason}); start one with `dask scheduler`, or leave "
+            "the option out"
+        ) from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT_S)
+        except TimeoutError as error:
+            raise StudyError(
+                f"--scheduler {address}: the scheduler has no worker; start one: `dask worker {address} --nthreads 1`"
+            ) from error
+        yield client

@@ -1,0 +1,147 @@
+"""What a worker process does: one run at a time, with everything that runs have in common built once."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from adaptive_flot.batch import BatchFit
+from adaptive_flot.errors import PluginError, StudyError
+from adaptive_flot.runner.prepared import Prepared
+from adaptive_flot.runner.results import plain, run_summary
+from adaptive_flot.runner.runs_table import run_rows
+from adaptive_flot.runner.scenario import load_scenario
+from adaptive_flot.runner.scenario_file import Plugin
+from adaptive_flot.runner.study import initial_fit, run_one
+from adaptive_flot.studies.grid import content_hash
+
+TIMES = ("seconds", "solve_median_s", "solve_p99_s")
+"""Columns that depend on the machine and the hour: kept apart from what is compared."""
+MOST_PREPARED = 8
+"""Scenarios whose functions a worker keeps; a study runs through its scenarios together, seed by seed."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """A scenario with plug-ins, as it is sent to a worker.
+
+    Attributes
+    ----------
+    path
+        Scenario file, readable by the worker under the same path.
+    content
+        Hash of scenario and plug-ins when the study started.
+    estimators, controllers
+        Plug-ins by the name under which they run.
+    shared
+        Estimators whose runs of a seed share the initial fit.
+    """
+
+    path: Path
+    content: str
+    estimators: Mapping[str, Plugin]
+    controllers: Mapping[str, Plugin]
+    shared: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run leaves behind: its row in the table of runs, and what it took."""
+
+    row: dict[str, Any]
+    timing: dict[str, Any]
+
+
+class _Kept(threading.local):
+    """What a thread has built: functions hold working memory, so no two threads may share them."""
+
+    def __init__(self) -> None:
+        self.prepared: dict[str, Prepared] = {}
+
+
+_kept = _Kept()
+
+
+def fit_start(order: Order, controller: str, seed: int) -> BatchFit | str:
+    """Initial fit that several runs of a seed share, or what went wrong."""
+    prepared = _prepare(order)
+    try:
+        return initial_fit(prepared, controller, seed)
+    except PluginError:
+        raise
+    except Exception as error:
+        return _message(error)
+
+
+def run(
+    order: Order, names: Mapping[str, str], controller: str, estimator: str, seed: int, start: BatchFit | str | None
+) -> Result:
+    """Run one combination; what goes wrong in it becomes a row too, and does not stop the study.
+
+    Parameters
+    ----------
+    order
+        The scenario.
+    names
+        Columns that name the run: `run` and `scenario`.
+    controller, estimator, seed
+        The combination.
+    start
+        Initial fit, or why there is none; None: fit here.
+
+    Raises
+    ------
+    StudyError, PluginError
+        Something that would hit every run: the scenario is not the one that the study started with, a plug-in can not
+        be loaded.
+    """
+    begin = time.perf_counter(), time.process_time()
+    head = {**names, "controller": controller, "estimator": estimator, "seed": seed}
+    try:
+        if isinstance(start, str):
+            return Result({**head, "outcome": "failed", "message": start}, _timing(head, begin))
+        prepared = _prepare(order)
+        found = run_one(prepared, estimator, controller, seed, {} if start is None else {"fit": start})
+        row = run_rows(plain(run_summary(prepared.scenario, [found])))[0]
+    except (PluginError, StudyError):
+        raise
+    except Exception as error:
+        return Result({**head, "outcome": "failed", "message": _message(error)}, _timing(head, begin))
+    times = {key: row.pop(key) for key in TIMES if key in row}
+    return Result({**row, **head, "outcome": "ok", "message": ""}, {**times, **_timing(head, begin)})
+
+
+def _prepare(order: Order) -> Prepared:
+    known, key = _kept.prepared, f"{order.path} {order.content}"
+    if key not in known:
+        scenario = load_scenario(order.path)
+        if content_hash(scenario, order.estimators, order.controllers) != order.content:
+            raise StudyError(
+                f"{order.path}: the scenario, or code of an estimator or controller, is not here as it was when the "
+                "study started; restore it and start the study again"
+            )
+        for plugin in (*order.estimators.values(), *order.controllers.values()):
+            # a worker that lives longer than a study may have imported the user's file as it was before
+            sys.modules.pop(Path(plugin.use.rpartition(":")[0]).stem if ".py:" in plugin.use else "", None)
+        if len(known) == MOST_PREPARED:
+            del known[next(iter(known))]
+        known[key] = Prepared(scenario, order.estimators, order.controllers)
+    return known[key]
+
+
+def _timing(head: Mapping[str, Any], begin: tuple[float, float]) -> dict[str, Any]:
+    """Wall-clock and processor time since `begin`, and where."""
+    spent = {"seconds": time.perf_counter() - begin[0], "cpu_seconds": time.process_time() - begin[1]}
+    where = f"{socket.gethostname()}:{os.getpid()}"
+    return {"run": head["run"], "worker": where, **{key: round(value, 4) for key, value in spent.items()}}
+
+
+def _message(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
