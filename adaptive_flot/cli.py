@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -41,6 +42,9 @@ ModelOption = Annotated[
     ),
 ]
 CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML), or the name of a shipped one.")]
+Compile = Annotated[
+    bool, typer.Option("--compile", help="Step and estimators as machine code, by the C compiler of this system.")
+]
 
 
 @app.command(epilog="Example: adaptive-flot run paper_scenario_1 --estimator rpem --seed 1 --seed 2 --out results/s1")
@@ -56,6 +60,7 @@ def run(
     out: Out = None,
     json: Json = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
+    compile_: Compile = False,
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
     from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
@@ -64,6 +69,7 @@ def run(
     from adaptive_flot.runner.study import run_scenario
 
     loaded = load_scenario(scenario)
+    loaded = loaded.compiled() if _can_compile(compile_) else loaded
     who = _once(estimator), _once(controller)
     count = len(loaded.combinations(*who)) * len(_once(seed) or set(loaded.file.seeds))
     with progress_bar(loaded.name, count) as advance:
@@ -120,6 +126,7 @@ def estimate(
     save_model: Annotated[Path | None, typer.Option(help="Write the fitted model as a model file (YAML).")] = None,
     out: Out = None,
     json: Json = None,
+    compile_: Compile = False,
 ) -> None:
     """Replay a measured record through fixed, recursive and batch estimation."""
     from adaptive_flot.console import print_estimate, progress_bar
@@ -131,7 +138,7 @@ def estimate(
 
     if save_cell is not None and model != "flotation":
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
-    made = make_model(model, cell=cell, folder=data.parent)
+    made = replace(make_model(model, cell=cell, folder=data.parent), compiled=_can_compile(compile_))
     blocks = read_blocks(data, made, fit_share)
     names = estimator or ["fixed", "rpem", "pem"]
     with progress_bar(data.stem, 1 + len(names)) as advance:
@@ -233,6 +240,7 @@ def sweep(
     ] = None,
     out: Out = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed runs again.")] = False,
+    compile_: Compile = False,
 ) -> None:
     """Run a study of many runs. Interrupted, the same command goes on where it was."""
     from adaptive_flot.studies.progress import live, print_study
@@ -241,10 +249,17 @@ def sweep(
 
     loaded = load_study(study)
     folder = out or Path("results") / loaded.name
+    compiled = _can_compile(compile_)
     try:
         with live(loaded.name) as progress:
             outcome = run_study(
-                loaded, folder, workers=workers, scheduler=scheduler, retry_failed=retry_failed, progress=progress
+                loaded,
+                folder,
+                workers=workers,
+                scheduler=scheduler,
+                retry_failed=retry_failed,
+                compiled=compiled,
+                progress=progress,
             )
     except KeyboardInterrupt:
         sys.stderr.write(f"adaptive-flot: interrupted; results so far are in {folder}, the same command goes on\n")
@@ -273,6 +288,18 @@ def main() -> None:
     except AdaptiveFlotError as error:
         sys.stderr.write(f"adaptive-flot: {' '.join(str(error).split())}\n")
         sys.exit(USER_ERROR)
+
+
+def _can_compile(asked: bool) -> bool:
+    """Whether to compile; where it is asked for and nothing can be compiled, one line says why."""
+    if not asked:
+        return False
+    from adaptive_flot.greybox.compiled import compiler_problem
+
+    problem = compiler_problem()
+    if problem is not None:
+        sys.stderr.write(f"adaptive-flot: --compile: {problem}; going on without, the results are the same\n")
+    return problem is None
 
 
 def _once(given: list[T] | None) -> list[T]:

@@ -93,7 +93,9 @@ class Ekf:
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
         self._step = FastCall(
-            filter_step(setup, self.coordinates, self.layout, outlier_std), matrices=("P", "Q", "P_next")
+            filter_step(setup, self.coordinates, self.layout, outlier_std),
+            matrices=("P", "Q", "P_next"),
+            as_machine_code=setup.model.compiled,
         )
 
     def init(self, prior: Prior) -> EkfState:

@@ -107,9 +107,12 @@ class Imm:
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
         step = filter_step(setup, self.coordinates, self.layout, outlier_std)
-        self._step = FastCall(step, matrices=("P", "Q", "P_next"))
-        self._mix = FastCall(mix_function(self.layout, self.modes, self.transitions), matrices=("z", "P"))
-        self._combine = FastCall(combine_function(self.layout, len(self.modes)), matrices=("z", "P", "covariance"))
+        mix = mix_function(self.layout, self.modes, self.transitions)
+        combine = combine_function(self.layout, len(self.modes))
+        code = setup.model.compiled
+        self._step = FastCall(step, matrices=("P", "Q", "P_next"), as_machine_code=code)
+        self._mix = FastCall(mix, matrices=("z", "P"), as_machine_code=code)
+        self._combine = FastCall(combine, matrices=("z", "P", "covariance"), as_machine_code=code)
 
     def init(self, prior: Prior) -> ImmState:
         """Start from a prior, every mode alike and with the share of time that the process spends in it."""

@@ -93,7 +93,9 @@ class Rpem:
         self._shape = (len(setup.model.outputs),)
         self._p = setup.model.parameter_values
         self._update = FastCall(
-            _update_function(setup, forgetting, gradient), matrices=("covariance", "covariance_next")
+            _update_function(setup, forgetting, gradient),
+            matrices=("covariance", "covariance_next"),
+            as_machine_code=setup.model.compiled,
         )
 
     def init(self, prior: Prior) -> RpemState:

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.compiled import compiled
 from adaptive_flot.greybox.model import FloatArray
 
 
@@ -25,12 +26,14 @@ class FastCall:
         The function.
     matrices
         Names of arguments and results that are matrices (n, m) also where m is 1; a column is else a vector (n,).
+    as_machine_code
+        Compile it (see `compiled`); the constructor then takes as long as the compiler, the first time.
     """
 
-    def __init__(self, function: ca.Function, matrices: Sequence[str] = ()) -> None:
-        self.function = _dense(function)
+    def __init__(self, function: ca.Function, matrices: Sequence[str] = (), *, as_machine_code: bool = False) -> None:
+        self.function = compiled(_dense(function)) if as_machine_code else _dense(function)
         self._buffer, self._evaluate = self.function.buffer()
-        self._plain = bool(self.function.is_a("SXFunction"))
+        self._plain = bool(self.function.is_a("SXFunction") or self.function.is_a("External"))
         arguments = [np.zeros(self.function.nnz_in(i)) for i in range(self.function.n_in())]
         results = [np.zeros(self.function.nnz_out(i)) for i in range(self.function.n_out())]
         # SWIG turns a memoryview into pointer and size; the stubs know only the C signature

@@ -73,6 +73,8 @@ class Model:
     """What a search may call by name; when empty, every site with every driver."""
     effects: tuple[Effect, ...] = ()
     """Effects attached by `with_effects`; their parameters and states follow those of the model."""
+    compiled: bool = False
+    """Steppers and estimators of this model turn what they call in a loop into machine code (`greybox/compiled.py`)."""
 
     def __post_init__(self) -> None:
         _ = self._built  # equations are checked when the model is made, not when it is first used

@@ -19,6 +19,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.compiled import compiled
 from adaptive_flot.greybox.fast_step import Moving, fast_step, fast_step_along
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -71,6 +72,7 @@ class Stepper:
         self.substeps = substeps or max(1, math.ceil(dt / model.max_step_s - 1e-9))
         self.accurate = accurate
         self._key = ("stepper", self.dt, self.substeps, accurate)
+        self._compiled = model.compiled and not accurate  # IDAS is machine code already
 
     @property
     def step(self) -> ca.Function:
@@ -84,7 +86,7 @@ class Stepper:
     @cached_property
     def call(self) -> FastCall:
         """The step as a NumPy function `(x, t, u, p) -> (x_next, y, s)`."""
-        return FastCall(self.step)
+        return FastCall(self.step, as_machine_code=self._compiled)
 
     def outputs_at(self, state: FloatArray, time: float, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
         """Outputs and signals (ny + ns,) at one instant: the first row of a table."""
@@ -209,7 +211,12 @@ class Stepper:
         # mapaccum carries only the first argument unless told how many: with a state and its sensitivity it must be
         # 2, else the sensitivity silently forgets the past.
         name = function.name()
-        return self._kept((name, wrt, rows), lambda: function.mapaccum(f"{name}_x{rows}", rows, carried))
+
+        def make() -> ca.Function:
+            step = self._kept((name, wrt, "compiled"), lambda: compiled(function)) if self._compiled else function
+            return step.mapaccum(f"{name}_x{rows}", rows, carried)
+
+        return self._kept((name, wrt, rows), make)
 
     def _kept(self, key: tuple[Hashable, ...], make: Callable[[], ca.Function]) -> ca.Function:
         """Function made once for all steppers of the model with the same interval and method."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +50,12 @@ class Scenario:
     model: Model
     setup: Setup
     plant_model: Model
+
+    def compiled(self) -> Scenario:
+        """The same scenario, its step and its estimators as machine code (`Model.compiled`)."""
+        model = replace(self.model, compiled=True)
+        plant = model if self.plant_model is self.model else replace(self.plant_model, compiled=True)
+        return replace(self, model=model, setup=replace(self.setup, model=model), plant_model=plant)
 
     @property
     def dt(self) -> float:

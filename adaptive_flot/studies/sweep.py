@@ -7,7 +7,7 @@ import concurrent.futures
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -60,6 +60,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     retry_failed: bool = False,
+    compiled: bool = False,
     progress: Callable[[int, Rows], Progress] = lambda total, before: lambda rows: None,
 ) -> Outcome:
     """Run what is missing of a study and complete its folder.
@@ -74,6 +75,8 @@ def sweep(
         Where to run, see `connected`.
     retry_failed
         Run failed runs again.
+    compiled
+        Run the step and the estimators as machine code; a worker without a compiler runs them plain.
     progress
         Called once with the number of runs and the rows that are there; what it returns is called with new rows.
 
@@ -84,7 +87,9 @@ def sweep(
     AdaptiveFlotError
         A plug-in can not be built.
     """
-    grid = grid_of(study)
+    grid = grid_of(study, compiled=compiled)
+    if compiled:
+        study = replace(study, arms=tuple(replace(a, scenario=a.scenario.compiled()) for a in study.arms))
     with locked(path) as folder:
         remember(path, grid)
         if retry_failed:
@@ -122,7 +127,8 @@ def _order(arm: Arm) -> worker.Order:
     content = content_hash(arm.scenario, arm.estimators, arm.controllers)
     prepared = Prepared(arm.scenario, arm.estimators, arm.controllers)
     shared = frozenset(name for name in arm.estimators if prepared.shares_fit(name))
-    return worker.Order(arm.scenario.path, content, dict(arm.estimators), dict(arm.controllers), shared)
+    compiled = arm.scenario.model.compiled
+    return worker.Order(arm.scenario.path, content, dict(arm.estimators), dict(arm.controllers), shared, compiled)
 
 
 def _check_plugins(groups: Sequence[_Group], study: Study) -> None:

@@ -42,6 +42,8 @@ class Order:
         Plug-ins by the name under which they run.
     shared
         Estimators whose runs of a seed share the initial fit.
+    compiled
+        Whether the step and the estimators run as machine code.
     """
 
     path: Path
@@ -49,6 +51,7 @@ class Order:
     estimators: Mapping[str, Plugin]
     controllers: Mapping[str, Plugin]
     shared: frozenset[str]
+    compiled: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ def run(
 
 
 def _prepare(order: Order) -> Prepared:
-    known, key = _kept.prepared, f"{order.path} {order.content}"
+    known, key = _kept.prepared, f"{order.path} {order.content} {order.compiled}"
     if key not in known:
         scenario = load_scenario(order.path)
         if content_hash(scenario, order.estimators, order.controllers) != order.content:
@@ -132,6 +135,7 @@ def _prepare(order: Order) -> Prepared:
             sys.modules.pop(Path(plugin.use.rpartition(":")[0]).stem if ".py:" in plugin.use else "", None)
         if len(known) == MOST_PREPARED:
             del known[next(iter(known))]
+        scenario = scenario.compiled() if order.compiled else scenario
         known[key] = Prepared(scenario, order.estimators, order.controllers)
     return known[key]
 

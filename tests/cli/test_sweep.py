@@ -54,3 +54,14 @@ def test_another_study_in_the_folder_is_one_line(call: Call, study: Path) -> Non
     result = call("sweep", study)
     assert result.code == 2 and result.err.count("\n") == 1
     assert "holds seeds that are no longer in the study (1)" in result.err and "another --out" in result.err
+
+
+def test_without_a_compiler_one_line_says_so_and_the_run_goes_on(
+    call: Call, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
+    result = call("run", study.with_name("short.yaml"), "--estimator", "fixed", "--compile")
+    assert result.code == 0 and "Report: " in result.out
+    assert "--compile: no C compiler found (looked for cc, gcc, clang on the path)" in result.err
+    assert result.err.count("\n") == 1

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from pandas.testing import assert_frame_equal
 
 from adaptive_flot.errors import AdaptiveFlotError, ModelError, PluginError, StudyError
+from adaptive_flot.greybox import compiled as machine_code
 from adaptive_flot.runner.results import plain, run_summary
 from adaptive_flot.runner.runs_table import read_runs, run_rows
 from adaptive_flot.runner.scenario import load_scenario
@@ -145,6 +147,24 @@ def test_changed_content_is_refused_with_what_changed(write_study: WriteStudy) -
     with pytest.raises(StudyError, match=r"scenario 'short' .* has changed"):
         run(write_study(scenario={"measurements.level.noise_std": 5.0e-3}))
     assert run(write_study()).found == 6
+
+
+def test_compiled_runs_have_the_fits_of_plain_ones_and_do_not_mix_with_them(
+    write_study: WriteStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What agrees to rounding only is another result, and the folder says so."""
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "cache")
+    problem = machine_code.compiler_problem()
+    if problem is not None:
+        pytest.skip(problem)
+    study = load_study(write_study({"seeds.count": 2}))
+    quick, plain = sweep(study, tmp_path / "quick", compiled=True).table, sweep(study, tmp_path / "plain").table
+    assert list((tmp_path / "cache").glob("rpem_update-*.so"))
+    fits = [c for c in map(str, plain.columns) if c.startswith("fit_")]
+    np.testing.assert_allclose(quick[fits], plain[fits], rtol=1e-9)
+    assert not set(quick["run"]) & set(plain["run"])
+    with pytest.raises(StudyError, match="holds results with compiled = True, now it is False"):
+        sweep(study, tmp_path / "quick")
 
 
 def test_two_sweeps_do_not_write_to_one_folder(write_study: WriteStudy) -> None:

@@ -1,0 +1,156 @@
+"""CasADi functions as machine code, on request: C through the system's compiler, kept on disk.
+
+CasADi interprets an expression operation by operation. The same operations as C, compiled at -O1 without contraction of
+products and sums, give the same numbers several times quicker; higher levels gain nothing on straight-line code and
+take the compiler much longer. A library is kept under a hash of source, compiler and flags, in the user's cache folder
+(`platformdirs`). It is compiled under another name and then renamed, so any number of processes may want the same one
+at once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import tempfile
+import warnings
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import casadi as ca
+from platformdirs import user_cache_path
+
+FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
+COMPILERS = ("cc", "gcc", "clang")
+"""Looked for in this order, unless the environment variable CC names one."""
+
+
+class CompileWarning(UserWarning):
+    """A function could not be compiled; it is interpreted, which gives the same numbers later."""
+
+
+class CompileError(Exception):
+    """No compiler, or it does not work: the message says what was tried."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: the command, and what tells it from others (first line of its version, machine)."""
+
+    command: tuple[str, ...]
+    identity: str
+
+
+def compiled(function: ca.Function) -> ca.Function:
+    """Return a function as machine code, or itself with a `CompileWarning` where that can not be had."""
+    try:
+        return compile_function(function)
+    except CompileError as failure:
+        warnings.warn(f"{function.name()} is not compiled: {failure}", CompileWarning, stacklevel=2)
+        return function
+
+
+def compiler_problem() -> str | None:
+    """Why nothing can be compiled here, in words; None when a small function was compiled and works."""
+    x = ca.SX.sym("x")
+    try:
+        probe = compile_function(ca.Function("probe", [x], [x + 1]))
+    except CompileError as failure:
+        return str(failure)
+    return None if float(probe(1.0)) == 2.0 else f"{find_compiler().command[0]} makes wrong code"
+
+
+def compile_function(function: ca.Function) -> ca.Function:
+    """Compile a function, or load it where it was compiled before.
+
+    Raises
+    ------
+    CompileError
+        No compiler, it fails, or its result can not be kept or loaded.
+    """
+    compiler, source = find_compiler(), _source(function)
+    content = "\0".join([source, compiler.identity, *FLAGS])
+    digest = hashlib.sha256(content.encode()).hexdigest()[:24]
+    library = cache_folder() / f"{function.name()}-{digest}.so"
+    if library.is_file():
+        # an unfinished library is never there, but a disk may have lost part of one
+        with suppress(RuntimeError):
+            return ca.external(function.name(), str(library))
+    _build(source, compiler, library)
+    try:
+        return ca.external(function.name(), str(library))
+    except RuntimeError as error:
+        raise CompileError(f"{library} can not be loaded ({_last_line(str(error))})") from error
+
+
+def cache_folder() -> Path:
+    """Folder of compiled functions; deleting it costs nothing but the time to compile again."""
+    return user_cache_path("adaptive-flot", appauthor=False) / "compiled"
+
+
+def find_compiler() -> Compiler:
+    """The C compiler of this system: what CC says, else the first of `COMPILERS` on the path.
+
+    Raises
+    ------
+    CompileError
+        None there, or it does not say its version.
+    """
+    return _compiler(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@lru_cache(maxsize=8)
+def _compiler(named: str, path: str) -> Compiler:
+    wanted = shlex.split(named)
+    names = wanted[:1] or list(COMPILERS)
+    program = next((found for name in names if (found := shutil.which(name, path=path))), None)
+    if program is None:
+        tried = f"{names[0]}, which the variable CC names," if wanted else f"{', '.join(COMPILERS)}"
+        raise CompileError(f"no C compiler found (looked for {tried} on the path); install one, for example gcc")
+    command = (program, *wanted[1:])
+    said = _run([*command, "--version"], "its version")
+    return Compiler(command, "\n".join([*command, said.partition("\n")[0], platform.machine(), platform.system()]))
+
+
+def _source(function: ca.Function) -> str:
+    generator = ca.CodeGenerator("adaptive_flot.c")
+    try:
+        generator.add(function)
+        return str(generator.dump())
+    except RuntimeError as error:
+        raise CompileError(f"CasADi writes no C for it ({_last_line(str(error))})") from error
+
+
+def _build(source: str, compiler: Compiler, library: Path) -> None:
+    """Compile a source and put the result in its place, whole."""
+    try:
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".compiling-", dir=library.parent) as folder:
+            code, made = Path(folder) / "function.c", Path(folder) / "function.so"
+            code.write_text(source, encoding="utf-8")
+            _run([*compiler.command, *FLAGS, str(code), "-o", str(made), "-lm"], library.name)
+            made.replace(library)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CompileError(f"compiled functions can not be kept in {library.parent} ({reason})") from error
+
+
+def _run(command: list[str], what: str) -> str:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise CompileError(f"{command[0]} can not be run ({error.strerror or error})") from error
+    if done.returncode != 0:
+        said = _last_line(done.stderr) or f"exit code {done.returncode}"
+        raise CompileError(f"{command[0]} failed on {what} ({said})")
+    return done.stdout
+
+
+def _last_line(text: str) -> str:
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return lines[-1][:200] if lines else ""
