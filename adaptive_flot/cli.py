@@ -171,18 +171,28 @@ def discover(
     processes: Annotated[
         int | None, typer.Option(min=1, help="Fits that run at once; default as many as there are cores.")
     ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Range of an input for the test that is proposed (repeatable), input=low:high in SI units; "
+            "default where the record has been."
+        ),
+    ] = None,
 ) -> None:
     """Find what physical effect a model lacks, from a measured record, and show the error before and after."""
     from adaptive_flot.console import print_discovery, stage_bar
     from adaptive_flot.discovery.parallel import available_processes
     from adaptive_flot.processes.registry import make_model
-    from adaptive_flot.runner.discover import check_model_path, discover_file, save_discovered
+    from adaptive_flot.runner.discover import check_model_path, discover_file, read_limits, save_discovered
     from adaptive_flot.runner.results import write_json
 
     check_model_path(save_model)
+    limits = read_limits(limit or ())
     made = make_model(model, cell=cell, folder=data.parent)
     with stage_bar(data.stem) as progress:
-        found = discover_file(data, made, processes=processes or available_processes(), progress=progress)
+        found = discover_file(
+            data, made, limits=limits, processes=processes or available_processes(), progress=progress
+        )
     folder = out or Path("results") / data.stem
     for target in filter(None, (folder / "verdict.json", json)):
         write_json(target, found.verdict.as_dict())

@@ -62,6 +62,8 @@ def print_discovery(found: Discovery) -> None:
             low, high = (report.number(100 * r, ".0f") for r in c.reduction95)
             table.add_row(c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
         console.print(table)
+    if verdict.experiment is not None:
+        console.print(f"{verdict.experiment}", highlight=False, markup=False)
     console.file.flush()
 
 

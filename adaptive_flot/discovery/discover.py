@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.experiment import leading, plan_experiment
 from adaptive_flot.discovery.fit import Fit, Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.noise import proportional
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
+from adaptive_flot.discovery.signals import input_range
 from adaptive_flot.discovery.verdict import Judgement, NamedEffect, Verdict, judge
 from adaptive_flot.discovery.verify import changes, whiteness
+from adaptive_flot.discovery.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -57,6 +60,7 @@ def discover(
     *,
     adapted: Sequence[str] = (),
     report_record: Dataset | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
@@ -73,6 +77,9 @@ def discover(
     report_record
         A further record of the same process that starts in the same (unknown) state. It reports the error before and
         after and is used for nothing else; the whole of `record` can then be used to search.
+    limits
+        Lowest and highest value of inputs by name, for the test that is proposed; where it is not given, the test
+        stays where the record has been.
     processes
         Fits that run at once.
     progress
@@ -86,11 +93,12 @@ def discover(
     Raises
     ------
     ModelError
-        No site, or no parameter of that name.
+        No site, no parameter of that name, or a limit that does not fit the inputs.
     """
     began = time.perf_counter()
     if not model.sites:
         raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
+    input_range(record.inputs, model.inputs, limits)  # a wrong limit is told before the search
     names = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
     progress("check the data")
     checked = gate(record, model)
@@ -107,6 +115,11 @@ def discover(
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)
     verdict = _verdict(problem, checked, found, judgement, before, after, report_record)
+    if judgement.best is not None and judgement.word != "none":
+        progress("plan a test")
+        compared = leading(judgement.best, found.alternatives, judgement.margin)
+        planned = plan_experiment(problem, compared, judgement.margin, limits, processes)
+        verdict = replace(verdict, experiment=planned)
     extended = after.model if judgement.word in ("named", "class", "unnamed") else before.model
     verdict = replace(verdict, seconds=time.perf_counter() - began)
     return Discovery(verdict, extended, checked, problem, found, judgement, before, after)
@@ -175,14 +188,14 @@ def _verdict(
     first = before.model.outputs[problem.columns[0]].name
     tests |= {f"ljung_box_{k}": tests.get(f"ljung_box_{k}_{first}", float("nan")) for k in ("before", "after")}
     effects = _effects(judgement, after) if tells else ()
-    drift = _drift(judgement, after) if judgement.word == "none" and judgement.best else ()
+    drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
     error = changes(problem, before, final, "report")
     if report is not None:
         there, old, new = on_record(problem, report, before, final)
         error = changes(there, old, new, "report")
     return Verdict(
         word=judgement.word,
-        reason=_reason(judgement, found, effects, drift),
+        reason=reason_words(judgement, found, effects, drift),
         effects=effects,
         members=judgement.members,
         error=error,
@@ -199,6 +212,7 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     model, best = after.model, judgement.best
     std = dict(zip(after.names, after.std(), strict=True))
     meanings = {(k.site, k.driver): k.meaning for k in model.known_effects}
+    unlisted = "no known effect of that kind" if meanings else "named by the model's own site and driver"
     found = []
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
@@ -212,42 +226,5 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
             for c, v in effect.coefficients.items()
             if effect.parameter(c) in std
         }
-        found.append(NamedEffect(effect, meanings.get(own, "an effect without a name"), interval, others))
+        found.append(NamedEffect(effect, meanings.get(own, unlisted), interval, others))
     return tuple(found)
-
-
-def _drift(judgement: Judgement, after: Fit) -> tuple[str, ...]:
-    assert judgement.best is not None  # drift is a kind of alternative
-    said = []
-    for effect in after.model.fitted_effects()[-len(judgement.best.names) :]:
-        values = [v for k, v in effect.coefficients.items() if k.startswith(("amplitude", "value"))]
-        change = max(values, key=abs) if len(values) == 1 else max(values) - min(values)
-        said.append(f"{effect.site} changes by about {100 * (np.exp(change) - 1):+.0f} % ({effect.form} in time)")
-    return tuple(said)
-
-
-def _reason(judgement: Judgement, found: Search, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
-    if judgement.word == "none" and drift:
-        return (
-            "The model lacks no effect that this record shows: a drift of its adapted parameters explains the residual "
-            f"({'; '.join(drift)}), and tracking them is the estimator's work."
-        )
-    if judgement.word == "none":
-        return (
-            "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
-            "noise would, or what it removes does not stand on rows that did not choose it."
-        )
-    evidence = f"{found.verification}" if found.verification else ""
-    said = "; and ".join(f"{e.effect.site} depends on {e.effect.driver} ({e.meaning})" for e in effects)
-    if judgement.word == "named":
-        return f"The model lacks this: {said}. {evidence}."
-    if judgement.word == "class":
-        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
-        return f"The model lacks one of these, which this record can not tell apart: {members}. {evidence}."
-    if judgement.word == "unnamed":
-        return f"The model lacks something without a known name: {said}. {evidence}."
-    close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
-    return (
-        "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
-        f"none explains it well ({close}). {evidence}."
-    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.experiment import Experiment
 from adaptive_flot.discovery.search import Search
 from adaptive_flot.discovery.verify import OutputChange
 from adaptive_flot.greybox.effects import Effect
@@ -67,6 +68,8 @@ class Verdict:
         Change of each adapted parameter that the plain fit needed to mimic the effect, as a share, by label.
     notes
         What was left out or stays open.
+    experiment
+        Input moves that would tell the leading alternatives apart; None where there is but one.
     seconds
         Wall-clock time.
     """
@@ -82,6 +85,7 @@ class Verdict:
     drift: tuple[str, ...] = ()
     absorbed: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    experiment: Experiment | None = None
     seconds: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
@@ -107,11 +111,13 @@ class Verdict:
             "drift": list(self.drift),
             "absorbed": dict(self.absorbed),
             "notes": list(self.notes),
+            "experiment": self.experiment.as_dict() if self.experiment else None,
             "seconds": round(self.seconds, 2),
         }
 
     def __str__(self) -> str:
-        return "\n".join([f"verdict: {self.word}", self.reason, *(f"  {c}" for c in self.error), *self.notes])
+        lines = [f"verdict: {self.word}", self.reason, *(f"  {c}" for c in self.error), *self.notes]
+        return "\n".join(lines + ([str(self.experiment)] if self.experiment else []))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,9 @@ from adaptive_flot.greybox.model import FloatArray
 
 BLOCK_ROWS = 20
 """Rows of a block of the paired block bootstrap: longer than the noise remembers."""
+SHORTEST_BLOCK = 4
+MANY_BLOCKS = 8
+"""A share too short for so many blocks gets shorter ones."""
 DRAWS = 500
 WORSE = 0.02
 """Share by which no output's error may grow."""
@@ -103,10 +106,11 @@ def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> F
 def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, float]]:
     """1 - RMS(new) / RMS(old) with a paired block-bootstrap interval (scipy, percentile)."""
     ok = np.isfinite(old) & np.isfinite(new)
-    count = int(ok.sum()) // BLOCK_ROWS
+    length = int(np.clip(ok.sum() // MANY_BLOCKS, SHORTEST_BLOCK, BLOCK_ROWS))
+    count = int(ok.sum()) // length
     if count < 4 or not old[ok].sum() > 0:
         return 0.0, (float("-inf"), float("inf"))
-    a, b = (s[ok][: count * BLOCK_ROWS].reshape(count, -1).sum(axis=1) for s in (old, new))
+    a, b = (s[ok][: count * length].reshape(count, -1).sum(axis=1) for s in (old, new))
 
     def statistic(x: FloatArray, y: FloatArray, axis: int = -1) -> FloatArray:
         value: FloatArray = 1 - np.sqrt(np.sum(y, axis=axis) / np.maximum(np.sum(x, axis=axis), 1e-300))

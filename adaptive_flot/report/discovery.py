@@ -11,6 +11,7 @@ from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.files import write_text
 from adaptive_flot.report import discovery_tables as tables
 from adaptive_flot.report import figures
+from adaptive_flot.report.discovery_experiment import experiment_chapter
 from adaptive_flot.report.discovery_pictures import curve_figure, heat_map
 from adaptive_flot.report.page import Album, Page, Picture, made_by, render
 from adaptive_flot.report.plotdata import Panel, Residuals, Role, Trace
@@ -58,6 +59,7 @@ def discovery_report(found: Discovery, name: str, command: str = "") -> str:
     if found.problem is not None and found.before is not None and found.after is not None:
         content |= _evidence(found, found.problem, found.before, found.after, album)
         contents += [("errors", "Error before and after"), ("residual", "Residual"), ("evidence", "Evidence")]
+        contents += [("experiment", "Which input moves would tell")] if content["experiment"] else []
         contents += [("absorbed", "Absorbed")] if content["absorbed"] else []
     made = made_by(command, [("Model", found.model.name), ("Time", f"{found.verdict.seconds:.1f} s")])
     lead = f"Record: {name}, {len(found.gate.record)} rows, one every {found.gate.record.dt:g} s."
@@ -70,6 +72,7 @@ def _evidence(found: Discovery, problem: Problem, before: Fit, after: Fit, album
     verdict = found.verdict
     curve = _curve_picture(found, problem, after, album)
     columns = _telling(found, problem)
+    planned = verdict.experiment
     return {
         "facts": _facts(found),
         "coefficients": tables.coefficient_table(found) if verdict.effects else None,
@@ -80,7 +83,8 @@ def _evidence(found: Discovery, problem: Problem, before: Fit, after: Fit, album
         "residuals": [_residuals(found, problem, j, album) for j in columns],
         "map": _map(found, album),
         "alternatives": tables.alternative_table(found) if tables.ranked_alternatives(found) else None,
-        "open": tables.not_told_apart(found) or ["Nothing comes near the best alternative."],
+        "open": tables.not_told_apart(found),
+        "experiment": experiment_chapter(planned, found.model, problem.columns, album) if planned else None,
         "absorbed": tables.absorbed_table(found) if verdict.absorbed and found.before is not found.after else None,
     }
 

@@ -125,7 +125,7 @@ def not_told_apart(found: Discovery) -> list[str]:
     """Sentences on what this record leaves open."""
     judged = found.judgement
     if judged is None or judged.best is None:
-        return []
+        return ["There is no alternative to tell apart."]
     best = judged.best
     said = []
     for a in judged.rivals:
@@ -135,4 +135,6 @@ def not_told_apart(found: Discovery) -> list[str]:
                 f"{effect_text(a.names)} explains the record as well as {effect_text(best.names)}: its criterion "
                 f"differs by {number(worse, '.1f')}, and {judged.margin:.0f} is the least that tells two apart."
             )
-    return said
+    if not said and found.verdict.experiment is not None:
+        said = ["Nothing comes as near as that to the best alternative; the test below is for those next to it."]
+    return said or ["Nothing comes near the best alternative."]

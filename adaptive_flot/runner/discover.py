@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from adaptive_flot.discovery.discover import Discovery, discover
@@ -28,7 +28,12 @@ def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
 
 
 def discover_file(
-    path: Path, model: Model, *, processes: int = 1, progress: Callable[[str], None] = lambda stage: None
+    path: Path,
+    model: Model,
+    *,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
     """Read a measured record and find what physical effect the model lacks.
 
@@ -38,6 +43,8 @@ def discover_file(
         CSV or Parquet file.
     model
         The model, with sites.
+    limits
+        Ranges of inputs by name for the test that is proposed.
     processes
         Fits that run at once.
     progress
@@ -49,7 +56,31 @@ def discover_file(
         The table or the model can not be used.
     """
     record, report = read_records(path, model)
-    return discover(model, record, report_record=report, processes=processes, progress=progress)
+    return discover(model, record, report_record=report, limits=limits, processes=processes, progress=progress)
+
+
+def read_limits(given: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Ranges of inputs from `input=low:high`.
+
+    >>> read_limits(["air_flow=0.0009:0.0022"])
+    {'air_flow': (0.0009, 0.0022)}
+
+    Raises
+    ------
+    ModelError
+        Not of that form.
+    """
+    found = {}
+    for text in given:
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        try:
+            found[name] = (float(low), float(high))
+        except ValueError:
+            raise ModelError(
+                f"--limit: {text!r}; write input=low:high in SI units, as air_flow=0.0009:0.0022"
+            ) from None
+    return found
 
 
 def check_model_path(path: Path | None) -> None:

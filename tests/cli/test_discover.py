@@ -62,3 +62,9 @@ def test_a_record_that_can_not_be_read_is_one_line(
     result = call("discover", table(change))
     assert result.code == 2 and says in result.err and "record.csv" in result.err
     assert len(result.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("limit", ["air_flow", "air_flow=1:", "air_flow=0.002:0.001", "air_flw=0.001:0.002"])
+def test_a_limit_that_can_not_be_read_is_one_line(call: Call, table: WriteTable, limit: str) -> None:
+    result = call("discover", table(), "--limit", limit)
+    assert result.code == 2 and "limit" in result.err and "air_fl" in result.err and len(result.err.splitlines()) == 1

@@ -1,0 +1,48 @@
+"""The verdict in plain words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.search import Search
+from adaptive_flot.discovery.verdict import Judgement, NamedEffect
+
+
+def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
+    """What drifts and by how much, for each effect of a drift."""
+    assert judgement.best is not None  # drift is a kind of alternative
+    said = []
+    for effect in after.model.fitted_effects()[-len(judgement.best.names) :]:
+        values = [v for k, v in effect.coefficients.items() if k.startswith(("amplitude", "value"))]
+        change = max(values, key=abs) if len(values) == 1 else max(values) - min(values)
+        said.append(f"{effect.site} changes by about {100 * (np.exp(change) - 1):+.0f} % ({effect.form} in time)")
+    return tuple(said)
+
+
+def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
+    """The verdict in one paragraph."""
+    if judgement.word == "none" and drift:
+        return (
+            "The model lacks no effect that this record shows: a drift of its adapted parameters explains the residual "
+            f"({'; '.join(drift)}), and tracking them is the estimator's work."
+        )
+    if judgement.word == "none":
+        return (
+            "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
+            "noise would, or what it removes does not stand on rows that did not choose it."
+        )
+    evidence = f"{found.verification}" if found.verification else ""
+    said = "; and ".join(f"{e.effect.site} depends on {e.effect.driver} ({e.meaning})" for e in effects)
+    if judgement.word == "named":
+        return f"The model lacks this: {said}. {evidence}."
+    if judgement.word == "class":
+        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
+        return f"The model lacks one of these, which this record can not tell apart: {members}. {evidence}."
+    if judgement.word == "unnamed":
+        return f"The model lacks something without a known name: {said}. {evidence}."
+    close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
+    return (
+        "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
+        f"none explains it well ({close}). {evidence}."
+    )
