@@ -9,7 +9,7 @@ from pathlib import Path
 from adaptive_flot.files import write_text
 from adaptive_flot.report import distributions
 from adaptive_flot.report.compare_findings import findings
-from adaptive_flot.report.compare_tables import compare_tables, overview_table, spread_text
+from adaptive_flot.report.compare_tables import MANY_SEEDS, compare_tables, overview_table, spread_text
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Role, Spread
 from adaptive_flot.report.tables import seed_list
@@ -114,7 +114,12 @@ def _fit_pictures(comparison: Comparison, album: Album) -> list[Picture]:
         for name in names
     ]
     figure = distributions.spread_figure(spreads, _roles(comparison))
-    return [album.add(figure, _spread_caption(comparison), "Fits by contender")]
+    pictures = [album.add(figure, _spread_caption(comparison), "Fits by contender")]
+    if max(len(c.seeds) for c in comparison.contenders) >= MANY_SEEDS:
+        caption = f"{comparison.scenario}: share of the runs whose fit is at most that; further right is better."
+        figure = distributions.cumulative_figure(spreads, _roles(comparison))
+        pictures.append(album.add(figure, caption, "Cumulative distribution of the fits"))
+    return pictures
 
 
 def _spread_caption(comparison: Comparison) -> str:

@@ -11,6 +11,10 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.page import Table, number
 from adaptive_flot.runner.comparison import Comparison, Contender, Spread
 
+MANY_SEEDS = 20
+"""Seeds from which a distribution is more than its median and range."""
+QUANTILES = ((0, "Least"), (0.05, "5 %"), (0.25, "25 %"), (0.5, "Median"), (0.75, "75 %"), (0.95, "95 %"), (1, "Most"))
+
 Values = Callable[[Contender], FloatArray]
 
 
@@ -104,19 +108,42 @@ def status_table(comparison: Comparison) -> Table:
     return _table(comparison, caption, (), words)
 
 
-def time_table(comparison: Comparison) -> Table:
-    """Wall-clock times of solves and runs."""
+def time_table(comparison: Comparison) -> Table | None:
+    """Times of solves and runs; None if none was taken."""
     columns = [
         _column("Solves", "solves", ".0f"),
         _column("Solve, median [ms]", "solve_median_s", ".1f", 1e3),
         _column("Solve, p99 [ms]", "solve_p99_s", ".1f", 1e3),
         _column("Run [s]", "seconds", ".1f"),
+        _column("Run, processor [s]", "cpu_seconds", ".2f"),
     ]
     caption = (
-        f"{comparison.scenario}: wall-clock time of a solve within a run (median and 99th percentile), and of the run. "
-        f"{spread_text(comparison)}"
+        f"{comparison.scenario}: wall-clock time of a solve within a run (median and 99th percentile), wall-clock and "
+        f"processor time of the run. {spread_text(comparison)}"
     )
-    return _table(comparison, caption, columns)
+    table = _table(comparison, caption, columns)
+    return table if len(table.header) > table.words + 1 else None
+
+
+def quantile_table(comparison: Comparison) -> Table | None:
+    """Distribution of each outcome over the seeds; None with too few of them."""
+    if max(len(c.seeds) for c in comparison.contenders) < MANY_SEEDS:
+        return None
+    wanted = {"value_cu_h": ("Value [cu/h]", ".3f"), "recovery": ("Recovery [–]", ".4f")}
+    names = [m for m in dict.fromkeys(m for c in comparison.contenders for m in c.metrics)]
+    wanted |= {n: (f"Fit of {n.removeprefix('fit_').replace('_', ' ')} [%]", ".2f") for n in names if "fit_" == n[:4]}
+    results = any(c.result for c in comparison.contenders)
+    rows = []
+    for name, (heading, form) in wanted.items():
+        for c in (c for c in comparison.contenders if c.has(name)):
+            values = c.values(name)
+            finite = values[np.isfinite(values)]
+            cells = (number(float(v), form) for v in np.quantile(finite, [q for q, _ in QUANTILES]))
+            own = (heading, c.controller, c.estimator, *((c.result,) if results else ()))
+            rows.append((*own, str(len(finite)), *cells))
+    header = ("Quantity", "Controller", "Estimator", *(("Result",) if results else ()))
+    caption = f"{comparison.scenario}: distribution over the seeds, by quantiles of the finite values."
+    return Table(caption, (*header, "Runs", *(h for _, h in QUANTILES)), tuple(rows), words=len(header))
 
 
 def spread_text(comparison: Comparison) -> str:
@@ -129,7 +156,7 @@ def spread_text(comparison: Comparison) -> str:
 
 def compare_tables(comparison: Comparison) -> list[Table]:
     """All tables of a comparison that hold something."""
-    makers = (outcome_table, value_table, status_table, time_table, fits_table)
+    makers = (outcome_table, value_table, status_table, time_table, fits_table, quantile_table)
     return [table for make in makers if (table := make(comparison)) is not None]
 
 

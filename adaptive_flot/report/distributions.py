@@ -15,6 +15,8 @@ from adaptive_flot.report.figures import legend_above, look
 from adaptive_flot.report.plotdata import Role, Spread
 
 MARKERS = ("o", "s", "^", "D", "v", "P")
+MANY_POINTS = 200
+"""Values from which points are drawn fainter."""
 FEWEST_FOR_A_BOX = 5
 """Values from which quartiles are drawn; fewer are shown as points and their median."""
 
@@ -51,6 +53,39 @@ def spread_figure(spreads: Sequence[Spread], roles: Mapping[str, tuple[Role, int
     axes[0].set_ylim(len(names) - 0.5, -0.5)
     if any(s.published for s in spreads):
         legend_above(figure, axes)
+    return figure
+
+
+@style.styled
+def cumulative_figure(spreads: Sequence[Spread], roles: Mapping[str, tuple[Role, int]]) -> Figure:
+    """Empirical cumulative distribution over the seeds, a panel a quantity and a line for each who has it.
+
+    Parameters
+    ----------
+    spreads
+        Values of each quantity.
+    roles
+        Role and colour index of each line.
+
+    Returns
+    -------
+    Figure
+        Steps from 0 to 1, thin lines at 5, 50 and 95 %.
+    """
+    figure = Figure(figsize=(style.WIDTH, 3.0))
+    axes: list[Axes] = list(figure.subplots(1, len(spreads), sharey=True, squeeze=False)[0])
+    for ax, spread in zip(axes, spreads, strict=True):
+        for name, role in roles.items():
+            values = spread.values.get(name, np.empty(0))
+            if np.isfinite(values).any():
+                ax.ecdf(values[np.isfinite(values)], color=look(*role)["color"], lw=1.6, label=name)
+        for share in (0.05, 0.5, 0.95):
+            ax.axhline(share, color="#c8c8c8", lw=0.8, zorder=0)
+        ax.set_xlabel(spread.label)
+        ax.xaxis.set_major_locator(MaxNLocator(4))
+    axes[0].set_ylabel("share of the runs [–]")
+    axes[0].set_yticks([0.05, 0.25, 0.5, 0.75, 0.95])
+    legend_above(figure, axes)
     return figure
 
 
@@ -106,7 +141,7 @@ def _draw_spread(ax: Axes, y: float, values: FloatArray, color: str) -> None:
     else:
         ax.vlines(np.median(values), y - 0.25, y + 0.25, color=color, lw=2.4)
     jitter = 0.16 * np.resize([-1.0, 0.4, 1.0, -0.4, 0.0], len(values))  # not random: the same data, the same picture
-    ax.plot(values, y + jitter, "o", ms=3.2, color=color, alpha=0.55, mew=0)
+    ax.plot(values, y + jitter, "o", ms=3.2, color=color, alpha=0.55 if len(values) < MANY_POINTS else 0.1, mew=0)
 
 
 def _draw_box(ax: Axes, y: float, values: FloatArray, color: str) -> None:

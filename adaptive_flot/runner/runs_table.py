@@ -16,6 +16,8 @@ from adaptive_flot.errors import ResultError
 KEYS = ("scenario", "controller", "estimator", "seed")
 """Columns that name a run; every table of runs has them."""
 SUMMARY = "summary.json"
+TIMINGS = "timings"
+"""End of the names of the files in which a study keeps times."""
 
 
 def run_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -133,7 +135,17 @@ def _read_parts(folder: Path, path: Path) -> pd.DataFrame:
         raise ResultError(f"{path}: no results in this folder (no {SUMMARY}, no Parquet table of runs); {hint}")
     table = pd.concat([pd.read_parquet(part) for part in parts], ignore_index=True)
     # a study that was killed while it merged its parts holds some runs twice, the same to the bit
-    return table.drop_duplicates("run", ignore_index=True) if "run" in table else table
+    return _with_times(table.drop_duplicates("run", ignore_index=True), folder) if "run" in table else table
+
+
+def _with_times(table: pd.DataFrame, folder: Path) -> pd.DataFrame:
+    """Add what each run of a study took, which lies apart from its results."""
+    files = [f for f in sorted(folder.rglob(f"*{TIMINGS}.parquet")) if not f.name.startswith(".")]
+    if not files:
+        return table
+    times = pd.concat([pd.read_parquet(f) for f in files], ignore_index=True).drop_duplicates("run")
+    new = [c for c in times.select_dtypes("number").columns if c not in table]
+    return table.merge(times[["run", *new]], on="run", how="left", validate="one_to_one")
 
 
 def _is_table_of_runs(file: Path) -> bool:

@@ -10,8 +10,10 @@ import pytest
 
 from adaptive_flot.report.compare import compare_report
 from adaptive_flot.report.compare_findings import findings
-from adaptive_flot.report.compare_tables import compare_tables, markdown, overview_table
+from adaptive_flot.report.compare_tables import compare_tables, markdown, overview_table, quantile_table
+from adaptive_flot.report.distributions import cumulative_figure
 from adaptive_flot.report.page import Table
+from adaptive_flot.report.plotdata import Role, Spread
 from adaptive_flot.runner.comparison import Comparison, compare
 from benchmarks.readme_table import BEGIN, END, README, put
 from tests.report.test_run_report import Links
@@ -133,3 +135,36 @@ def test_a_page_of_open_loop_runs_shows_their_fits() -> None:
     )
     page = compare_report(compare(table))
     assert "fit of the estimates" in page and "Value [cu/h]" not in page
+
+
+def test_many_seeds_show_their_distribution_and_few_only_median_and_range() -> None:
+    """Values of seed k lie 0.01 k above the first, so the quantile q of 101 seeds is that of seed 1 + 100 q."""
+    assert quantile_table(comparison(seeds=3)) is None
+    table = quantile_table(comparison(seeds=101))
+    assert table is not None
+    rows = {row[: table.words]: row[table.words :] for row in table.rows}
+    assert rows["Value [cu/h]", "mpc", "rpem"] == (
+        "101",
+        "11.510",
+        "11.560",
+        "11.760",
+        "12.010",
+        "12.260",
+        "12.460",
+        "12.510",
+    )
+    assert rows["Recovery [–]", "pi", "fixed"][:2] == ("101", "0.8010")
+    assert len(rows) == 4 * 3  # value, recovery and one fit
+
+
+def test_cumulative_figure_rises_by_one_run_at_each_value() -> None:
+    spread = Spread("fit", {"a": np.array([3.0, 1.0, np.nan, 2.0]), "b": np.array([np.nan])})
+    figure = cumulative_figure([spread], {"a": (Role.ESTIMATE, 0), "b": (Role.ESTIMATE, 1)})
+    (line,) = [x for x in figure.axes[0].lines if x.get_label() == "a"]
+    x, y = (np.asarray(v) for v in line.get_data())
+    assert [(float(b), round(float(a), 9)) for b, a in zip(x, y, strict=True)][1:] == [
+        (1.0, round(1 / 3, 9)),
+        (2.0, round(2 / 3, 9)),
+        (3.0, 1.0),
+    ]
+    assert "b" not in [x.get_label() for x in figure.axes[0].lines]

@@ -178,3 +178,6 @@ def test_compare_reads_a_study_finished_or_not(write_study: WriteStudy, tmp_path
     whole = run(write_study()).table
     table = read_runs([tmp_path / "out"])
     assert_frame_equal(table[whole.columns], whole, check_dtype=False)
+    assert table["seconds"].tolist() == pd.read_parquet(tmp_path / "out" / "timings.parquet")["seconds"].tolist()
+    (tmp_path / "out" / "timings.parquet").unlink()
+    assert "seconds" not in read_runs([tmp_path / "out"])
