@@ -112,7 +112,7 @@ def _scipy_rpem(record: _Record, method: scipy_reference.Method) -> Callable[[],
 def simulation_figures() -> list[Figure]:
     """2400 s at 1 s: fast step and accurate integrator."""
     scenario = load_scenario("paper_scenario_1")
-    schedule, p = scenario.schedule(1), scenario.true_parameters()
+    schedule, p = scenario.schedule(1), scenario.true_parameters(1)
     x0 = steady_state(scenario.model, schedule[0]).state
     figures = []
     for name, stepper, limit in (

@@ -26,14 +26,14 @@ def disturbances(scenario: Scenario, seed: int, model: Model | None = None) -> D
     for j in imposed:
         part = scenario.file.disturbances.get(scenario.model.inputs[j].column, EXACT)
         shown[:, j] = known(scenario, part, inputs[:, j], float(inputs[0, j]), generator)
-    return Disturbances(inputs, shown, _parameters(scenario, model or scenario.model, generator))
+    return Disturbances(inputs, shown, _parameters(scenario, seed, model or scenario.model, generator))
 
 
-def _parameters(scenario: Scenario, model: Model, generator: np.random.Generator) -> FloatArray | None:
+def _parameters(scenario: Scenario, seed: int, model: Model, generator: np.random.Generator) -> FloatArray | None:
     inputs = [q.column for q in scenario.model.inputs]
     if not scenario.measured_parameters:
         return None
-    true, nominal = scenario.true_parameters(), model.parameter_values
+    true, nominal = scenario.true_parameters(seed), model.parameter_values
     found = np.tile(nominal, (len(true), 1))
     for key, part in scenario.file.disturbances.items():
         if key not in inputs:

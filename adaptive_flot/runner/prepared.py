@@ -48,33 +48,34 @@ class Prepared:
         moved = {name: controller_plugin(scenario, name) for name in controllers} or dict(scenario.file.controllers)
         return cls(scenario, chosen, moved)
 
-    def setup(self, name: str) -> Setup:
-        """What the estimator of that name is built for; only the oracle is shown the truth, and the plant's model."""
+    def setup(self, name: str, seed: int) -> Setup:
+        """What the estimator of a run is built for; only the oracle is shown the truth, and the plant's model."""
         s = self.scenario
         if self.estimators[name].use != "oracle":
             return s.setup
         known = tuple(p for p in s.setup.parameters if p in s.plant_model.names("parameters"))
-        return replace(s.setup, model=s.plant_model, parameters=known, truth=s.true_parameters())
+        return replace(s.setup, model=s.plant_model, parameters=known, truth=s.true_parameters(seed))
 
     def shares_fit(self, name: str) -> bool:
         """Whether runs with this estimator see the same first part as all others: not where its model is another."""
-        return self.setup(name).model is self.scenario.model
+        return self.estimators[name].use != "oracle" or self.scenario.plant_model is self.scenario.model
 
-    def estimator(self, name: str) -> AnyEstimator:
-        """The estimator of that name."""
-        if name not in self._built:
-            use, options = self.estimators[name].use, self.estimators[name].options
-            setup = self.setup(name)
+    def estimator(self, name: str, seed: int) -> AnyEstimator:
+        """The estimator of that name for the run of a seed: one for all, but where it is told the truth."""
+        use, options = self.estimators[name].use, self.estimators[name].options
+        key = f"{name}-{seed}" if use == "oracle" else name
+        if key not in self._built:
+            setup = self.setup(name, seed)
             factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
             made = construct(factory, use, "estimator", setup, **options)
-            self._built[name] = taking_late_values(made, self.scenario.longest_dead_time)
-        return self._built[name]
+            self._built[key] = taking_late_values(made, self.scenario.longest_dead_time)
+        return self._built[key]
 
     def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
         """A controller of that name for the run of a seed, with the model of the estimator that it listens to."""
         use, options = self.controllers[name].use, self.controllers[name].options
         s = self.scenario
-        told = s.setup if estimator is None else self.setup(estimator)
+        told = s.setup if estimator is None else self.setup(estimator, seed)
         setup = ControllerSetup(told.model, s.dt, s.plan(seed), told.parameters, s.limits, s.prices)
         made: AnyController = construct(
             load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options

@@ -98,8 +98,9 @@ class Change(_Profile):
             raise ValueError("to_s must lie after from_s")
         return self
 
-    def factor(self, time: FloatArray) -> FloatArray:
+    def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
         """Factor on the nominal value in the interval that starts at each time [s] (N,)."""
+        del seed, name
         if self.profile == "step":
             share = (time >= self.from_s - 1e-9).astype(float)
         else:
@@ -120,10 +121,32 @@ class Factors(_Profile):
             raise ValueError("at_s must rise from 0 and have as many entries as factors")
         return self
 
-    def factor(self, time: FloatArray) -> FloatArray:
+    def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
         """Factor on the nominal value in the interval that starts at each time [s] (N,)."""
+        del seed, name
         return np.array(self.factors)[np.searchsorted(self.at_s, time + 1e-9, side="right") - 1]
 
 
+class RandomWalk(_Profile):
+    """A parameter whose logarithm does a random walk in continuous time, held during each interval."""
+
+    profile: Literal["random_walk"]
+    share_per_hour: float = Field(gt=0)
+    """Standard deviation of the walk after an hour, as a share of the parameter."""
+    from_s: float = Field(default=0.0, ge=0)
+    """The parameter is at its nominal value until then."""
+    seed: Annotated[int, Field(ge=0)] | Literal["per_run"] = "per_run"
+    """A number fixes the walk for all runs; `per_run` draws another one for each run seed."""
+
+    def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
+        """Factor on the nominal value in the interval that starts at each time [s] (N,); another walk for each name."""
+        stream = [seed, 6] if self.seed == "per_run" else [self.seed, 7]
+        generator = np.random.default_rng([*stream, *name.encode()])
+        walk = np.zeros(len(time))
+        moves = generator.standard_normal(len(time) - 1) * np.sqrt(np.diff(time) / 3600.0)
+        walk[1:] = self.share_per_hour * np.cumsum(np.where(time[1:] >= self.from_s - 1e-9, moves, 0.0))
+        return np.exp(walk)
+
+
 InputProfile = Annotated[Constant | Staircase | Random | Steps, Field(discriminator="profile")]
-ParameterProfile = Change | Factors
+ParameterProfile = Change | Factors | RandomWalk

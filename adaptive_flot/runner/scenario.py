@@ -140,11 +140,12 @@ class Scenario:
         parts = self.file.disturbances.items()
         return [self.model.index("parameters", key) for key, part in parts if key not in inputs and part.measured]
 
-    def true_parameters(self) -> FloatArray:
-        """Parameters of the plant's model (N, np) in each interval."""
+    def true_parameters(self, seed: int) -> FloatArray:
+        """Parameters of the plant's model (N, np) in each interval of a run."""
         p = np.tile(self.plant_model.parameter_values, (len(self.starts), 1))
         for name, change in self.file.parameters.items():
-            p[:, self.plant_model.index("parameters", name)] *= change.factor(self.starts)
+            column = self.plant_model.index("parameters", name)
+            p[:, column] *= change.factor(self.starts, seed, self.plant_model.parameters[column].name)
         return p
 
     @property

@@ -36,18 +36,30 @@ def check_scenario(scenario: Scenario) -> None:
     model.indices("outputs", file.measurements)
     with located("initial_estimate.guess"):
         model.with_parameters(file.initial_estimate.guess)
-    with located("parameters"):
-        for name in file.parameters:
-            plant = scenario.plant_model
-            values = scenario.true_parameters()[:, plant.index("parameters", name)]
-            for extreme in (values.min(), values.max()):
-                plant.with_parameters({name: float(extreme)})
+    for seed in file.seeds:
+        check_truth(scenario, seed)
     _check_closed_loop(scenario)
     _check_initial_state(scenario)
     _check_disturbances(scenario)
     _check_faults(scenario)
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
+
+
+def check_truth(scenario: Scenario, seed: int) -> None:
+    """Check that the plant's parameters stay within their range in the run of a seed.
+
+    Raises
+    ------
+    ModelError
+        They do not.
+    """
+    true, plant = scenario.true_parameters(seed), scenario.plant_model
+    with located("parameters"):
+        for name in scenario.file.parameters:
+            values = true[:, plant.index("parameters", name)]
+            for extreme in (values.min(), values.max()):
+                plant.with_parameters({name: float(extreme)})
 
 
 def _check_closed_loop(scenario: Scenario) -> None:

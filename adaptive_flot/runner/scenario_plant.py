@@ -17,7 +17,7 @@ def make_plant(scenario: Scenario, seed: int, model: Model | None = None) -> Sim
 
     `model` is that of the estimator and the controller, whose parameters the plant's instruments tell.
     """
-    parameters = scenario.true_parameters()
+    parameters = scenario.true_parameters(seed)
     x0 = initial_state(scenario, scenario.plant_model, scenario.schedule(seed)[0], parameters[0])
     noise = measurement_noise(scenario, seed)
     accurate = scenario.file.plant.integrator == "accurate"

@@ -20,6 +20,7 @@ from adaptive_flot.runner.loop import MakePrior, Step, run_loop
 from adaptive_flot.runner.plans import plan_table
 from adaptive_flot.runner.prepared import Prepared
 from adaptive_flot.runner.scenario import Scenario
+from adaptive_flot.runner.scenario_checks import check_truth
 from adaptive_flot.runner.scenario_plant import make_plant
 from adaptive_flot.runner.starts import nominal_start, record_of
 from adaptive_flot.runner.timeseries import fits, time_series
@@ -138,7 +139,7 @@ def run_one(
     """
     begin = time.perf_counter()
     scenario, plugin = prepared.scenario, prepared.estimators[estimator_name]
-    estimator, setup = prepared.estimator(estimator_name), prepared.setup(estimator_name)
+    estimator, setup = prepared.estimator(estimator_name, seed), prepared.setup(estimator_name, seed)
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
@@ -175,7 +176,7 @@ def initial_fit(prepared: Prepared, controller_name: str, seed: int) -> BatchFit
     def never(steps: list[Step]) -> Prior:
         raise AssertionError(f"an estimator started after {len(steps)} of {scenario.initial_rows} intervals")
 
-    untouched = prepared.estimator(next(iter(prepared.estimators)))
+    untouched = prepared.estimator(next(iter(prepared.estimators)), seed)
     controller = prepared.controller(controller_name, seed)
     steps = _steps(scenario, seed, scenario.model, controller, untouched, scenario.initial_rows, never)
     return prepared.batch.fit(record_of(scenario, scenario.setup, steps))
@@ -192,6 +193,7 @@ def _steps(
 ) -> list[Step]:
     """The first intervals of a run with an estimator of that model."""
     scenario.model.check_inputs(scenario.schedule(seed), scenario.starts, where=f"inputs of seed {seed}")
+    check_truth(scenario, seed)
     plant, controller = with_faults(scenario, seed, make_plant(scenario, seed, model), controller)
     return run_loop(
         plant, estimator, controller, intervals, initial_intervals=scenario.initial_rows, make_prior=make_prior

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
 
 from adaptive_flot import metrics
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.late import in_time
 from adaptive_flot.protocols import Sample, Setup, Status
 from adaptive_flot.runner.loop import Step
@@ -20,10 +21,11 @@ def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.D
     """Table of a run whose estimator was built for `setup`: `time_s`, inputs, and with suffixes.
 
     For inputs `_true` where what acted is not what was known; for outputs `_true`, `_measured`, `_predicted`,
-    `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std`, for others that move or are
-    measured `_true`, `_known` (NaN where the plant, or the estimator's model, has no such parameter); then `status` of
-    the estimator, `control_status`, `decided_by`, the `faults` of a scenario that has any, and, where a controller
-    optimised, `solve_seconds`.
+    `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std` and for each pair of them
+    `_correlation` (as `n_C_correlation`), as the estimator claims them; for others that move or are measured `_true`,
+    `_known` (NaN where the plant, or the estimator's model, has no such parameter); then `status` of the estimator,
+    `control_status`, `decided_by`, the `faults` of a scenario that has any, and, where a controller optimised,
+    `solve_seconds`.
     """
     columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
     columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps, setup)
@@ -94,7 +96,26 @@ def _adapted(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[st
         columns[f"{label}_true"] = _column(true, plant, name)
         columns[f"{label}_estimate"] = _column(theta, setup.parameters, name)
         columns[f"{label}_std"] = _column(std, setup.parameters, name)
+    for a, b in combinations(scenario.setup.parameters, 2):
+        columns[correlation_column(model, a, b)] = _correlation(steps, setup.parameters, a, b)
     return columns
+
+
+def correlation_column(model: Model, first: str, second: str) -> str:
+    """Column of the correlation that an estimator claims of two parameters, each by its full name."""
+    labels = [model.parameters[i].label for i in model.indices("parameters", [first, second])]
+    return f"{labels[0]}_{labels[1]}_correlation"
+
+
+def _correlation(steps: Sequence[Step], names: Sequence[str], first: str, second: str) -> FloatArray:
+    if first not in names or second not in names:
+        return np.full(len(steps), np.nan)
+    i, j = names.index(first), names.index(second)
+    unknown = np.full((len(names), len(names)), np.nan)
+    P = np.array([s.estimate.covariance if s.estimate else unknown for s in steps])
+    spread = np.sqrt(P[:, i, i] * P[:, j, j])
+    correlation: FloatArray = np.divide(P[:, i, j], spread, out=np.full(len(P), np.nan), where=spread > 0)
+    return correlation
 
 
 def _column(table: FloatArray, names: Sequence[str], name: str) -> FloatArray:

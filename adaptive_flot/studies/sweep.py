@@ -141,7 +141,7 @@ def _check_plugins(groups: Sequence[_Group], study: Study) -> None:
             for controller in sorted({c for c, _ in mine}):
                 prepared.controller(controller, study.seeds[0])
             for estimator in sorted({e for _, e in mine}):
-                prepared.estimator(estimator)
+                prepared.estimator(estimator, study.seeds[0])
 
 
 def _results(client: Client, groups: Sequence[_Group]) -> Iterator[list[worker.Result]]:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from adaptive_flot.runner.profiles import Change, InputProfile
+from adaptive_flot.runner.profiles import Change, InputProfile, RandomWalk
 
 _ADAPTER: TypeAdapter[InputProfile] = TypeAdapter(InputProfile)
 
@@ -103,3 +103,25 @@ def test_step_factor_jumps_at_the_start_of_the_ramp() -> None:
 def test_a_change_needs_its_end_after_its_start() -> None:
     with pytest.raises(ValidationError, match="to_s must lie after from_s"):
         Change(change=0.1, from_s=10, to_s=10)
+
+
+def test_a_random_walk_has_the_std_asked_for_after_an_hour_and_rests_before_its_start() -> None:
+    """Over many runs; the sampling interval is of no account."""
+    walk = RandomWalk(profile="random_walk", share_per_hour=0.1, from_s=100)
+    for dt in (1.0, 10.0):
+        time = np.arange(0.0, 3700.0, dt)
+        paths = np.log([walk.factor(time, seed, "C") for seed in range(400)])
+        assert not paths[:, time < 100].any()
+        np.testing.assert_allclose(paths[:, -1].std(), 0.1, rtol=0.15)
+        half = paths[:, np.searchsorted(time, 1900.0)]
+        np.testing.assert_allclose(half.std(), 0.1 * np.sqrt(0.5), rtol=0.15)
+
+
+def test_a_random_walk_is_another_one_for_each_seed_and_parameter_unless_its_seed_is_given() -> None:
+    time = np.arange(50.0)
+    walk = RandomWalk(profile="random_walk", share_per_hour=0.1)
+    np.testing.assert_array_equal(walk.factor(time, 1, "C"), walk.factor(time, 1, "C"))
+    for other in (walk.factor(time, 2, "C"), walk.factor(time, 1, "n")):
+        assert abs(np.corrcoef(np.diff(walk.factor(time, 1, "C")), np.diff(other))[0, 1]) < 0.5
+    fixed = RandomWalk(profile="random_walk", share_per_hour=0.1, seed=3)
+    np.testing.assert_array_equal(fixed.factor(time, 1, "C"), fixed.factor(time, 2, "C"))

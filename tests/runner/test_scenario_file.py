@@ -129,13 +129,13 @@ def test_an_unknown_scenario_names_the_shipped_ones(name: str) -> None:
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_every_shipped_scenario_loads_by_name(name: str) -> None:
     loaded = load_scenario(name)
-    assert loaded.name == name and len(loaded.schedule(1)) == len(loaded.true_parameters())
+    assert loaded.name == name and len(loaded.schedule(1)) == len(loaded.true_parameters(1))
 
 
 @pytest.mark.parametrize("name", [n for n in shipped_scenarios() if n.startswith("paper")])
 def test_the_paper_scenarios_are_those_of_the_paper(name: str) -> None:
     loaded = load_scenario(name)
-    schedule, truth = loaded.schedule(1), loaded.true_parameters()
+    schedule, truth = loaded.schedule(1), loaded.true_parameters(1)
     model = loaded.model
     assert schedule.shape == (2400, 3) and loaded.initial_rows == 600
     assert loaded.setup.parameters == ("growth_exponent", "coalescence_rate")

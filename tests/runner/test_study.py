@@ -132,7 +132,7 @@ def test_row_k_holds_the_inputs_and_the_truth_of_the_interval_that_ends_there(
 
 def test_truth_is_the_simulation_of_the_same_inputs(scenario: Scenario, by_name: Runs) -> None:
     """Open loop: `Stepper.simulate` from the steady state of the first inputs, in one call."""
-    model, schedule, p = scenario.model, scenario.schedule(1), scenario.true_parameters()
+    model, schedule, p = scenario.model, scenario.schedule(1), scenario.true_parameters(1)
     x0 = steady_state(model, schedule[0], p[0]).state
     expected = Stepper(model, 1.0).simulate(x0, schedule, p)
     for j, q in enumerate(model.outputs):

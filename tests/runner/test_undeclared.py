@@ -85,7 +85,7 @@ def test_an_effect_of_the_plant_may_drift(write_scenario: WriteScenario) -> None
     drift = {EXPONENT: {"profile": "ramp", "change": 1.0, "from_s": 50, "to_s": 90}}
     path = write_scenario({"plant": {"effects": [GROWTH]}, "parameters": drift})
     scenario = load_scenario(path)
-    column = scenario.true_parameters()[:, scenario.plant_model.index("parameters", EXPONENT)]
+    column = scenario.true_parameters(1)[:, scenario.plant_model.index("parameters", EXPONENT)]
     assert (column[0], column[-1]) == (0.4, 0.8)
     table = run_scenario(scenario, ["fixed"], [1])[0].table
     np.testing.assert_array_equal(table[f"{EXPONENT}_true"], column)

@@ -1,0 +1,122 @@
+"""How accurate and how honest each estimator is over many seeds: `python -m benchmarks.accuracy`.
+
+Both paper scenarios with ramps, the grade alone, every estimator with its defaults. Writes one Parquet part for each
+scenario and seed into the folder of `--out` (default `results/accuracy`); parts that are there are not run again, so
+that what was stopped goes on; remove the folder after a change. Prints medians and quartiles of the fits beside what
+was asked, and the consistency: the normalised estimation error squared (NEES) of n and C, whose mean over the runs
+should lie within its 95 % band (Bar-Shalom, Li & Kirubarajan 2001, section 5.4.2). Over so many runs even a small bias
+leaves the band, so the share of samples of single runs below their own 95 % limit is shown too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+from scipy.stats import chi2
+
+from adaptive_flot.greybox.tables import read_table, write_table
+from adaptive_flot.metrics import normalised_error_squared
+from adaptive_flot.runner.scenario import Scenario, load_scenario
+from adaptive_flot.runner.study import Run, run_scenario
+
+SCENARIOS = ("paper_scenario_1", "paper_scenario_2")
+ESTIMATORS = ("fixed", "rpem", "ekf", "imm")
+SEEDS = 100
+ASKED = {"n": 98.7, "C": 95.0, "concentrate_grade": 99.8}
+ROWS_APART = 10
+"""The error of a parameter changes slowly: its NEES is kept every so many rows."""
+
+
+def run_part(scenario: Scenario, estimators: Sequence[str], seed: int) -> pd.DataFrame:
+    """Fits, NEES every tenth row over the time of the fits, and CPU time, one row an estimator."""
+    rows = []
+    for name in estimators:
+        begin = time.process_time()
+        run = run_scenario(scenario, [name], seeds=[seed])[0]
+        seconds = time.process_time() - begin
+        rows.append({"estimator": name, "seed": seed, "cpu_s": seconds, **run.fit, "nees": list(nees(scenario, run))})
+    return pd.DataFrame(rows)
+
+
+def nees(scenario: Scenario, run: Run) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Normalised estimation error squared of the adapted parameters n and C, every tenth row after `fits_after_s`."""
+    table = run.table[run.table["time_s"] > scenario.fits_after + 1e-9].iloc[::ROWS_APART]
+    if not (table[["n_std", "C_std"]].to_numpy() > 0).all():  # constant parameters claim to be exact
+        return np.full(len(table), np.nan)
+    error = table[["n_estimate", "C_estimate"]].to_numpy() - table[["n_true", "C_true"]].to_numpy()
+    std = table[["n_std", "C_std"]].to_numpy()
+    between = table["n_C_correlation"].to_numpy()
+    correlation = np.stack([np.stack([np.ones_like(between), between]), np.stack([between, np.ones_like(between)])])
+    return normalised_error_squared(error / std, correlation.transpose(2, 0, 1))
+
+
+def parts(folder: Path, name: str, estimators: Sequence[str], seeds: Sequence[int]) -> pd.DataFrame:
+    """Rows of a scenario; what has no part yet is run."""
+    scenario = load_scenario(name)
+    for seed in track(seeds, name, console=Console(stderr=True)):
+        for estimator in estimators:
+            part = folder / f"{name}-{estimator}-seed{seed}.parquet"
+            if not part.is_file():
+                write_table(run_part(scenario, [estimator], seed), part)
+    files = [folder / f"{name}-{estimator}-seed{seed}.parquet" for estimator in estimators for seed in seeds]
+    return pd.concat([read_table(file) for file in files], ignore_index=True)
+
+
+def spread(values: pd.Series[float]) -> str:
+    """Median and quartiles."""
+    low, middle, high = np.nanquantile(np.asarray(values, dtype=float), [0.25, 0.5, 0.75]).tolist()
+    return f"{middle:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def consistency(rows: pd.DataFrame) -> list[str]:
+    """Mean NEES over all runs and times; share of times with the mean over the runs in its band; share of samples."""
+    values = np.stack([np.asarray(v, dtype=float) for v in rows["nees"]])
+    if not np.isfinite(values).all():
+        return ["–", "–", "–"]
+    count, q = len(values), 2
+    low, high = chi2.ppf([0.025, 0.975], q * count) / count
+    by_time = values.mean(axis=0)
+    inside = np.mean((by_time >= low) & (by_time <= high))
+    covered = np.mean(values <= chi2.ppf(0.95, q))
+    return [f"{values.mean():.2f}", f"{inside:.0%} in [{low:.2f}, {high:.2f}]", f"{covered:.1%}"]
+
+
+def table_of(results: dict[str, pd.DataFrame]) -> Table:
+    """What is printed."""
+    heads = [f"{key.replace('_', ' ')} (asked {limit:g})" for key, limit in ASKED.items()]
+    table = Table("scenario", "estimator", *heads, "mean NEES (2)", "mean over runs in band", "samples below 95 %")
+    for name, rows in results.items():
+        for estimator, of in rows.groupby("estimator", sort=False):
+            fits = [spread(of[key]) for key in ASKED]
+            table.add_row(name, str(estimator), *fits, *consistency(of))
+    return table
+
+
+def main() -> None:
+    """Run what is missing and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("results/accuracy"))
+    parser.add_argument("--scenario", action="append", help="repeatable; default both paper scenarios")
+    parser.add_argument("--estimator", action="append", help=f"repeatable; default {', '.join(ESTIMATORS)}")
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds")
+    parser.add_argument("--first-seed", type=int, default=1)
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    names, estimators = options.scenario or SCENARIOS, options.estimator or ESTIMATORS
+    results = {name: parts(options.out, name, estimators, seeds) for name in names}
+    console = Console(width=None if Console().is_terminal else 170)
+    console.print(f"Fits in percent, median and quartiles over seeds {seeds[0]} to {seeds[-1]}")
+    console.print(table_of(results))
+
+
+if __name__ == "__main__":
+    main()

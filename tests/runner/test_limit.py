@@ -1,0 +1,37 @@
+"""The bound of a scenario: the joint filter of a truth that walks reaches it, and claims it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.runner.limit import MORE_SENSORS, TrueRun, has_limit
+from adaptive_flot.runner.scenario import load_scenario
+from adaptive_flot.runner.study import run_scenario
+
+
+def test_the_joint_filter_of_a_random_walk_is_within_1_3_of_the_bound() -> None:
+    """Root mean square over the runs, as asked; its own covariance is the bound but for the point of linearisation."""
+    scenario = load_scenario("random_walk")
+    late = scenario.starts >= scenario.fits_after
+    errors, claimed, bounds = [], [], []
+    for seed in (1, 2, 3, 4):
+        table = run_scenario(scenario, ["ekf"], [seed])[0].table
+        limit = TrueRun(scenario, seed, scenario.schedule(seed)).limit()
+        bounds.append(np.diagonal(limit, axis1=1, axis2=2)[late])
+        wrong = [table[f"{label}_estimate"] - table[f"{label}_true"] for label in "nC"]
+        errors.append(np.column_stack(wrong)[late] ** 2)
+        claimed.append(table[["n_std", "C_std"]].to_numpy()[late] ** 2)
+    ratio = np.sqrt(np.mean(errors, axis=(0, 1)) / np.mean(bounds, axis=(0, 1)))
+    assert (ratio < 1.3).all() and (ratio > 0.5).all(), ratio
+    own = np.sqrt(np.mean(claimed, axis=(0, 1)) / np.mean(bounds, axis=(0, 1)))
+    np.testing.assert_allclose(own, 1.0, atol=0.15)
+
+
+def test_more_sensors_lower_the_bound_of_the_ridge() -> None:
+    scenario = load_scenario("paper_scenario_1")
+    assert has_limit(scenario)
+    run = TrueRun(scenario, 1, scenario.schedule(1))
+    alone, more = run.limit(), run.limit(more=MORE_SENSORS)
+    assert alone.shape == (2400, 2, 2)
+    assert (np.diagonal(more, axis1=1, axis2=2) <= np.diagonal(alone, axis1=1, axis2=2) * (1 + 1e-9)).all()
+    assert np.sqrt(more[-1, 1, 1] / alone[-1, 1, 1]) < 0.9
