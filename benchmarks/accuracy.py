@@ -82,7 +82,7 @@ def consistency(rows: pd.DataFrame) -> list[str]:
     if not np.isfinite(values).all():
         return ["–", "–", "–"]
     count, q = len(values), 2
-    low, high = chi2.ppf([0.025, 0.975], q * count) / count
+    low, high = (float(chi2.ppf(share, q * count)) / count for share in (0.025, 0.975))
     by_time = values.mean(axis=0)
     inside = np.mean((by_time >= low) & (by_time <= high))
     covered = np.mean(values <= chi2.ppf(0.95, q))
