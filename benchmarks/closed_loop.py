@@ -1,8 +1,8 @@
 """Every closed-loop scenario with every controller over ten seeds: `python -m benchmarks.closed_loop`.
 
-Runs in two processes and writes one Parquet part for each scenario and seed into the folder of `--out` (default
-`results/closed_loop`). Parts that are there already are not run again, so that a run that was stopped goes on; remove
-the folder after a change. Prints what was asked of the closed loop and what was reached; `adaptive-flot compare
+Runs in two processes (`--processes`) and writes one Parquet part for each scenario and seed into the folder of `--out`
+(default `results/closed_loop`). Parts that are there already are not run again, so that a run that was stopped goes on;
+remove the folder after a change. Prints what was asked of the closed loop and what was reached; `adaptive-flot compare
 results/closed_loop` shows the same runs in full, `python -m benchmarks.readme_table results/closed_loop` puts them into
 the README.
 """
@@ -53,13 +53,13 @@ def run_part(name: str, seed: int, part: Path) -> None:
     write_table(pd.DataFrame(run_rows(run_summary(scenario, run_scenario(scenario, seeds=[seed])))), part)
 
 
-def run_missing(folder: Path, scenarios: Sequence[str], seeds: Sequence[int]) -> None:
+def run_missing(folder: Path, scenarios: Sequence[str], seeds: Sequence[int], processes: int) -> None:
     """Run what has no part yet."""
     parts = {(name, seed): folder / f"{name}-seed{seed}.parquet" for seed in seeds for name in scenarios}
     missing = {key: part for key, part in parts.items() if not part.is_file()}
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # two processes of one thread each
-    with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         jobs = [pool.submit(run_part, name, seed, part) for (name, seed), part in missing.items()]
         for job in track(as_completed(jobs), "closed loop", total=len(jobs), console=Console(stderr=True)):
             job.result()
@@ -101,9 +101,10 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("results/closed_loop"))
     parser.add_argument("--scenario", action="append", choices=SCENARIOS, help="repeatable; default all")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds, from 1 on")
+    parser.add_argument("--processes", type=int, default=PROCESSES)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    run_missing(options.out, options.scenario or SCENARIOS, range(1, options.seeds + 1))
+    run_missing(options.out, options.scenario or SCENARIOS, range(1, options.seeds + 1), options.processes)
     comparisons = compare(read_runs([options.out]))
     counts = sorted({len(c.seeds) for comparison in comparisons for c in comparison.contenders})
     table = Table("figure", "measured", "asked", "met", title=f"{MPC} with {ADAPTIVE}, seeds: {counts}")

@@ -1,7 +1,8 @@
 """PI control of the concentrate grade by the air flow: the baseline that an economic MPC has to beat.
 
 Designed with python-control on the cell linearised at the last planned inputs: the gain gives the crossover asked for,
-the integral time the phase margin. The level set-point stays where it is planned.
+the integral time the phase margin. What is measured of the feed is fed forward, as an economic MPC is told of it too.
+The level set-point stays where it is planned.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status
+from controllers.feed_forward import FeedForward
 
 MOST_LAG_DEG = 80.0
 """Phase lag a PI controller gives at most in this design; with 90 degrees it would be a mere integrator."""
@@ -22,11 +24,25 @@ MOST_LAG_DEG = 80.0
 
 @dataclass(frozen=True)
 class PiState:
-    """Row of the schedule to come, filtered grade error (NaN before the first), and inputs held now (nu,)."""
+    """What the next decision needs.
+
+    Attributes
+    ----------
+    row
+        Row of the schedule to come.
+    error
+        Filtered grade error, NaN before the first.
+    inputs
+        Inputs held now (nu,).
+    feed, fed_forward
+        State of the feed-forward, and the air flow it asked for last [m3/s], NaN before the first.
+    """
 
     row: int
     error: float
     inputs: FloatArray | None
+    feed: FloatArray
+    fed_forward: float = float("nan")
 
 
 class Pi:
@@ -43,6 +59,8 @@ class Pi:
         is larger.
     filter_s
         Time constant of the first-order filter on the measured grade [s].
+    feed_forward
+        Whether the air also answers what is measured of the feed, before the grade shows it (`FeedForward`).
 
     Raises
     ------
@@ -60,6 +78,7 @@ class Pi:
         crossover_rad_s: float = 0.01,
         phase_margin_deg: float = 60.0,
         filter_s: float = 10.0,
+        feed_forward: bool = True,
     ) -> None:
         if setup.limits is None:
             raise ModelError("pi needs limits; add 'limits' to the scenario")
@@ -75,30 +94,41 @@ class Pi:
             setup.model, setup.schedule[-1], filter_s, crossover_rad_s, np.deg2rad(phase_margin_deg)
         )
         self._memory = float(np.exp(-setup.dt / filter_s))
+        self.feed_forward = FeedForward(setup.model, setup.schedule[-1], setup.dt) if feed_forward else None
 
     def init(self, time: float) -> PiState:
         """Start before the first sample."""
         del time
-        return PiState(0, float("nan"), None)
+        return PiState(0, float("nan"), None, np.empty(0) if self.feed_forward is None else self.feed_forward.start())
 
     def decide(self, state: PiState, sample: Sample | None, estimate: Estimate | None) -> tuple[PiState, Decision]:
         """Planned inputs until the estimator runs (as every controller here), then the PI law in velocity form."""
         planned = self.setup.schedule[min(state.row, len(self.setup.schedule) - 1)]
-        row = state.row + 1
+        after = replace(state, row=state.row + 1)
         if sample is None or estimate is None or state.inputs is None:
-            return PiState(row, float("nan"), planned.copy()), Decision(planned.copy(), Status.OK, "schedule")
+            return replace(after, inputs=planned.copy()), Decision(planned.copy(), Status.OK, "schedule")
+        after, ahead = self._feed_change(after, sample)
         measured = float(sample.outputs[self._grade])
-        if not np.isfinite(measured):
-            return replace(state, row=row), Decision(state.inputs.copy(), Status.MISSING, "pi")
-        error = measured - self.setpoint
-        if np.isfinite(state.error):
-            error = self._memory * state.error + (1 - self._memory) * error
-        change = 0.0 if not np.isfinite(state.error) else error - state.error
-        inputs = planned.copy()
-        inputs[self._air] = self._limited(
-            state.inputs[self._air] + self.gain * (change + self.setup.dt / self.integral_time * error)
-        )
-        return PiState(row, error, inputs), Decision(inputs.copy(), Status.OK, "pi")
+        found = np.isfinite(measured)
+        error, change = state.error, 0.0
+        if found:
+            error = measured - self.setpoint
+            if np.isfinite(state.error):
+                error = self._memory * state.error + (1 - self._memory) * error
+                change = error - state.error
+        back = self.gain * (change + self.setup.dt / self.integral_time * error) if found else 0.0
+        inputs = state.inputs.copy() if not found else planned.copy()
+        inputs[self._air] = self._limited(state.inputs[self._air] + back + ahead)
+        status = Status.OK if found else Status.MISSING
+        return replace(after, error=error, inputs=inputs), Decision(inputs.copy(), status, "pi")
+
+    def _feed_change(self, state: PiState, sample: Sample) -> tuple[PiState, float]:
+        """How much more air than an interval ago the feed asks for [m3/s]."""
+        if self.feed_forward is None:
+            return state, 0.0
+        feed, asked = self.feed_forward.step(state.feed, sample)
+        change = asked - state.fed_forward if np.isfinite(state.fed_forward) else 0.0
+        return replace(state, feed=feed, fed_forward=asked), change
 
     def _limited(self, air: float) -> float:
         """Within the air limits: in velocity form a limit does not wind up the integral."""

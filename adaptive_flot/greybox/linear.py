@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import control
 import numpy as np
@@ -12,7 +14,11 @@ from adaptive_flot.greybox.steady_state import steady_state
 
 
 def linearise(
-    model: Model, inputs: FloatArray, parameters: FloatArray | None = None, state: FloatArray | None = None
+    model: Model,
+    inputs: FloatArray,
+    parameters: FloatArray | None = None,
+    state: FloatArray | None = None,
+    parameters_as_inputs: Sequence[str] = (),
 ) -> control.StateSpace:
     """State space of small deviations, with named states, inputs and outputs, exact derivatives.
 
@@ -26,6 +32,9 @@ def linearise(
         Parameter vector (np,); default the model's values.
     state
         State of the operating point (nx,); default the steady state of the inputs.
+    parameters_as_inputs
+        Names of parameters that follow as further inputs (disturbances that the model has as parameters); a dot in a
+        name becomes an underscore, which python-control asks for.
 
     Returns
     -------
@@ -41,7 +50,12 @@ def linearise(
     x0 = steady_state(model, inputs, p).state if state is None else state
     t, x, u, q = model.ode.sx_in()
     xdot, y, _, _ = model.ode(t, x, u, q)
-    blocks = [ca.jacobian(a, b) for a in (xdot, y) for b in (x, u)]
+    extra = [model.index("parameters", name) for name in parameters_as_inputs]
+    blocks = [
+        block
+        for a in (xdot, y)
+        for block in (ca.jacobian(a, x), ca.horzcat(ca.jacobian(a, u), ca.jacobian(a, q)[:, extra]))
+    ]
     a, b, c, d = (
         m.reshape(rows, -1)
         for m, rows in zip(
@@ -57,7 +71,7 @@ def linearise(
         c,
         d,
         states=list(model.names("states")),
-        inputs=list(model.names("inputs")),
+        inputs=[*model.names("inputs"), *(name.replace(".", "_") for name in parameters_as_inputs)],
         outputs=list(model.names("outputs")),
         name=model.name,
     )
