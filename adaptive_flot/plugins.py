@@ -19,6 +19,7 @@ ESTIMATORS: Mapping[str, str] = {
     "imm": "estimators.imm:Imm",
     "oracle": "estimators.oracle:Oracle",
     "rpem": "estimators.rpem:Rpem",
+    "rpem_full": "estimators.rpem_full:rpem_full",
 }
 BATCH_ESTIMATORS: Mapping[str, str] = {"pem": "estimators.pem:Pem"}
 CONTROLLERS: Mapping[str, str] = {

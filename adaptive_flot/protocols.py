@@ -29,6 +29,7 @@ class Status(Enum):
     LATE = "late value put in its place, the samples since then taken again"
     TOO_OLD = "late value without a sample of its time among those kept: not used"
     PROJECTED = "estimate projected onto its bounds"
+    LOW_INFORMATION = "the data say too little about some direction: the estimate is held along it"
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
     NOT_CONVERGED = "search stopped before it converged: best values so far"
     RETRIED = "solved at the second try, from a cold start"

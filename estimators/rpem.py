@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
-import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status
+from estimators.information import Information
+from estimators.measured import driving_outputs
+from estimators.rpem_update import Gradient, UpdateOptions, alternative_covariance, update_function
+from estimators.state_correction import StateCorrection
 
-Gradient = Literal["exact", "central"]
-CENTRAL_STEP = 1e-4
-"""Step of the printed central differences, relative to each parameter's scale."""
+GRADIENTS = ("exact", "central", "recursive")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,13 @@ class RpemState:
     covariance
         sigma^2 L (q, q): the paper's inverse Hessian L times the noise variance.
     noise_std
-        sigma of each driving output (m,).
+        sigma of each output (m,).
+    sensitivity
+        dx/dtheta (nx, q), for the recursive gradient.
+    information
+        Sum of psi psi' / sigma^2 over the last while (q, q), where directions may be frozen.
+    gain
+        Gain of the state correction (nx, c); None until the first sample, whose inputs it is designed for.
     """
 
     time: float
@@ -43,6 +49,9 @@ class RpemState:
     theta: FloatArray
     covariance: FloatArray
     noise_std: FloatArray
+    sensitivity: FloatArray
+    information: FloatArray
+    gain: FloatArray | None
 
 
 class Rpem:
@@ -58,17 +67,35 @@ class Rpem:
     one output this changes nothing in theta, for several it weighs them. A missing output leaves its term out; when
     all are missing nothing is forgotten.
 
+    The defaults are the paper. What goes beyond it is an option; `rpem_full` has them all.
+
     Parameters
     ----------
     setup
-        Model, sampling interval, adapted parameters (q) and driving outputs (m).
+        Model, sampling interval, adapted parameters (q) and measured outputs (m).
     forgetting
         Forgetting factor lambda in (0, 1]; 1 / (1 - lambda) samples is the memory.
     gradient
-        `exact`: forward sensitivities of the step; `central`: second-order central differences, four more simulations
-        a sample, as the paper prints.
+        `exact`: forward sensitivities of the step with the state before it held; `central`: the same by second-order
+        central differences, four more simulations a sample, as the paper prints; `recursive`: the sensitivity of the
+        state is carried along, psi counts what past estimates did to the state (Ljung & Soderstrom, *Theory and
+        Practice of Recursive Identification* (1983), section 3.8).
     l0_scale
         Factor on the prior covariance ("L_0 is chosen proportional to the empirical covariance").
+    forget_to
+        Stabilised forgetting: the inverse of L is forgotten towards that of a parameter known to within this share
+        of it, (lambda L^-1 + (1 - lambda) A^-1)^-1, and not towards nothing. So the covariance stays below A where
+        nothing excites, instead of growing without end (Kulhavy & Zarrop, Int. J. Control 58 (1993)). Default: the
+        exponential forgetting of the paper.
+    freeze_s
+        Freeze each direction of theta on which the data of this time [s] say less than A: the estimate does not move
+        along it and the status is LOW_INFORMATION. Needs `forget_to`. Default: never.
+    correct_state
+        Outputs that correct the state by the gain of a steady-state Kalman filter, and do not drive the parameters.
+        Default none: all drive, and the state is the free run of the paper.
+    state_noise
+        For that gain: standard deviation that unknown disturbances add to each state within a second, as a share of
+        its scale.
 
     Raises
     ------
@@ -77,62 +104,98 @@ class Rpem:
     """
 
     def __init__(
-        self, setup: Setup, *, forgetting: float = 0.995, gradient: Gradient = "exact", l0_scale: float = 1.0
+        self,
+        setup: Setup,
+        *,
+        forgetting: float = 0.995,
+        gradient: Gradient = "exact",
+        l0_scale: float = 1.0,
+        forget_to: float | None = None,
+        freeze_s: float | None = None,
+        correct_state: Sequence[str] = (),
+        state_noise: float = 1e-3,
     ) -> None:
         if not 0.0 < forgetting <= 1.0:
             raise ModelError(f"rpem: forgetting = {forgetting:g}; give a factor in (0, 1], for example 0.995")
-        if gradient not in ("exact", "central"):
-            raise ModelError(f"rpem: unknown gradient {gradient!r}; {near_match(gradient, ['exact', 'central'])}")
+        if gradient not in GRADIENTS:
+            raise ModelError(f"rpem: unknown gradient {gradient!r}; {near_match(gradient, GRADIENTS)}")
         if not l0_scale > 0.0:
             raise ModelError(f"rpem: l0_scale = {l0_scale:g}; give a positive factor")
+        if forget_to is not None and not forget_to > 0.0:
+            raise ModelError(f"rpem: forget_to = {forget_to:g}; give a positive share, for example 0.05")
+        if freeze_s is not None and (forget_to is None or not freeze_s > 0.0):
+            raise ModelError(f"rpem: freeze_s = {freeze_s:g} needs a positive time and forget_to; give both")
         self.setup = setup
-        self.forgetting = forgetting
-        self.gradient = gradient
         self.l0_scale = l0_scale
+        alternative = None if forget_to is None else alternative_covariance(setup, forget_to)
+        self.options = UpdateOptions(forgetting, gradient, alternative, tuple(correct_state), freeze_s is not None)
+        self._correction = StateCorrection(setup, self.options.correcting, state_noise)
+        self._information = None if alternative is None or freeze_s is None else Information(alternative, freeze_s)
         self._columns = setup.model.indices("outputs", setup.outputs)
-        self._shape = (len(setup.model.outputs),)
         self._p = setup.model.parameter_values
+        matrices = ("S", "covariance", "free", "gain", "S_next", "covariance_next", "information")
         self._update = FastCall(
-            _update_function(setup, forgetting, gradient),
-            matrices=("covariance", "covariance_next"),
-            as_machine_code=setup.model.compiled,
+            update_function(setup, self.options), matrices=matrices, as_machine_code=setup.model.compiled
         )
+        self._recursive = gradient == "recursive"
 
     def init(self, prior: Prior) -> RpemState:
-        """Start from a prior, L_0 from its covariance."""
+        """Start from a prior, L_0 from its covariance, the sensitivity of the state from what ties it to them."""
+        nx, q = len(self.setup.model.states), len(self.setup.parameters)
+        sensitivity = np.zeros((nx, q))
+        if prior.joint_covariance is not None:
+            sensitivity = prior.joint_covariance[:nx, nx:] @ np.linalg.pinv(prior.covariance, hermitian=True)
         return RpemState(
             prior.time,
             prior.state.copy(),
             prior.parameters.copy(),
             self.l0_scale * prior.covariance,
             prior.noise_std.copy(),
+            sensitivity,
+            np.zeros((q, q)) if self._information is None else self._information.start(prior.covariance),
+            None,
         )
 
     def update(self, state: RpemState, sample: Sample) -> tuple[RpemState, Estimate]:
         """Predict, compare, correct; see `Estimator.update`."""
-        measured = np.asarray(sample.outputs, dtype=float)
-        if measured.shape != self._shape:
-            raise ModelError(f"a sample has {measured.shape} outputs, the model {self._shape}")
-        driving = measured[self._columns]
-        present = np.isfinite(driving)
-        count = np.count_nonzero(present)
-        x, theta, covariance, prediction, expected_std, flags = self._update(
+        measured, outputs, present = driving_outputs(sample, self._columns, len(self.setup.model.outputs))
+        p = self._p if sample.parameters is None else sample.parameters
+        extra, gain, starved = [], state.gain, False
+        if self._recursive:
+            extra.append(state.sensitivity)
+        if self._information is not None:
+            free, starved = self._information.free_directions(state.information)
+            extra.append(free)
+        if self._correction.outputs:
+            if gain is None:
+                gain = self._correction.gain(state.x, state.time, sample.inputs, p, state.theta, state.noise_std)
+            extra.append(gain)
+        x, theta, covariance, prediction, expected_std, flags, *more = self._update(
             state.x,
             state.time,
             sample.inputs,
-            self._p if sample.parameters is None else sample.parameters,
+            p,
             state.theta,
             state.covariance,
             state.noise_std,
-            driving if count == present.size else np.where(present, driving, 0.0),
+            outputs,
             present,
+            *extra,
         )
-        status = Status.OK if count else Status.MISSING
+        sensitivity, information = state.sensitivity, state.information
+        status = Status.OK if flags[2] > 0 else Status.MISSING
         if not math.isfinite(flags[0]):
             x, theta, covariance, status = state.x, state.theta, state.covariance, Status.NOT_FINITE
-        elif flags[1] > 0:
-            status = Status.PROJECTED
-        new = RpemState(sample.time, x, theta, covariance, state.noise_std)
+        else:
+            if self._recursive:
+                sensitivity = more[0]
+            if self._information is not None:
+                information = self._information.add(information, more[-1], self.setup.dt)
+            if flags[1] > 0:
+                status = Status.PROJECTED
+            elif starved and status is Status.OK:
+                status = Status.LOW_INFORMATION
+        new = RpemState(sample.time, x, theta, covariance, state.noise_std, sensitivity, information, gain)
         estimate = Estimate(
             sample.time,
             prediction,
@@ -144,65 +207,3 @@ class Rpem:
             status,
         )
         return new, estimate
-
-
-def _update_function(setup: Setup, forgetting: float, gradient: Gradient) -> ca.Function:
-    """One whole update as a CasADi function: prediction, gradient, (lupdate), (thetaupdate), projection."""
-    model = setup.model
-    columns = model.indices("parameters", setup.parameters)
-    rows = model.indices("outputs", setup.outputs)
-    q, m = len(columns), len(rows)
-    x, t, u, p = Stepper(model, setup.dt).step.sx_in()
-    theta, cov = ca.SX.sym("theta", q), ca.SX.sym("covariance", q, q)
-    noise, measured, present = ca.SX.sym("noise", m), ca.SX.sym("measured", m), ca.SX.sym("present", m)
-    p_now = ca.SX(p)
-    p_now[columns] = theta
-
-    x_next, y, psi = _prediction(setup, gradient)(x, t, u, p_now)
-    psi = psi[rows, :] / ca.repmat(noise, 1, q)
-    residual = (measured - y[rows]) / noise
-
-    # (lupdate) and (thetaupdate) one output at a time: the same as the block form, without a matrix inverse
-    forgotten = cov / ca.if_else(ca.sum1(present) > 0, forgetting, 1.0)
-    expected = [noise[j] * ca.sqrt(1 + psi[j, :] @ forgotten @ psi[j, :].T) for j in range(m)]
-    updated = forgotten
-    theta_next = theta
-    for j in range(m):
-        row = psi[j, :]
-        gain = present[j] * (updated @ row.T) / (1 + row @ updated @ row.T)
-        theta_next = theta_next + gain * (residual[j] - row @ (theta_next - theta))
-        # Joseph's form of (lupdate): the same in exact arithmetic, and never indefinite in rounded one
-        left = ca.SX.eye(q) - gain @ row
-        updated = left @ updated @ left.T + gain @ gain.T
-    updated = (updated + updated.T) / 2
-
-    lower = ca.DM([model.parameters[i].lower for i in columns])
-    upper = ca.DM([model.parameters[i].upper for i in columns])
-    inside = ca.fmin(ca.fmax(theta_next, lower), upper)
-    # one number that is finite only if the whole new state is, and the number of parameters that were projected
-    size = ca.sumsqr(x_next) + ca.sumsqr(theta_next) + ca.sumsqr(updated) + ca.sumsqr(y[rows])
-    flags = ca.vertcat(size, ca.sum1(inside != theta_next))
-    return ca.Function(
-        "rpem_update",
-        [x, t, u, p, theta, cov, noise, measured, present],
-        [x_next, inside, updated, y, ca.vertcat(*expected), flags],
-        ["x", "t", "u", "p", "theta", "covariance", "noise", "measured", "present"],
-        ["x_next", "theta_next", "covariance_next", "prediction", "expected_std", "flags"],
-        {"cse": True},
-    )
-
-
-def _prediction(setup: Setup, gradient: Gradient) -> ca.Function:
-    """`(x, t, u, p) -> (x_next, y, dy_dtheta)`."""
-    stepper = Stepper(setup.model, setup.dt)
-    if gradient == "exact":
-        return stepper.one_step_gradient(setup.parameters)
-    x, t, u, p = stepper.step.sx_in()
-    x_next, y, _ = stepper.step(x, t, u, p)
-    psi = []
-    for i in setup.model.indices("parameters", setup.parameters):
-        move = ca.DM(p.numel(), 1)
-        move[i] = CENTRAL_STEP * setup.model.parameters[i].scale
-        ahead, behind = stepper.step(x, t, u, p + move)[1], stepper.step(x, t, u, p - move)[1]
-        psi.append((ahead - behind) / (2 * move[i]))
-    return ca.Function("central", [x, t, u, p], [x_next, y, ca.horzcat(*psi)])

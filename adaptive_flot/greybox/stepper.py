@@ -182,7 +182,7 @@ class Stepper:
         x = self._initial(x0)
         gradient = np.asarray(x0_gradient, dtype=float).reshape(x.size, -1)
         q = gradient.shape[1]
-        function = self._sensitivity_step(tuple(wrt), q)
+        function = self.sensitivity_step(tuple(wrt), q)
         ys: list[FloatArray] = []
         dys: list[FloatArray] = []
         for rows in _chunks(len(u)):
@@ -195,7 +195,14 @@ class Stepper:
             dys.append(np.array(dy).reshape(-1, count, q).transpose(1, 0, 2))
         return Sensitivities(np.vstack(ys), np.concatenate(dys), x, gradient)
 
-    def _sensitivity_step(self, wrt: tuple[str, ...], q: int) -> ca.Function:
+    def sensitivity_step(self, wrt: Sequence[str], unknowns: int | None = None) -> ca.Function:
+        """The step with the sensitivity of the state carried along, exact for the map.
+
+        Returns `(x, S (nx, q), t, u, p) -> (x_next, S_next (nx, q), y, dy (ny, q))` for q unknowns: the parameters
+        `wrt`, followed by further ones that act through the state alone; default none.
+        """
+        wrt, q = tuple(wrt), len(wrt) if unknowns is None else unknowns
+
         def make() -> ca.Function:
             x, t, u, p = self._symbols()
             sensitivity = ca.SX.sym("S", x.numel(), q)

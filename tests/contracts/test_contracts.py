@@ -24,6 +24,7 @@ from estimators.fixed import Fixed, FixedState
 ESTIMATOR_CASES: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for name in ESTIMATORS} | {
     "ekf-integrated": ("ekf", {"walk": "integrated"}),
     "rpem-central": ("rpem", {"gradient": "central"}),
+    "rpem-never-frozen": ("rpem_full", {"freeze_s": None}),
 }
 
 

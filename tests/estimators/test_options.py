@@ -18,6 +18,9 @@ WRONG_VALUES: list[tuple[str, dict[str, Any], str]] = [
     ("rpem", {"gradient": "centrl"}, "did you mean 'central'"),
     ("rpem", {"l0_scale": 0.0}, "l0_scale"),
     ("rpem", {"l0_scale": float("nan")}, "l0_scale"),
+    ("rpem", {"forget_to": 0.0}, "forget_to"),
+    ("rpem", {"freeze_s": 60.0}, "forget_to"),
+    ("rpem_full", {"freeze_s": 0.0}, "freeze_s"),
     ("pem", {"initial_state": "stedy"}, "did you mean 'steady'"),
     ("pem", {"initial_state": "estimated", "free": ["leval"]}, "did you mean 'level'"),
 ]
