@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from adaptive_flot.economics import Prices
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -303,6 +303,29 @@ class Controller(Protocol[State]):
 
     def decide(self, state: State, sample: Sample | None, estimate: Estimate | None) -> tuple[State, Decision]:
         """Inputs for the next interval, from the newest sample and estimate (None before the first)."""
+        ...
+
+
+@runtime_checkable
+class TakesOver(Protocol):
+    """A controller whose state depends on its model, and that can go on where one with a smaller model stood.
+
+    The model of a running loop may be extended (`Model.with_effects`): states and parameters are added behind those in
+    common. A controller without this method gets the state of the one before as it is.
+    """
+
+    def take_over(self, before: AnyController, state: Any, known: Sequence[Estimate], again: Sequence[Estimate]) -> Any:
+        """State of this controller that goes on from a state of the one before.
+
+        Parameters
+        ----------
+        before, state
+            A controller of the same class and options for the smaller model, and its state.
+        known
+            The last estimates that it was told, oldest first.
+        again
+            What an estimator with this controller's model makes of the same samples.
+        """
         ...
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +11,20 @@ import numpy as np
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Plan, Sample, Status, full_parameters
+from adaptive_flot.protocols import (
+    AnyController,
+    ControllerSetup,
+    Decision,
+    Estimate,
+    Plan,
+    Sample,
+    Status,
+    full_parameters,
+)
 from controllers.collocation import MOVED, Arguments, Bounds, Problem
+from controllers.grade_bias import GradeBias
 from controllers.nlp_solvers import FailingSolver, Solution, Solver, Verdict
+from controllers.widening import widened
 
 VALUE_SCALE = 1000.0
 """Prices are scaled so that the objective is of order 1 to 100: solvers' tolerances then mean something."""
@@ -119,8 +131,7 @@ class EconomicMpc:
             level=np.array(limits.level),
         )
         self._solver_bounds = self.problem.bounds(self._bounds)
-        self._bias_time = bias_time_s
-        self._grade = setup.model.index("outputs", "concentrate_grade")
+        self._bias = GradeBias(setup.model.index("outputs", "concentrate_grade"), setup.dt, bias_time_s)
         self._ode = FastCall(setup.model.ode)
         self._grades = FastCall(self.problem.grades)
 
@@ -133,6 +144,18 @@ class EconomicMpc:
         drill = copy.copy(self)
         drill.solver = FailingSolver()
         return drill
+
+    def take_over(
+        self, before: AnyController, state: MpcState, known: Sequence[Estimate], again: Sequence[Estimate]
+    ) -> MpcState:
+        """Go on with the inputs and the plan of the same controller for a smaller model; see `TakesOver.take_over`."""
+        if not isinstance(before, EconomicMpc):
+            raise ModelError("economic_mpc: only the state of an economic_mpc can be taken over")
+        state = replace(state, bias=state.bias + self._bias.change(known, again))
+        if state.plan is None or len(self.setup.model.states) == len(before.setup.model.states):
+            return state
+        plan = widened(state.plan, before.problem, self.problem, again[-1].state)
+        return replace(state, plan=plan, multipliers=None)
 
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
         """Inputs of the next interval: the planned ones until there is an estimate, then the optimiser's."""
@@ -150,17 +173,10 @@ class EconomicMpc:
         return self._optimise(state, held, sample, estimate)
 
     def _listen(self, state: MpcState, estimate: Estimate | None) -> MpcState:
-        """Filter the grade's innovation; after a gap, one value counts for the time since the last one."""
         if estimate is None:
             return state
-        innovation = float(estimate.innovation[self._grade])
-        late = [v.value for v in estimate.late if v.output == "concentrate_grade"]
-        if not np.isfinite(innovation):
-            innovation = late[-1] if late else np.nan
-        if not np.isfinite(innovation):
-            return state
-        memory = float(np.exp(-max(estimate.time - state.heard, self.setup.dt) / self._bias_time))
-        return replace(state, bias=memory * state.bias + (1 - memory) * innovation, heard=estimate.time)
+        bias, heard = self._bias.after(state.bias, state.heard, estimate)
+        return replace(state, bias=bias, heard=heard)
 
     def _optimise(
         self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate

@@ -9,8 +9,18 @@ from typing import Any
 from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.runner.scenario import Scenario
 
-WHO = ("description", "seeds", "estimators", "controllers", "cases", "published", "adapt", "initial_estimate")
-METHOD: dict[str, Any] = {**dict.fromkeys((*WHO, "effects"), True), "plant": {"effects"}}
+WHO = (
+    "description",
+    "seeds",
+    "estimators",
+    "controllers",
+    "cases",
+    "published",
+    "adapt",
+    "initial_estimate",
+    "discovery",
+)
+METHOD: dict[str, Any] = {**dict.fromkeys((*WHO, "effects", "discovery"), True), "plant": {"effects"}}
 """Keys of a scenario that say who runs, with what model, and how it is told, not what is asked; what effects the plant
 has is taken from its model."""
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from adaptive_flot.protocols import AnyController, Decision, Estimate, Sample
+from adaptive_flot.protocols import AnyController, Decision, Estimate, Sample, TakesOver
 from adaptive_flot.runner.faults import ControllerFault, NanState
 
 
@@ -40,6 +40,13 @@ class FaultyController:
     def init(self, time: float) -> Any:
         """State before the first decision."""
         return self._controller.init(time)
+
+    def take_over(self, before: AnyController, state: Any, known: Sequence[Estimate], again: Sequence[Estimate]) -> Any:
+        """Go on where another stood; see `TakesOver.take_over`."""
+        inner = before._controller if isinstance(before, FaultyController) else before
+        if isinstance(self._controller, TakesOver):
+            return self._controller.take_over(inner, state, known, again)
+        return state
 
     def decide(self, state: Any, sample: Sample | None, estimate: Estimate | None) -> tuple[Any, Decision]:
         """Decide with what the faults leave; see `Controller.decide`."""

@@ -15,10 +15,15 @@ def with_faults(
     scenario: Scenario, seed: int, plant: AnyPlant, controller: AnyController
 ) -> tuple[AnyPlant, AnyController]:
     """Plant and controller of a run with the faults of its scenario; chance is drawn from the seed, fault by fault."""
-    inside = [fault for fault in scenario.file.faults if isinstance(fault, ControllerFault)]
     around = [fault for fault in scenario.file.faults if not isinstance(fault, ControllerFault)]
     if around:
         rows = len(scenario.starts)
         draws = np.stack([np.random.default_rng([seed, 4, i]).random((rows, 2)) for i in range(len(around))], axis=1)
         plant = FaultyPlant(plant, around, scenario.model, scenario.dt, draws)
-    return plant, FaultyController(controller, inside) if inside else controller
+    return plant, with_controller_faults(scenario, controller)
+
+
+def with_controller_faults(scenario: Scenario, controller: AnyController) -> AnyController:
+    """The controller of a run with the faults of its scenario."""
+    inside = [fault for fault in scenario.file.faults if isinstance(fault, ControllerFault)]
+    return FaultyController(controller, inside) if inside else controller

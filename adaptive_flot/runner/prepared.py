@@ -62,20 +62,28 @@ class Prepared:
 
     def estimator(self, name: str, seed: int) -> AnyEstimator:
         """The estimator of that name for the run of a seed: one for all, but where it is told the truth."""
-        use, options = self.estimators[name].use, self.estimators[name].options
-        key = f"{name}-{seed}" if use == "oracle" else name
+        key = f"{name}-{seed}" if self.estimators[name].use == "oracle" else name
         if key not in self._built:
-            setup = self.setup(name, seed)
-            factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
-            made = construct(factory, use, "estimator", setup, **options)
-            self._built[key] = taking_late_values(made, self.scenario.longest_dead_time)
+            self._built[key] = self.estimator_for(name, self.setup(name, seed))
         return self._built[key]
+
+    def estimator_for(self, name: str, setup: Setup) -> AnyEstimator:
+        """A new estimator of that name for another setup."""
+        use, options = self.estimators[name].use, self.estimators[name].options
+        factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
+        made = construct(factory, use, "estimator", setup, **options)
+        return taking_late_values(made, self.scenario.longest_dead_time)
 
     def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
         """A controller of that name for the run of a seed, with the model of the estimator that it listens to."""
+        return self.controller_for(
+            name, seed, self.scenario.setup if estimator is None else self.setup(estimator, seed)
+        )
+
+    def controller_for(self, name: str, seed: int, told: Setup) -> AnyController:
+        """A controller of that name for the run of a seed and an estimator with that setup."""
         use, options = self.controllers[name].use, self.controllers[name].options
         s = self.scenario
-        told = s.setup if estimator is None else self.setup(estimator, seed)
         setup = ControllerSetup(told.model, s.dt, s.plan(seed), told.parameters, s.limits, s.prices)
         made: AnyController = construct(
             load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options

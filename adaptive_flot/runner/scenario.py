@@ -115,6 +115,14 @@ class Scenario:
         apart += [(c, name) for c in controllers if c not in {known for known, _ in cases} for name in every]
         return [case for case in cases if case[0] in moved and case[1] in every] + apart
 
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Names of the estimators that are watched for effects that their model lacks."""
+        part = self.file.discovery
+        if part is None:
+            return ()
+        return tuple(part.estimators or (n for n, e in self.file.estimators.items() if e.use != "oracle"))
+
     def schedule(self, seed: int) -> FloatArray:
         """Planned inputs (N, nu) of a run."""
         columns = [self.file.inputs[q.column].values(self.starts, seed) for q in self.model.inputs]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from adaptive_flot.errors import ScenarioError, located, near_match
+from adaptive_flot.runner.discovery_options import FEWEST
 from adaptive_flot.runner.faults import ControllerFault, SlowAnalyser, Stuck
 
 if TYPE_CHECKING:  # the scenario that is being loaded, which calls this
@@ -42,6 +43,7 @@ def check_scenario(scenario: Scenario) -> None:
     _check_initial_state(scenario)
     _check_disturbances(scenario)
     _check_faults(scenario)
+    _check_discovery(scenario)
     for seed in file.seeds:
         model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
 
@@ -120,6 +122,37 @@ def _check_faults(scenario: Scenario) -> None:
                 raise ScenarioError(f"{where}: output {fault.output!r} is not measured; {hint}")
             if isinstance(fault, SlowAnalyser) and fault.output in scenario.dead_times:
                 raise ScenarioError(f"{where}: {fault.output!r} has a dead_time_s already; leave one out")
+
+
+def _check_discovery(scenario: Scenario) -> None:
+    file, model, part = scenario.file, scenario.model, scenario.file.discovery
+    if part is None:
+        return
+    for name in part.estimators or ():
+        if name not in file.estimators:
+            raise ScenarioError(f"discovery.estimators: {name!r} is not defined; {near_match(name, file.estimators)}")
+        if file.estimators[name].use == "oracle":
+            raise ScenarioError(f"discovery.estimators: {name!r} is an oracle, which lacks nothing; leave it out")
+    if not scenario.watched:
+        raise ScenarioError("discovery: there is no estimator to watch; add one that is no oracle")
+    for name in part.outputs or ():
+        if name not in file.measurements:
+            raise ScenarioError(f"discovery.outputs: {name!r} is not measured; {near_match(name, file.measurements)}")
+    if not model.sites:
+        raise ScenarioError(f"discovery: model {model.name!r} has no sites, so no effect can be found; leave it out")
+    if part.window_s < FEWEST * file.sampling_s:
+        least = FEWEST * file.sampling_s
+        raise ScenarioError(f"discovery.window_s = {part.window_s:g} s holds too few samples; give {least:g} s or more")
+    if part.least_record_s > part.record_s:
+        raise ScenarioError(
+            f"discovery: least_record_s = {part.least_record_s:g} s is longer than record_s = {part.record_s:g} s; "
+            "make it shorter"
+        )
+    if part.least_record_s + part.delay_s > file.duration_s:
+        raise ScenarioError(
+            f"discovery: a search needs least_record_s + delay_s = {part.least_record_s + part.delay_s:g} s, longer "
+            f"than the run, {file.duration_s:g} s; make them shorter"
+        )
 
 
 def _check_times(scenario: Scenario) -> None:

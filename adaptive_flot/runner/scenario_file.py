@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from adaptive_flot.economics import Prices
 from adaptive_flot.processes.effect_entry import EffectEntry
+from adaptive_flot.runner.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.faults import Fault
 from adaptive_flot.runner.profiles import InputProfile, ParameterProfile
 
@@ -132,6 +133,8 @@ class ScenarioFile(_Part):
     controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
     cases: list[Case] = Field(default_factory=list)
     """Combinations of estimator and controller; default all."""
+    discovery: DiscoveryOptions | None = None
+    """Search for what the model lacks while the loop runs; default no search."""
     limits: LimitsPart | None = None
     economics: EconomicsPart | None = None
     fits_after_s: float | None = None

@@ -16,13 +16,15 @@ from adaptive_flot.greybox.model import Model
 from adaptive_flot.protocols import AnyController, AnyEstimator, Prior, Status
 from adaptive_flot.runner.accounts import account, control_account
 from adaptive_flot.runner.injection import with_faults
-from adaptive_flot.runner.loop import MakePrior, Step, run_loop
+from adaptive_flot.runner.inquiry import Inquiry
+from adaptive_flot.runner.loop import MakePrior, Step, Supervise, run_loop, unwatched
 from adaptive_flot.runner.plans import plan_table
 from adaptive_flot.runner.prepared import Prepared
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.scenario_checks import check_truth
 from adaptive_flot.runner.scenario_plant import make_plant
 from adaptive_flot.runner.starts import nominal_start, record_of
+from adaptive_flot.runner.supervision import supervision
 from adaptive_flot.runner.timeseries import fits, time_series
 
 Progress = Callable[[], None]
@@ -54,6 +56,8 @@ class Run:
         Intervals in which each injected fault changed something; empty without faults.
     plans
         What the controller expected, one row a planned move (see `plan_table`); empty where it makes no plans.
+    inquiries
+        What came of each alarm of a watched estimator; None where the estimator was not watched.
     """
 
     estimator: str
@@ -68,12 +72,15 @@ class Run:
     control: dict[str, Any] = field(default_factory=dict)
     fault_counts: dict[str, int] = field(default_factory=dict)
     plans: pd.DataFrame = field(default_factory=pd.DataFrame)
+    inquiries: Sequence[Inquiry] | None = None
 
     def summary(self) -> dict[str, object]:
-        """Entry of the JSON summary; `account` and `control` only with economics, `fault_counts` with faults."""
+        """Entry of the JSON summary; some of its keys only where they apply."""
         extra: dict[str, object] = {"account": self.account, "control": self.control} if self.account else {}
         if self.fault_counts:
             extra["fault_counts"] = self.fault_counts
+        if self.inquiries is not None:
+            extra["discovery"] = [inquiry.as_dict() for inquiry in self.inquiries]
         return {
             "estimator": self.estimator,
             "controller": self.controller,
@@ -150,7 +157,8 @@ def run_one(
         return nominal_start(scenario, setup, steps, prior)
 
     controller = prepared.controller(controller_name, seed, estimator_name)
-    steps = _steps(scenario, seed, setup.model, controller, estimator, len(scenario.starts), make_prior)
+    with supervision(prepared, estimator_name, controller_name, seed) as supervise:
+        steps = _steps(scenario, seed, setup.model, controller, estimator, len(scenario.starts), make_prior, supervise)
     table = time_series(scenario, steps, setup)
     counts = Counter((s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps)
     seconds = time.perf_counter() - begin
@@ -166,6 +174,7 @@ def run_one(
         *_accounts(scenario, table),
         dict(Counter(fault for s in steps for fault in (*s.plant.faults, *s.decision.faults))),
         plans=plan_table(scenario.model, steps),
+        inquiries=supervise.inquiries,
     )
 
 
@@ -190,13 +199,20 @@ def _steps(
     estimator: AnyEstimator,
     intervals: int,
     make_prior: MakePrior,
+    supervise: Supervise = unwatched,
 ) -> list[Step]:
     """The first intervals of a run with an estimator of that model."""
     scenario.model.check_inputs(scenario.schedule(seed), scenario.starts, where=f"inputs of seed {seed}")
     check_truth(scenario, seed)
     plant, controller = with_faults(scenario, seed, make_plant(scenario, seed, model), controller)
     return run_loop(
-        plant, estimator, controller, intervals, initial_intervals=scenario.initial_rows, make_prior=make_prior
+        plant,
+        estimator,
+        controller,
+        intervals,
+        initial_intervals=scenario.initial_rows,
+        make_prior=make_prior,
+        supervise=supervise,
     )
 
 

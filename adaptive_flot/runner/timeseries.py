@@ -60,7 +60,7 @@ def _outputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
     measured = np.vstack([s.outputs for s in in_time([s.plant.sample for s in steps], setup)])
     unknown = np.full(len(model.outputs), np.nan)
     predicted = np.vstack([e.prediction if e else unknown for e in estimates])
-    innovation = np.vstack([s.outputs for s in in_time(_innovations(steps, unknown), setup)])
+    innovation = np.vstack([s.outputs for s in in_time(innovations(steps), setup)])
     expected = np.vstack([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
     for j, q in enumerate(model.outputs):
         columns[f"{q.column}_true"] = true[:, j]
@@ -73,8 +73,9 @@ def _outputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
     return columns
 
 
-def _innovations(steps: Sequence[Step], unknown: FloatArray) -> list[Sample]:
+def innovations(steps: Sequence[Step]) -> list[Sample]:
     """Innovations in place of the measurements, those of late values with the sample that they arrived with."""
+    unknown = np.full(len(steps[0].plant.outputs), np.nan)
     return [
         replace(s.plant.sample, outputs=s.estimate.innovation, late=s.estimate.late)
         if s.estimate
