@@ -16,7 +16,7 @@ from adaptive_flot.discovery.noise import proportional
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
 from adaptive_flot.discovery.signals import input_range
-from adaptive_flot.discovery.verdict import Judgement, NamedEffect, Verdict, judge
+from adaptive_flot.discovery.verdict import LEAST_MARGIN, Judgement, NamedEffect, Verdict, judge
 from adaptive_flot.discovery.verify import changes, whiteness
 from adaptive_flot.discovery.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
@@ -98,7 +98,8 @@ def discover(
     began = time.perf_counter()
     if not model.sites:
         raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
-    input_range(record.inputs, model.inputs, limits)  # a wrong limit is told before the search
+    if limits:
+        input_range(record.inputs, model.inputs, limits)  # a wrong limit is told before the search
     names = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
     progress("check the data")
     checked = gate(record, model)
@@ -118,7 +119,7 @@ def discover(
     if judgement.best is not None and judgement.word != "none":
         progress("plan a test")
         compared = leading(judgement.best, found.alternatives, judgement.margin)
-        planned = plan_experiment(problem, compared, judgement.margin, limits, processes)
+        planned = plan_experiment(problem, compared, LEAST_MARGIN, limits, processes)
         verdict = replace(verdict, experiment=planned)
     extended = after.model if judgement.word in ("named", "class", "unnamed") else before.model
     verdict = replace(verdict, seconds=time.perf_counter() - began)

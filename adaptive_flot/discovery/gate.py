@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -18,8 +19,9 @@ LEAST_MOVE = 5e-3
 """An input moves when its spread is at least this share of its mean."""
 OUTLIER_SHARE = 0.15
 """Share of samples far outside from which a signal is an outlier storm."""
-LEAST_MEASURED = 0.3
-"""An output with a smaller share of usable samples (of those it has at its own rate) is left out."""
+NEIGHBOURS = 9
+QUARTER = 0.3186
+"""Quantile 0.25 of the size of a standard normal variable."""
 
 
 @dataclass(frozen=True)
@@ -98,13 +100,23 @@ def _clean(y: FloatArray, name: str) -> list[str]:
             y[at] = np.nan
             notes.append(f"{name}: {int(at.sum())} samples clipped at the {word} value left out")
     values = y[np.isfinite(y)]
-    step = np.diff(values, 2)
-    size = 1.4826 * float(np.median(np.abs(step)))
-    storm = float(np.mean(np.abs(step) > 8 * size)) if size > 0 else 0.0
+    storm = _outliers(values)
     if storm > OUTLIER_SHARE:
         _blank(y)
         notes.append(f"{name}: an outlier storm ({100 * storm:.0f} % of the samples), left out")
     return notes
+
+
+def _outliers(values: FloatArray) -> float:
+    """Share of samples far from the median of their neighbours (Hampel's filter).
+
+    Far is more than eight times the noise and more than what the signal itself does: fits bear smaller ones. The noise
+    is judged by the quietest quarter of the deviations, since in a storm their median is wild.
+    """
+    middle = median_filter(values, NEIGHBOURS, mode="nearest")
+    away = np.abs(values - middle)
+    noise = float(np.quantile(away, 0.25)) / QUARTER
+    return float(np.mean(away > max(8 * noise, float(np.quantile(middle, 0.9) - np.quantile(middle, 0.1)))))
 
 
 def _blank(y: FloatArray) -> bool:

@@ -19,6 +19,8 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepper import Stepper
 
 ROWS_AT_ONCE = 500
+LEAST_VALUE = 1e-6
+"""Share of its largest value below which a site is at zero."""
 
 
 @dataclass(frozen=True)
@@ -132,11 +134,18 @@ class Responses:
             v = c.values[1:]
             default = self._offset[c.site]
             if c.offset and not default:
-                v = v / self.site_values[c.site][1:]
+                v = v * self._inverse(c.site)[1:]
             elif default and not c.offset:
                 v = v * self.site_values[c.site][1:]
             table[:, j] = v
         return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table)
+
+    def _inverse(self, site: str) -> FloatArray:
+        """One over the value at a site (N,), bounded: a pump that is off has no relative change."""
+        value = self.site_values[site]
+        least = LEAST_VALUE * float(np.max(np.abs(value), initial=0.0))
+        found: FloatArray = np.where(np.abs(value) > least, 1 / np.where(np.abs(value) > least, value, 1.0), 0.0)
+        return found
 
     def adapted_sites(self) -> tuple[str, ...]:
         """Sites whose constant change does what a change of an adapted parameter does, and nothing else.

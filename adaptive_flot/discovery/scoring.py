@@ -20,6 +20,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 PRIOR_SHARE = 0.3
 """Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
+ABSORBED = 1e-7
+"""Share of an answer that must be left after projection; less is rounding, in which anything can be found."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,9 @@ class Scorer:
         base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self.rows][self._present])
         self._base = base
         columns = self.noise.whiten(answers)[self.rows][self._present]
+        size = np.linalg.norm(columns, axis=0)
         columns -= base @ (base.T @ columns)
+        columns[:, np.linalg.norm(columns, axis=0) < ABSORBED * size] = 0.0  # what is left is rounding
         self._columns = columns
         self.residual = self._project(np.clip(e[self._present], -1e3, 1e3))
         self._slices: list[slice] = []

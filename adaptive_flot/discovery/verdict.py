@@ -159,6 +159,8 @@ def judge(found: Search) -> Judgement:
     if len(names) == 1:
         return Judgement("named", best, (), rivals, margin)
     members = tuple(dict.fromkeys(n for group in names for n in group))
+    if any(a.delta_bic > -LEAST_MARGIN for a in named):  # one that explains nothing comes close: so does the best
+        return Judgement("abstain", best, (), rivals, margin)
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)

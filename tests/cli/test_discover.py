@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 
 from tests.cli.conftest import Call, WriteTable
+from tests.discovery.heated import tank_record
 
 KEYS = {"verdict", "effects", "class", "error", "tests", "parameters", "drift", "absorbed", "notes", "seconds"}
 
@@ -68,3 +71,104 @@ def test_a_record_that_can_not_be_read_is_one_line(
 def test_a_limit_that_can_not_be_read_is_one_line(call: Call, table: WriteTable, limit: str) -> None:
     result = call("discover", table(), "--limit", limit)
     assert result.code == 2 and "limit" in result.err and "air_fl" in result.err and len(result.err.splitlines()) == 1
+
+
+HEATED = """
+from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
+
+
+def equations(m: Scope) -> None:
+    temperature = m.state("temperature")
+    heating = m.site("heating", m.parameter("efficiency") * m.input("power"), "actuator")
+    loss = m.site("heat_loss", m.parameter("loss") * (temperature - 293.0))
+    m.derivative("temperature", (heating - loss) / 4.0e5)
+    m.output("temperature", m.site("thermometer", temperature, "sensor", "offset", unit="K"))
+
+
+def make_model() -> Model:
+    return Model(
+        name="heated-tank",
+        states=(Quantity("temperature", "K", "", 273.0, 373.0, 10.0),),
+        inputs=(Quantity("power", "W", "", 0.0, 1e4), Quantity("fan_speed", "1/s", "", 0.0, 100.0)),
+        parameters=(
+            Parameter("efficiency", 0.9, "-", "data sheet", lower=0.5, upper=1.0, scale=0.05, role="estimated"),
+            Parameter("loss", 80.0, "W/K", "guess", lower=1.0, upper=1000.0, scale=10.0, role="estimated"),
+        ),
+        outputs=(Quantity("temperature", "K", ""),),
+        equations=equations,
+        max_step_s=60.0,
+        initial_guess={"temperature": 310.0},
+    )
+"""
+
+
+def _write_tank(folder: Path, name: str = "tank.csv", **more: Any) -> pd.DataFrame:
+    (folder / "heated.py").write_text(HEATED)
+    record = tank_record(**more)
+    columns = {"time_s": record.time, "power_W": record.inputs[:, 0], "fan_speed_1_s": record.inputs[:, 1]}
+    table = pd.DataFrame(columns | {"temperature_K": record.outputs[:, 0]})
+    table.to_csv(folder / name, index=False)
+    return table
+
+
+def test_a_model_of_the_user_from_record_to_extended_model(call: Call, tmp_path: Path) -> None:
+    """Record in; verdict, page and model file out; the model file is accepted by discover, estimate and simulate."""
+    _write_tank(tmp_path)
+    result = call(
+        "discover", "tank.csv", "--model", "heated:make_model", "--processes", "1", "--save-model", "more.yaml"
+    )
+    assert result.code == 0, result.err
+    said = " ".join(result.out.split())
+    assert said.startswith("named: The model lacks this: heat_loss depends on fan_speed")
+    assert "temperature" in said and "Model: more.yaml" in said
+    page = (tmp_path / "results" / "tank" / "report.html").read_text()
+    assert "heat loss by fan speed" in page and "Error before and after" in page
+    verdict = json.loads((tmp_path / "results" / "tank" / "verdict.json").read_text())
+    assert verdict["effects"][0]["site"] == "heat_loss"
+    assert verdict["error"]["temperature"]["after"] < 0.2 * verdict["error"]["temperature"]["before"]
+
+    _write_tank(tmp_path, "fresh.csv", seed=5)
+    again = call("discover", "fresh.csv", "--model", "more.yaml", "--processes", "1")
+    assert again.code == 0 and again.out.startswith("none: ")
+    replayed = call("estimate", "fresh.csv", "--model", "more.yaml", "--estimator", "fixed", "--json", "e.json")
+    assert replayed.code == 0, replayed.err
+    assert call("simulate", "fresh.csv", "--model", "more.yaml", "--out", "s.csv").code == 0
+
+
+def _drop(t: pd.DataFrame) -> pd.DataFrame:
+    return t.drop(columns="fan_speed_1_s")
+
+
+def _gap(t: pd.DataFrame) -> pd.DataFrame:
+    return t.drop(index=range(200, 260))
+
+
+def _still(t: pd.DataFrame) -> pd.DataFrame:
+    return t.assign(power_W=1500.0, fan_speed_1_s=10.0)
+
+
+def _no_output(t: pd.DataFrame) -> pd.DataFrame:
+    return t.drop(columns="temperature_K")
+
+
+def _range(t: pd.DataFrame) -> pd.DataFrame:
+    return t.assign(power_W=1000 * t["power_W"])
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "says"),
+    [
+        (_drop, 2, "fan_speed_1_s"),
+        (_gap, 2, "not uniform"),
+        (_range, 2, "power"),
+        (_still, 0, "insufficient: "),
+        (_no_output, 0, "no output"),
+    ],
+)
+def test_a_bad_record_gets_an_error_or_a_verdict_that_names_the_reason(
+    call: Call, tmp_path: Path, change: Callable[[pd.DataFrame], pd.DataFrame], code: int, says: str
+) -> None:
+    change(_write_tank(tmp_path)).to_csv(tmp_path / "tank.csv", index=False)
+    result = call("discover", "tank.csv", "--model", "heated:make_model", "--processes", "1")
+    assert result.code == code and says in " ".join((result.out if code == 0 else result.err).split())
+    assert (tmp_path / "results").exists() == (code == 0)

@@ -1,0 +1,27 @@
+"""A shared example with an answer beside it. The others, and measured data, are judged by `benchmarks.measured`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from adaptive_flot.discovery.parallel import available_processes
+from adaptive_flot.processes.registry import make_model
+from adaptive_flot.runner.discover import discover_file
+
+EXAMPLE = "example_froth_recovery_step"
+
+
+def test_an_example_is_judged_as_its_answer_says(shared_file: Callable[[str], Path]) -> None:
+    """The froth recovery of another cell drops at 1500 s: site, driver and onset are found, the error falls by 80 %."""
+    answer = json.loads(shared_file("examples/answers.json").read_text())[EXAMPLE]
+    found = discover_file(
+        shared_file(f"examples/{EXAMPLE}.csv"), make_model("flotation"), processes=min(2, available_processes())
+    ).verdict
+    assert found.word == answer["verdict"] == "named"
+    (effect,) = (e.effect for e in found.effects)
+    assert effect.site in answer["site"] and effect.driver in answer["driver"]
+    assert abs(effect.coefficients["onset"] - 1500.0) < 30.0
+    grade = next(c for c in found.error if c.output == "concentrate_grade")
+    assert grade.after < 0.2 * grade.before

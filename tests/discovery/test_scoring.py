@@ -1,0 +1,153 @@
+"""Fits and first-order scores: parameters that made the record come back, and a score is what a full fit gains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.catalogue import Candidate, catalogue, finer, spline_values
+from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.problem import Problem, make_problem
+from adaptive_flot.discovery.responses import Course, Responses
+from adaptive_flot.discovery.scoring import Scorer
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.stepper import Stepper
+from tests.discovery.heated import DT, EXPONENT, Truth, heated_tank, tank_record
+
+ADAPTED = ("efficiency", "loss")
+
+
+def _fitted(truth: Truth, seed: int = 0) -> tuple[Problem, Fit]:
+    problem = make_problem(tank_record(truth, seed=seed), heated_tank(), ADAPTED, burn_in=30, guard=5)
+    fit = Fitter(problem).fit(heated_tank())
+    assert fit is not None
+    return problem, fit
+
+
+@pytest.fixture(scope="module")
+def weak() -> tuple[Problem, Fit, Scorer]:
+    """A draught so weak that the model is close to linear in it."""
+    problem, fit = _fitted(Truth(exponent=0.03, noise=0.02))
+    responses = Responses(problem, fit)
+    return problem, fit, Scorer(problem, fit, responses, catalogue(fit.model, responses))
+
+
+def _candidate(scorer: Scorer, site: str, driver: str) -> Candidate:
+    return next(c for c in scorer.candidates if c.name == (site, driver))
+
+
+def test_shares_do_not_overlap_and_leave_guards_between_them() -> None:
+    problem, _ = _fitted(Truth())
+    shares = [problem.rows(s) for s in ("estimate", "confirm", "report")]
+    assert not np.any(np.sum(shares, axis=0) > 1)
+    assert [round(float(s.sum()) / len(problem.record), 1) for s in shares] == [0.5, 0.2, 0.2]
+    assert not problem.rows()[:30].any()
+    changes = np.flatnonzero(problem.blocks[1:] != problem.blocks[:-1])
+    assert all("" in (problem.blocks[k], problem.blocks[k + 1]) for k in changes)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_parameters_that_made_the_record_come_back(seed: int) -> None:
+    """Model and truth agree (no draught): each parameter within four of its standard deviations, white innovations."""
+    problem, fit = _fitted(Truth(exponent=0.0), seed)
+    truth = np.array([0.9, 60.0])
+    assert np.all(np.abs(fit.values - truth) < 4 * fit.std() + 1e-3 * truth)
+    assert fit.noise.stationary_std()[0] == pytest.approx(0.05, rel=0.15)
+    assert 0.85 < np.std(fit.innovations[problem.rows("estimate")]) < 1.15
+
+
+def test_the_exponent_that_made_the_record_comes_back() -> None:
+    problem, base = _fitted(Truth())
+    draught = Effect("heat_loss", "fan_speed", "power", settings={"reference": 10.0})
+    names = tuple(draught.parameter(c.name) for c in draught.terms)
+    fit = Fitter(problem).fit(base.model.with_effects([draught]), names, like=base)
+    assert fit is not None
+    exponent = fit.names.index(draught.parameter("exponent"))
+    assert abs(fit.values[exponent] - EXPONENT) < 4 * fit.std()[exponent] < 0.1
+    assert fit.bic < base.bic - 100
+
+
+def test_an_answer_is_what_the_model_does(weak: tuple[Problem, Fit, Scorer]) -> None:
+    """Linear answers against differences of two full simulations."""
+    problem, fit, _ = weak
+    responses = Responses(problem, fit)
+    fan = problem.record.inputs[:, 1]
+    answer = responses.of([Course("heat_loss", np.log(fan / 10), False), Course("thermometer", np.ones(600), True)])
+    small = 1e-4
+    effects = [
+        Effect("heat_loss", "fan_speed", "power", {"exponent": small}, {"reference": 10.0}),
+        Effect("thermometer", "constant", "shift", {"amplitude": small}),
+    ]
+    for j, effect in enumerate(effects):
+        runs = []
+        for model in (fit.model, fit.model.with_effects([effect])):
+            inputs = problem.record.inputs[1:]
+            runs.append(Stepper(model, DT).simulate(fit.initial_state, inputs, model.parameter_values, DT).outputs)
+        np.testing.assert_allclose(answer[1:, :, j], (runs[1] - runs[0]) / small, rtol=2e-3, atol=1e-3)
+
+
+def test_a_score_is_the_gain_of_the_full_fit(weak: tuple[Problem, Fit, Scorer]) -> None:
+    """Near amplitude zero the drop of the whitened sum of squares, after projection, is that of a full refit."""
+    problem, fit, scorer = weak
+    score = next(
+        s for s in scorer.variant_scores(_candidate(scorer, "heat_loss", "fan_speed"))
+        if s.variant.effect.form == "power"
+    )  # fmt: skip
+    effect = score.variant.effect
+    names = tuple(effect.parameter(c.name) for c in effect.terms)
+    full = Fitter(problem).fit(fit.model.with_effects([effect]), names, like=fit)
+    assert full is not None
+    rows = problem.rows("estimate")
+    before, after = (scorer.noise.whiten(f.residual(problem))[rows] for f in (fit, full))
+    assert score.gain == pytest.approx(float(np.sum(before**2) - np.sum(after**2)), rel=0.15)
+    found = full.values[full.names.index(effect.parameter("exponent"))]
+    assert score.start["exponent"] == pytest.approx(found, rel=0.15)
+
+
+def test_the_truth_has_the_best_score_and_what_adaptation_can_do_has_none(weak: tuple[Problem, Fit, Scorer]) -> None:
+    _, _, scorer = weak
+    assert scorer.scores()[0].candidate.name == ("heat_loss", "fan_speed")
+    absorbed = scorer.variant_scores(_candidate(scorer, "heat_loss", "constant"))[0]
+    assert absorbed.gain < 1e-6 * scorer.scores()[0].gain
+
+
+def test_noise_alone_passes_the_threshold_as_often_as_it_should() -> None:
+    """Scores of records without an effect stay below the bootstrap's 99 % threshold (nominal: 0.1 of 12 pass)."""
+    passed = 0
+    for seed in range(12):
+        problem, fit = _fitted(Truth(exponent=0.0), seed)
+        responses = Responses(problem, fit)
+        scorer = Scorer(problem, fit, responses, catalogue(fit.model, responses))
+        passed += int(scorer.scores()[0].penalised > np.quantile(scorer.null_gains(200, seed=0), 0.99))
+    assert passed <= 1
+
+
+def test_the_catalogue_offers_what_makes_sense_once(weak: tuple[Problem, Fit, Scorer]) -> None:
+    problem, fit, scorer = weak
+    names = [c.name for c in scorer.candidates]
+    assert len(set(names)) == len(names)
+    assert {s for s, d in names if d in ("lag", "delay")} == {"heating", "thermometer"}
+    assert {d for s, d in names if s == "heat_loss"} == {"constant", "time", "power", "fan_speed", "temperature"}
+    assert {c.name for c in scorer.candidates if not c.known} >= {("thermometer", "power"), ("heating", "fan_speed")}
+    extended = fit.model.with_effects([Effect("heat_loss", "fan_speed", "power", settings={"reference": 10.0})])
+    responses = Responses(problem, Fitter(problem).fit(extended, like=fit) or fit)
+    assert ("heat_loss", "fan_speed") not in [c.name for c in catalogue(extended, responses)]
+    for c in scorer.candidates:
+        for v in c.variants:
+            assert all(value == 0 for value in v.effect.coefficients.values())
+            assert len(v.coefficients) == len(v.courses)
+
+
+def test_splines_pass_through_their_knots_and_a_finer_one_draws_the_same_curve(
+    weak: tuple[Problem, Fit, Scorer],
+) -> None:
+    knots = (1.0, 2.0, 4.0, 5.0)
+    np.testing.assert_allclose(spline_values(np.array(knots), knots), np.eye(4), atol=1e-12)
+    np.testing.assert_allclose(spline_values(np.linspace(0, 7, 30), knots).sum(axis=1), 1.0)
+    *_, scorer = weak
+    curve = next(v for v in _candidate(scorer, "heat_loss", "fan_speed").variants if v.effect.form == "curve")
+    start = {n: float(k) for k, n in enumerate(curve.coefficients)}
+    fine = finer(curve, start)
+    assert fine is not None
+    coarse, dense = (np.atleast_1d(np.asarray(v.effect.settings["knots"])) for v in (curve, fine[0]))
+    np.testing.assert_allclose(list(fine[1].values()), spline_values(dense, tuple(coarse)) @ list(start.values()))

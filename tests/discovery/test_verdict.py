@@ -1,0 +1,112 @@
+"""Verification on rows that chose nothing, and the word that ranked alternatives amount to: made by hand."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.experiment import leading
+from adaptive_flot.discovery.search import Search
+from adaptive_flot.discovery.verdict import judge
+from adaptive_flot.discovery.verify import Verification, changes, verify, whiteness
+
+BY_FAN, BY_HEATER, BY_TIME = ("heat_loss", "fan_speed"), ("heating", "fan_speed"), ("heat_loss", "time")
+CONFIRMED = Verification(0.5, (0.4, 0.6), (), True)
+
+
+def _search(draught: Discovery, *found: tuple[tuple[str, str], bool, float], left: float = 0.0,
+            verification: Verification | None = CONFIRMED) -> Search:  # fmt: skip
+    """Alternatives by name, whether known, and how much worse than the first."""
+    assert draught.search is not None
+    own = draught.search.alternatives[0]
+    alternatives = tuple(
+        Alternative((name,), (known,), replace(own.fit, bic=own.fit.bic + worse), 0.0, -100.0 + worse)
+        for name, known, worse in found
+    )
+    return replace(draught.search, alternatives=alternatives, verification=verification, left=left, left_threshold=10.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "left", "word"),
+    [
+        ([], 0.0, "none"),
+        ([(BY_FAN, True, 0.0)], 0.0, "named"),
+        ([(BY_FAN, True, 0.0), (BY_HEATER, True, 11.0)], 0.0, "named"),
+        ([(BY_FAN, True, 0.0), (BY_HEATER, True, 9.0)], 0.0, "class"),
+        ([(BY_FAN, True, 0.0), (BY_HEATER, True, 40.0)], 60.0, "class"),  # the best leaves 50 above chance itself
+        ([(BY_HEATER, False, 0.0), (BY_FAN, True, 5.0)], 0.0, "named"),  # of equals, the one that has a name
+        ([(BY_HEATER, False, 0.0), (BY_FAN, True, 50.0)], 0.0, "unnamed"),
+        ([(BY_HEATER, False, 0.0), (("thermometer", "power"), False, 2.0)], 0.0, "abstain"),
+        ([(BY_FAN, True, 0.0), (BY_HEATER, True, 95.0)], 150.0, "abstain"),  # no better than no effect at all
+        ([((s, "fan_speed"), True, 1.0 * k) for k, s in enumerate("abcd")], 0.0, "abstain"),  # too many to be a class
+    ],
+)
+def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, float]], left: float, word: str) -> None:
+    judged = judge(_search(draught, *found, left=left))
+    assert judged.word == word
+    if word in ("named", "class"):
+        assert judged.best is not None and all(judged.best.known)
+    assert (len(judged.members) > 1) == (word == "class")
+
+
+def test_nothing_is_named_that_does_not_stand_on_fresh_rows(draught: Discovery) -> None:
+    name = (BY_FAN, True, 0.0)
+    by_chance = Verification(0.0, (-0.1, 0.1), (), False)
+    assert judge(_search(draught, name, verification=by_chance)).word == "none"
+    one_worse = Verification(0.3, (0.2, 0.4), ("level",), False)
+    assert judge(_search(draught, name, verification=one_worse)).word == "abstain"
+
+
+def test_verify_tells_better_from_the_same_and_the_worse(draught: Discovery) -> None:
+    problem, before, after = draught.problem, draught.before, draught.after
+    assert problem is not None and before is not None and after is not None
+    assert verify(problem, before, after).confirmed
+    same = verify(problem, before, before)
+    assert same.reduction == 0 and not same.confirmed
+    back = verify(problem, after, before)
+    assert not back.confirmed and back.worse == ("temperature",)
+
+
+def test_the_error_is_that_of_the_share_and_the_interval_holds_it(draught: Discovery) -> None:
+    problem, before, after = draught.problem, draught.before, draught.after
+    assert problem is not None and before is not None and after is not None
+    (change,) = changes(problem, before, after, "report")
+    rows = problem.rows("report")
+    expected = [float(np.sqrt(np.mean(f.residual(problem)[rows] ** 2))) for f in (before, after)]
+    assert [change.before, change.after] == pytest.approx(expected)
+    low, high = change.reduction95
+    assert 0.5 < low < 1 - change.after / change.before < high < 1
+    assert change.noise == pytest.approx(0.05, rel=0.15) and change.after < 1.5 * change.noise
+
+
+def test_whiteness_tells_what_is_left(draught: Discovery) -> None:
+    problem, before, after = draught.problem, draught.before, draught.after
+    assert problem is not None and before is not None and after is not None
+    assert whiteness(problem, before, raw=True)["temperature"] < 1e-6
+    assert whiteness(problem, after, raw=True)["temperature"] > 0.01
+
+
+def test_only_those_close_to_the_best_are_worth_a_test(draught: Discovery) -> None:
+    found = _search(draught, (BY_FAN, True, 0.0), (BY_HEATER, False, 25.0), (BY_TIME, True, 80.0), (BY_FAN, True, 1.0))
+    best, *others = found.alternatives
+    assert [a.names for a in leading(best, others, 10.0)] == [(BY_FAN,), (BY_HEATER,)]
+    assert len(leading(best, others, 100.0)) == 3
+
+
+def test_the_machine_readable_verdict_is_that_of_the_design(draught: Discovery) -> None:
+    told = json.loads(json.dumps(draught.verdict.as_dict()))
+    assert told["verdict"] == "named" and told["class"] == []
+    (effect,) = told["effects"]
+    assert (effect["site"], effect["driver"], effect["form"]) == (*BY_FAN, "power")
+    low, high = effect["interval95"]["exponent"]
+    assert low < 0.6 < high and low < effect["parameters"]["exponent"] < high
+    assert all(a["delta_bic"] > 0 for a in effect["alternatives"])
+    error = told["error"]["temperature"]
+    assert set(error) == {"unit", "before", "after", "noise", "reduction95", "block"} and error["unit"] == "K"
+    assert told["tests"]["ljung_box_before"] < 1e-6 < told["tests"]["ljung_box_after"]
+    assert set(told["parameters"]) == {"efficiency", "loss"} == set(told["absorbed"])
