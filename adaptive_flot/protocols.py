@@ -174,6 +174,9 @@ class Estimator(Protocol[State]):
     Late values: after one, the estimate is what the same value in time would have given. An estimator need not see to
     that: `adaptive_flot.late.LateValues`, put around it by the loop wherever a measurement has a dead time, does. One
     that keeps a window of samples anyway may take `Sample.late` itself; it then has `takes_late_values = True`.
+
+    Whole records: an estimator may have `track(state, time, inputs, outputs) -> Track` (`adaptive_flot/track.py`) that
+    gives for N samples what N calls of `update` give; replays of measured records then use it.
     """
 
     setup: Setup

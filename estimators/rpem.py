@@ -12,8 +12,10 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.track import Track
 from estimators.information import Information
 from estimators.measured import driving_outputs
+from estimators.rpem_record import BLOCK_ROWS, RecordBlock
 from estimators.rpem_update import Gradient, UpdateOptions, alternative_covariance, update_function
 from estimators.state_correction import StateCorrection
 
@@ -133,6 +135,9 @@ class Rpem:
         self._information = None if alternative is None or freeze_s is None else Information(alternative, freeze_s)
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
+        self._block: RecordBlock | None = None
+        if self._information is None and not self._correction.outputs:
+            self._block = RecordBlock(setup, self.options)
         matrices = ("S", "covariance", "free", "gain", "S_next", "covariance_next", "information")
         self._update = FastCall(
             update_function(setup, self.options), matrices=matrices, as_machine_code=setup.model.compiled
@@ -207,3 +212,31 @@ class Rpem:
             status,
         )
         return new, estimate
+
+    def track(self, state: RpemState, time: FloatArray, inputs: FloatArray, outputs: FloatArray) -> Track:
+        """Take a whole record: the estimates that `update` gives sample by sample, without a Python call for each.
+
+        Parameters
+        ----------
+        state
+            Before the first sample.
+        time, inputs, outputs
+            Of each sample, (N,), (N, nu) and (N, ny), NaN where missing.
+        """
+        parts: list[Track] = []
+        for first in range(0, len(time), BLOCK_ROWS):
+            rows = slice(first, first + BLOCK_ROWS)
+            block = (time[rows], inputs[rows], outputs[rows])
+            found = None if self._block is None or len(time[rows]) < BLOCK_ROWS else self._block(state, *block)
+            state, part = self._by_samples(state, *block) if found is None else found
+            parts.append(part)
+        return Track.joined(parts)
+
+    def _by_samples(
+        self, state: RpemState, time: FloatArray, inputs: FloatArray, outputs: FloatArray
+    ) -> tuple[RpemState, Track]:
+        estimates: list[Estimate] = []
+        for t, u, y in zip(time, inputs, outputs, strict=True):
+            state, estimate = self.update(state, Sample(float(t), u, y))
+            estimates.append(estimate)
+        return state, Track.of(estimates)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +19,9 @@ from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.protocols import AnyEstimator, ControllerSetup, Prior, Setup, full_parameters
-from adaptive_flot.runner.loop import Step, run_loop
+from adaptive_flot.runner.loop import run_loop
 from adaptive_flot.runner.plant import ReplayPlant
+from adaptive_flot.track import Track
 
 WHITENESS_LAGS = 20
 
@@ -191,11 +192,9 @@ def _replay(name: str, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Pa
     prior = _start(name, setup, blocks, batch)
 
     first = _run(blocks.fit, estimator, setup, prior)
-    end = first[-1].estimate
-    assert end is not None  # the estimator runs from the first interval
+    end = first.end(prior.noise_std)
     x_test = end.state if blocks.continues else batch.initial_state
-    start = Prior(blocks.test.time[0], x_test, end.parameters, end.covariance, prior.noise_std)
-    second = _run(blocks.test, estimator, setup, start)
+    second = _run(blocks.test, estimator, setup, replace(end, time=float(blocks.test.time[0]), state=x_test))
 
     simulator = RecordSimulator(setup.model, setup.dt)
     p = full_parameters(setup.model, setup.parameters, end.parameters)
@@ -215,7 +214,7 @@ def _replay(name: str, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Pa
         parameters={k: (float(v), float(s)) for k, v, s in zip(labels, end.parameters, std, strict=True)},
         errors=tuple(e for t in tables for e in _errors(setup, t)),
         table=pd.concat(tables, ignore_index=True),
-        status_counts=dict(Counter(s.estimate.status.name.lower() for s in (*first, *second) if s.estimate)),
+        status_counts=dict(Counter(status.name.lower() for status in (*first.statuses, *second.statuses))),
     )
 
 
@@ -227,19 +226,22 @@ def _start(name: str, setup: Setup, blocks: Blocks, batch: BatchFit) -> Prior:
     return Prior(float(blocks.fit.time[0]), batch.initial_state, values, batch.covariance, batch.noise_std)
 
 
-def _run(record: Dataset, estimator: AnyEstimator, setup: Setup, prior: Prior) -> list[Step]:
-    """Replay rows 1, 2, ... of a record: the runner's loop with the record as the plant."""
+def _run(record: Dataset, estimator: AnyEstimator, setup: Setup, prior: Prior) -> Track:
+    """Replay rows 1, 2, ... of a record: at once where the estimator can, else by the runner's loop."""
+    whole: Callable[..., Track] | None = getattr(estimator, "track", None)
+    if whole is not None:
+        return whole(estimator.init(prior), record.time[1:], record.inputs[1:], record.outputs[1:])
     controller = load("schedule", CONTROLLERS, "controller")(ControllerSetup(setup.model, setup.dt, record.inputs[1:]))
     plant = ReplayPlant(record, len(setup.model.parameters))
-    return run_loop(plant, estimator, controller, len(record) - 1, initial_intervals=0, make_prior=lambda _: prior)
+    steps = run_loop(plant, estimator, controller, len(record) - 1, initial_intervals=0, make_prior=lambda _: prior)
+    return Track.of([s.estimate for s in steps if s.estimate is not None])
 
 
 def _table(
-    block: str, setup: Setup, record: Dataset, steps: list[Step], free: FloatArray, known: FloatArray | None
+    block: str, setup: Setup, record: Dataset, track: Track, free: FloatArray, known: FloatArray | None
 ) -> pd.DataFrame:
     model = setup.model
-    estimates = [s.estimate for s in steps if s.estimate]
-    predicted = np.vstack([free[0], *(e.prediction for e in estimates)])  # row 0 is the initial instant
+    predicted = np.vstack([free[0], track.prediction])  # row 0 is the initial instant
     columns: dict[str, object] = {"block": [block] * len(record), "time_s": record.time}
     columns |= {q.column: record.inputs[:, j] for j, q in enumerate(model.inputs)}
     for j, q in enumerate(model.outputs):
@@ -248,13 +250,14 @@ def _table(
             columns[f"{q.column}_predicted"] = predicted[:, j]
             columns[f"{q.column}_innovation"] = record.outputs[:, j] - predicted[:, j]
             columns[f"{q.column}_free_run"] = free[:, j]
-    theta = np.vstack([estimates[0].parameters, *(e.parameters for e in estimates)])
-    covariances = [e.covariance if known is None else known for e in (estimates[0], *estimates)]
-    std = np.vstack([np.sqrt(np.diag(c)) for c in covariances])
+    theta = np.vstack([track.parameters[:1], track.parameters])
+    covariance = np.concatenate([track.covariance[:1], track.covariance])
+    variances = np.diagonal(covariance if known is None else np.tile(known, (len(theta), 1, 1)), axis1=1, axis2=2)
+    std = np.sqrt(variances)
     for j, i in enumerate(model.indices("parameters", setup.parameters)):
         columns[f"{model.parameters[i].label}_estimate"] = theta[:, j]
         columns[f"{model.parameters[i].label}_std"] = std[:, j]
-    columns["status"] = [estimates[0].status.name.lower(), *(e.status.name.lower() for e in estimates)]
+    columns["status"] = [s.name.lower() for s in (track.statuses[0], *track.statuses)]
     return pd.DataFrame(columns)
 
 
