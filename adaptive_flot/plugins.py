@@ -17,6 +17,7 @@ ESTIMATORS: Mapping[str, str] = {
     "ekf": "estimators.ekf:Ekf",
     "fixed": "estimators.fixed:Fixed",
     "imm": "estimators.imm:Imm",
+    "mhe": "estimators.mhe:Mhe",
     "oracle": "estimators.oracle:Oracle",
     "rpem": "estimators.rpem:Rpem",
     "rpem_full": "estimators.rpem_full:rpem_full",

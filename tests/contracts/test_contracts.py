@@ -23,6 +23,7 @@ from estimators.fixed import Fixed, FixedState
 
 ESTIMATOR_CASES: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for name in ESTIMATORS} | {
     "ekf-integrated": ("ekf", {"walk": "integrated"}),
+    "mhe": ("mhe", {"window_s": 12, "solve_every_s": 4}),  # a window that fills and moves within the short record
     "rpem-central": ("rpem", {"gradient": "central"}),
     "rpem-never-frozen": ("rpem_full", {"freeze_s": None}),
 }
