@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from estimators.information import Information
 from estimators.measured import driving_outputs
 from estimators.rpem_record import BLOCK_ROWS, RecordBlock
 from estimators.rpem_update import Gradient, UpdateOptions, alternative_covariance, update_function
-from estimators.state_correction import StateCorrection
+from estimators.state_correction import Correction, StateCorrection
 
 GRADIENTS = ("exact", "central", "recursive")
 
@@ -42,8 +42,8 @@ class RpemState:
         dx/dtheta (nx, q), for the recursive gradient.
     information
         Sum of psi psi' / sigma^2 over the last while (q, q), where directions may be frozen.
-    gain
-        Gain of the state correction (nx, c); None until the first sample, whose inputs it is designed for.
+    correction
+        Gain of the state correction; None until the first sample, whose operating point it is designed for.
     """
 
     time: float
@@ -53,7 +53,7 @@ class RpemState:
     noise_std: FloatArray
     sensitivity: FloatArray
     information: FloatArray
-    gain: FloatArray | None
+    correction: Correction | None
 
 
 class Rpem:
@@ -69,12 +69,12 @@ class Rpem:
     one output this changes nothing in theta, for several it weighs them. A missing output leaves its term out; when
     all are missing nothing is forgotten.
 
-    The defaults are the paper. What goes beyond it is an option; `rpem_full` has them all.
+    The defaults are the paper. What goes beyond it is an option; `rpem_full` has other defaults.
 
     Parameters
     ----------
     setup
-        Model, sampling interval, adapted parameters (q) and measured outputs (m).
+        Model, sampling interval, adapted parameters (q) and driving outputs (m).
     forgetting
         Forgetting factor lambda in (0, 1]; 1 / (1 - lambda) samples is the memory.
     gradient
@@ -93,8 +93,9 @@ class Rpem:
         Freeze each direction of theta on which the data of this time [s] say less than A: the estimate does not move
         along it and the status is LOW_INFORMATION. Needs `forget_to`. Default: never.
     correct_state
-        Outputs that correct the state by the gain of a steady-state Kalman filter, and do not drive the parameters.
-        Default none: all drive, and the state is the free run of the paper.
+        Measured outputs that correct the state, driving or not, with the standard deviation of their noise in the
+        output's unit, by the gain of a stationary Kalman filter (see `state_correction.py`). Default none: the state
+        is the free run of the paper.
     state_noise
         For that gain: standard deviation that unknown disturbances add to each state within a second, as a share of
         its scale.
@@ -114,7 +115,7 @@ class Rpem:
         l0_scale: float = 1.0,
         forget_to: float | None = None,
         freeze_s: float | None = None,
-        correct_state: Sequence[str] = (),
+        correct_state: Mapping[str, float] | None = None,
         state_noise: float = 1e-3,
     ) -> None:
         if not 0.0 < forgetting <= 1.0:
@@ -130,8 +131,8 @@ class Rpem:
         self.setup = setup
         self.l0_scale = l0_scale
         alternative = None if forget_to is None else alternative_covariance(setup, forget_to)
-        self.options = UpdateOptions(forgetting, gradient, alternative, tuple(correct_state), freeze_s is not None)
-        self._correction = StateCorrection(setup, self.options.correcting, state_noise)
+        self._correction = StateCorrection(setup, correct_state or {}, state_noise)
+        self.options = UpdateOptions(forgetting, gradient, alternative, self._correction.outputs, freeze_s is not None)
         self._information = None if alternative is None or freeze_s is None else Information(alternative, freeze_s)
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
@@ -165,16 +166,17 @@ class Rpem:
         """Predict, compare, correct; see `Estimator.update`."""
         measured, outputs, present = driving_outputs(sample, self._columns, len(self.setup.model.outputs))
         p = self._p if sample.parameters is None else sample.parameters
-        extra, gain, starved = [], state.gain, False
+        extra, correction, starved = [], state.correction, False
         if self._recursive:
             extra.append(state.sensitivity)
         if self._information is not None:
             free, starved = self._information.free_directions(state.information)
             extra.append(free)
         if self._correction.outputs:
-            if gain is None:
-                gain = self._correction.gain(state.x, state.time, sample.inputs, p, state.theta, state.noise_std)
-            extra.append(gain)
+            if correction is None:
+                correction = self._correction.design(state.x, state.time, sample.inputs, p, state.theta)
+            _, seen, there = driving_outputs(sample, self._correction.rows, len(self.setup.model.outputs))
+            extra += [correction.gain, correction.reach, seen, there]
         x, theta, covariance, prediction, expected_std, flags, *more = self._update(
             state.x,
             state.time,
@@ -200,7 +202,7 @@ class Rpem:
                 status = Status.PROJECTED
             elif starved and status is Status.OK:
                 status = Status.LOW_INFORMATION
-        new = RpemState(sample.time, x, theta, covariance, state.noise_std, sensitivity, information, gain)
+        new = RpemState(sample.time, x, theta, covariance, state.noise_std, sensitivity, information, correction)
         estimate = Estimate(
             sample.time,
             prediction,

@@ -31,7 +31,7 @@ class UpdateOptions:
     alternative
         Covariance that is forgotten to (q, q); None forgets exponentially, to no knowledge at all.
     correcting
-        Names of the outputs that correct the state and do not drive the parameters.
+        Names of the c outputs that correct the state.
     freezing
         Whether directions of the parameters may be held.
     """
@@ -42,10 +42,6 @@ class UpdateOptions:
     correcting: tuple[str, ...] = ()
     freezing: bool = False
 
-    def driving(self, setup: Setup) -> tuple[str, ...]:
-        """Names of the outputs that drive the parameters."""
-        return tuple(name for name in setup.outputs if name not in self.correcting)
-
 
 def update_function(setup: Setup, options: UpdateOptions) -> ca.Function:
     """Build the update.
@@ -54,61 +50,55 @@ def update_function(setup: Setup, options: UpdateOptions) -> ca.Function:
     -------
     casadi.Function
         `(x, t, u, p, theta, covariance, noise (m,), measured (m,), present (m,)[, S (nx, q)][, free (q, q)]
-        [, gain (nx, c)]) -> (x_next, theta_next, covariance_next, prediction, expected_std (m,), flags[, S_next]
-        [, information (q, q)])`. With the recursive gradient S is the sensitivity of the state; with freezing `free`
-        projects the step of theta onto the directions that may move, and information is that of this sample; `gain`
-        corrects the state by the c correcting outputs. flags: a number that is finite only if the result is, the
-        number of parameters that were projected onto their bounds, and of driving outputs that are there.
+        [, gain (nx, c), reach (c,), seen (c,), there (c,)]) -> (x_next, theta_next, covariance_next, prediction,
+        expected_std (m,), flags[, S_next][, information (q, q)])`. With the recursive gradient S is the sensitivity of
+        the state; with freezing `free` projects the step of theta onto the directions that may move, and information is
+        that of this sample; with correcting outputs `gain` moves the state by their errors, each cut at `reach`, where
+        `seen` is measured and `there`. flags: a number that is finite only if the result is, the number of parameters
+        that were projected onto their bounds, and of driving outputs that are there.
     """
     model = setup.model
-    columns = model.indices("parameters", setup.parameters)
-    rows = model.indices("outputs", setup.outputs)
-    drives = [setup.outputs.index(name) for name in options.driving(setup)]
-    corrects = [setup.outputs.index(name) for name in options.correcting]
-    q, m, nx = len(columns), len(rows), len(model.states)
+    columns, rows = model.indices("parameters", setup.parameters), model.indices("outputs", setup.outputs)
+    q, m, nx, recursive = len(columns), len(rows), len(model.states), options.gradient == "recursive"
     x, t, u, p = Stepper(model, setup.dt).step.sx_in()
-    theta, cov, S = ca.SX.sym("theta", q), ca.SX.sym("covariance", q, q), ca.SX.sym("S", nx, q)
-    noise, measured, present = ca.SX.sym("noise", m), ca.SX.sym("measured", m), ca.SX.sym("present", m)
-    free, correction = ca.SX.sym("free", q, q), ca.SX.sym("gain", nx, len(corrects))
+    theta, cov, S, free = (ca.SX.sym(*a) for a in (("theta", q), ("covariance", q, q), ("S", nx, q), ("free", q, q)))
+    noise, measured, present = (ca.SX.sym(name, m) for name in ("noise", "measured", "present"))
     p_now = ca.SX(p)
     p_now[columns] = theta
 
     x_next, S_next, y, slope = _prediction(setup, options.gradient)(x, S, t, u, p_now)
     psi = slope[rows, :] / ca.repmat(noise, 1, q)
-    residual = (measured - y[rows]) / noise
-    some = sum((present[j] for j in drives), ca.SX(0))
+    residual, some = (measured - y[rows]) / noise, ca.sum1(present)
     forgotten = _forget(cov, some > 0, options)
     expected = [noise[j] * ca.sqrt(1 + psi[j, :] @ forgotten @ psi[j, :].T) for j in range(m)]
-    theta_next, updated = _correct(theta, forgotten, psi, residual, present, drives, free if options.freezing else None)
-    if options.gradient == "recursive":
-        x_next += S_next @ (theta_next - theta)
-    for i, j in enumerate(corrects):
-        x_next += present[j] * correction[:, i] * (measured - y[rows])[j]
-        S_next -= present[j] * correction[:, i] @ slope[rows[j], :]
-
-    lower = ca.DM([model.parameters[i].lower for i in columns])
-    upper = ca.DM([model.parameters[i].upper for i in columns])
+    theta_next, updated = _correct(theta, forgotten, psi, residual, present, free if options.freezing else None)
+    lower, upper = (ca.DM([getattr(model.parameters[i], bound) for i in columns]) for bound in ("lower", "upper"))
     inside = ca.fmin(ca.fmax(theta_next, lower), upper)
+    correction: list[ca.SX] = []
+    if options.correcting:
+        x_next, S_next, correction = _correct_state(setup, options.correcting, x_next, S_next, y, slope)
+    if recursive:
+        x_next += S_next @ (inside - theta)
+    if options.correcting:
+        x_next = _within_range(setup, x_next)
+
     size = ca.sumsqr(x_next) + ca.sumsqr(theta_next) + ca.sumsqr(updated) + ca.sumsqr(y[rows])
-    arguments = {
-        **{"x": x, "t": t, "u": u, "p": p, "theta": theta, "covariance": cov},
-        **{"noise": noise, "measured": measured, "present": present},
-    }
+    names = ["x", "t", "u", "p", "theta", "covariance", "noise", "measured", "present"]
+    arguments = [x, t, u, p, theta, cov, noise, measured, present]
     results = {
         **{"x_next": x_next, "theta_next": inside, "covariance_next": updated, "prediction": y},
         **{"expected_std": ca.vertcat(*expected), "flags": ca.vertcat(size, ca.sum1(inside != theta_next), some)},
     }
     # what is not used is not passed: an argument costs as much as a hundred operations
-    if options.gradient == "recursive":
-        arguments["S"], results["S_next"] = S, S_next
+    if recursive:
+        names, arguments = [*names, "S"], [*arguments, S]
+        results["S_next"] = S_next
     if options.freezing:
-        information = sum((present[j] * psi[j, :].T @ psi[j, :] for j in drives), ca.SX(q, q))
-        arguments["free"], results["information"] = free, ca.densify(information)
-    if corrects:
-        arguments["gain"] = correction
-    return ca.Function(
-        "rpem_update", [*arguments.values()], [*results.values()], [*arguments], [*results], {"cse": True}
-    )
+        names, arguments = [*names, "free"], [*arguments, free]
+        results["information"] = ca.densify(sum((present[j] * psi[j, :].T @ psi[j, :] for j in range(m)), ca.SX(q, q)))
+    if options.correcting:
+        names, arguments = [*names, "gain", "reach", "seen", "there"], [*arguments, *correction]
+    return ca.Function("rpem_update", arguments, [*results.values()], names, [*results], {"cse": True})
 
 
 def _forget(covariance: ca.SX, some: ca.SX, options: UpdateOptions) -> ca.SX:
@@ -126,12 +116,11 @@ def _correct(
     psi: ca.SX,
     residual: ca.SX,
     present: ca.SX,
-    drives: Sequence[int],
     free: ca.SX | None,
 ) -> tuple[ca.SX, ca.SX]:
     """(lupdate) and (thetaupdate) one output at a time: the same as the block form, without a matrix inverse."""
     updated, theta_next = forgotten, theta
-    for j in drives:
+    for j in range(residual.numel()):
         row = psi[j, :]
         gain = present[j] * (updated @ row.T) / (1 + row @ updated @ row.T)
         gain = gain if free is None else free @ gain
@@ -141,6 +130,26 @@ def _correct(
         left = ca.SX.eye(theta.numel()) - gain @ row
         updated = left @ updated @ left.T + gain @ gain.T
     return theta_next, (updated + updated.T) / 2
+
+
+def _correct_state(
+    setup: Setup, names: Sequence[str], x: ca.SX, S: ca.SX, y: ca.SX, slope: ca.SX
+) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+    """State and sensitivity (nx, q) moved by the errors of c outputs, and the arguments gain, reach, seen, there."""
+    rows = setup.model.indices("outputs", names)
+    c, nx = len(rows), x.numel()
+    gain, (reach, seen, there) = ca.SX.sym("gain", nx, c), (ca.SX.sym(name, c) for name in ("reach", "seen", "there"))
+    for i, row in enumerate(rows):
+        error = seen[i] - y[row]
+        x += there[i] * gain[:, i] * ca.fmin(ca.fmax(error, -reach[i]), reach[i])
+        S -= there[i] * (ca.fabs(error) < reach[i]) * gain[:, i] @ slope[row, :]
+    return x, S, [gain, reach, seen, there]
+
+
+def _within_range(setup: Setup, x: ca.SX) -> ca.SX:
+    """States within their physical range: a wrong instrument must not push a mass below zero."""
+    lower, upper = (ca.DM([getattr(state, bound) for state in setup.model.states]) for bound in ("lower", "upper"))
+    return ca.fmin(ca.fmax(x, lower), upper)
 
 
 def _prediction(setup: Setup, gradient: Gradient) -> ca.Function:

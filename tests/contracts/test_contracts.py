@@ -26,6 +26,7 @@ ESTIMATOR_CASES: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for n
     "mhe": ("mhe", {"window_s": 12, "solve_every_s": 4}),  # a window that fills and moves within the short record
     "rpem-central": ("rpem", {"gradient": "central"}),
     "rpem-never-frozen": ("rpem_full", {"freeze_s": None}),
+    "rpem-corrected": ("rpem_full", {"correct_state": {"level": 5e-4, "tails_flow": 5e-7}}),
 }
 
 

@@ -21,6 +21,9 @@ WRONG_VALUES: list[tuple[str, dict[str, Any], str]] = [
     ("rpem", {"forget_to": 0.0}, "forget_to"),
     ("rpem", {"freeze_s": 60.0}, "forget_to"),
     ("rpem_full", {"freeze_s": 0.0}, "freeze_s"),
+    ("rpem", {"correct_state": {"leval": 1e-3}}, "did you mean 'level'"),
+    ("rpem", {"correct_state": {"level": 0.0}}, "level"),
+    ("rpem", {"correct_state": {"level": 1e-3}, "state_noise": 0.0}, "state_noise"),
     ("pem", {"initial_state": "stedy"}, "did you mean 'steady'"),
     ("pem", {"initial_state": "estimated", "free": ["leval"]}, "did you mean 'level'"),
 ]
