@@ -213,7 +213,9 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     model, best = after.model, judgement.best
     std = dict(zip(after.names, after.std(), strict=True))
     meanings = {(k.site, k.driver): k.meaning for k in model.known_effects}
-    unlisted = "no known effect of that kind" if meanings else "named by the model's own site and driver"
+    unlisted = (
+        "not listed among the effects known for this model" if meanings else "named by the model's own site and driver"
+    )
     found = []
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
