@@ -11,6 +11,7 @@ from adaptive_flot.report import compare, distributions, figures, series, tables
 from adaptive_flot.report.closed_loop_pictures import Sections, closed_loop_sections
 from adaptive_flot.report.fault_table import fault_table
 from adaptive_flot.report.findings import below_published, candidates, findings
+from adaptive_flot.report.limit import LimitPart, limit_part
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Panel
 from adaptive_flot.report.series import Case
@@ -33,6 +34,7 @@ class Chapter:
     course: Sections
     parameters: Picture
     parameter_table: Table
+    limit: LimitPart | None
     outputs: Picture
     residuals: list[Picture]
     innovation_table: Table
@@ -126,6 +128,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         course=course,
         parameters=parameters,
         parameter_table=tables.parameter_table(case),
+        limit=limit_part(case, album),
         outputs=outputs,
         residuals=_residuals(case, album),
         spread=spread,

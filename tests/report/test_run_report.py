@@ -65,7 +65,7 @@ def test_page_is_self_contained(result: Result, tmp_path: Path) -> None:
     links = Links()
     links.feed(text)
     assert (links.fetched, links.scripts) == ([], 0)
-    assert links.images == 8  # four a scenario: two seeds are too few for a distribution
+    assert links.images == 10  # five a scenario: two seeds are too few for a distribution
     assert len(text) < 3_000_000
     assert "adaptive-flot run x --seed 1" in text
     assert "2 seeds (1, 2)" in text
