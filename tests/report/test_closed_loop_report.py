@@ -110,7 +110,7 @@ def test_page_of_a_closed_loop(result: Result) -> None:
     links = Links()
     links.feed(page)
     # plane and spread of the comparison, operation, plans, strip, parameters, outputs, residuals
-    assert (links.fetched, links.scripts, links.images) == ([], 0, 8)
+    assert (links.fetched, links.scripts, links.images) == ([], 0, 9)
     for text in ("Plans and what happened", "Statuses over time", "Value [cu/h]", "ok 4"):
         assert text in page
 
