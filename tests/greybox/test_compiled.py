@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic, sleep
 
 import casadi as ca
 import numpy as np
@@ -22,6 +22,7 @@ from adaptive_flot.greybox.stepper import Stepper
 from adaptive_flot.plugins import ESTIMATORS, load
 from adaptive_flot.protocols import Estimate, Prior, Sample, Setup
 from adaptive_flot.testing.cases import estimator_case, run_estimator
+from estimators.rpem import Rpem
 
 NAMES = ("growth_exponent", "coalescence_rate")
 PROBLEM = compiler_problem()
@@ -94,6 +95,20 @@ def test_filters_are_those_of_the_plain_filter(clock: Model, name: str) -> None:
         ] * (1 if name == "ekf" else 3)
         runs.append(run_estimator(estimator, estimator.init(prior), samples)[1])
     same_estimates(*runs)
+
+
+@needs_compiler
+def test_whole_records_are_those_of_the_plain_estimator(clock: Model) -> None:
+    """The loop over the samples is compiled too."""
+    time = np.linspace(0.1, 25.0, 250)
+    y = (2.0 * np.sin(time) + 2.0 * time)[:, None]
+    prior = Prior(0.0, np.zeros(1), np.array([1.8]), np.array([[0.04]]), np.array([0.01]))
+    tracks = []
+    for candidate in (clock, replace(clock, compiled=True)):
+        estimator = Rpem(Setup(candidate, 0.1, ("k",), ("y",)))
+        tracks.append(estimator.track(estimator.init(prior), time, np.ones((250, 1)), y))
+    for what in ("parameters", "state", "prediction", "covariance"):
+        same(getattr(tracks[1], what), getattr(tracks[0], what))
 
 
 def same_estimates(plain: Sequence[Estimate], quick: Sequence[Estimate]) -> None:
@@ -172,9 +187,9 @@ def test_processes_that_want_the_same_function_at_once(tmp_path: Path) -> None:
         subprocess.Popen([sys.executable, "-c", RACER, str(tmp_path), str(i)], stderr=subprocess.PIPE, text=True)
         for i in range(4)
     ]
-    end = time.monotonic() + 60
-    while len(list(tmp_path.glob("ready-*"))) < len(racers) and time.monotonic() < end:
-        time.sleep(0.01)
+    end = monotonic() + 60
+    while len(list(tmp_path.glob("ready-*"))) < len(racers) and monotonic() < end:
+        sleep(0.01)
     (tmp_path / "go").touch()
     errors = [racer.communicate(timeout=60)[1] for racer in racers]
     assert [racer.returncode for racer in racers] == [0] * len(racers), errors
