@@ -23,9 +23,9 @@ from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot.greybox.compiled import compiler_problem
+from adaptive_flot.greybox.rows import core_count
 from adaptive_flot.studies import sweep as module
 from adaptive_flot.studies import worker
-from adaptive_flot.studies.cluster import core_count
 from adaptive_flot.studies.study_file import Study, load_study
 
 SIMULATED = (2, 8, 32)

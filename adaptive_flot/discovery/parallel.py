@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any, TypeVar
+
+from adaptive_flot.greybox.rows import core_count
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -50,4 +51,4 @@ def parallel_map(
 
 def available_processes() -> int:
     """Cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return core_count()

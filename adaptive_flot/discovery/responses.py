@@ -16,6 +16,7 @@ from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.rows import over_rows
 from adaptive_flot.greybox.stepper import Stepper
 
 ROWS_AT_ONCE = 500
@@ -76,7 +77,7 @@ class Responses:
         for start in range(0, n, ROWS_AT_ONCE):
             rows = slice(start, min(start + ROWS_AT_ONCE, n))
             count = rows.stop - rows.start
-            call = mapped.setdefault(count, function.map(count))
+            call = mapped.setdefault(count, over_rows(function, count))
             found = call(self.states[rows].T, record.time[rows], record.inputs[1:][rows].T, p)
             for target, value, height, width in (
                 (self._A, found[2], nx, nx),

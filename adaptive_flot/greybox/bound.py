@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.rows import over_rows
 from adaptive_flot.greybox.stepper import Stepper
 
 CHUNK = 500
@@ -69,7 +70,7 @@ def linearise(
     model, dt, rows = stepper.model, stepper.dt, len(inputs)
     key = ("bound", dt, stepper.substeps, tuple(wrt))
     if key not in model.kept:
-        model.kept[key] = stepper.one_step_jacobians(wrt).map(CHUNK)
+        model.kept[key] = over_rows(stepper.one_step_jacobians(wrt), CHUNK)
     nx, ny, q = len(model.states), len(model.outputs), len(wrt)
     F, H = np.empty((rows, nx, nx + q)), np.empty((rows, ny, nx + q))
     time = t0 + dt * np.arange(rows)

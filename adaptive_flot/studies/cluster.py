@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,14 +12,10 @@ import dask
 from distributed import Client, LocalCluster
 
 from adaptive_flot.errors import StudyError
+from adaptive_flot.greybox.rows import core_count
 
 CONNECT_S = 15.0
 """Longest wait for a scheduler to answer and for its first worker to be there."""
-
-
-def core_count() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
