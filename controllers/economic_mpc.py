@@ -21,9 +21,12 @@ from adaptive_flot.protocols import (
     Status,
     full_parameters,
 )
-from controllers.collocation import MOVED, Arguments, Bounds, Problem
+from controllers.collocation import Problem
 from controllers.grade_bias import GradeBias
-from controllers.nlp_solvers import FailingSolver, Solution, Solver, Verdict
+from controllers.layout import MOVED, Bounds
+from controllers.nlp_solvers import FailingSolver, Solver, make_solver
+from controllers.stage import Arguments
+from controllers.verification import Solution, Verdict
 from controllers.widening import widened
 
 VALUE_SCALE = 1000.0
@@ -120,7 +123,8 @@ class EconomicMpc:
                 raise ModelError(f"economic_mpc moves {name!r}; give its range and its largest move in 'limits'")
         self.setup = setup
         self.problem = Problem(setup.model, horizon, move_s)
-        self.solver: Solver | FailingSolver = Solver(self.problem, solver, budget_s)
+        self.layout = self.problem.layout
+        self.solver: Solver = make_solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
         self.grade_limit = setup.limits.grade + backoff
         self._prices = VALUE_SCALE * np.array([*setup.prices.values(), move_cost, grade_penalty])
@@ -130,7 +134,7 @@ class EconomicMpc:
             moves=np.array([limits.moves[name] for name in MOVED]),
             level=np.array(limits.level),
         )
-        self._solver_bounds = self.problem.bounds(self._bounds)
+        self._solver_bounds = self.layout.bounds(self._bounds)
         self._bias = GradeBias(setup.model.index("outputs", "concentrate_grade"), setup.dt, bias_time_s)
         self._ode = FastCall(setup.model.ode)
         self._grades = FastCall(self.problem.grades)
@@ -154,7 +158,7 @@ class EconomicMpc:
         state = replace(state, bias=state.bias + self._bias.change(known, again))
         if state.plan is None or len(self.setup.model.states) == len(before.setup.model.states):
             return state
-        plan = widened(state.plan, before.problem, self.problem, again[-1].state)
+        plan = widened(state.plan, before.layout, self.layout, again[-1].state)
         return replace(state, plan=plan, multipliers=None)
 
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
@@ -166,10 +170,10 @@ class EconomicMpc:
             return replace(state, inputs=inputs), Decision(inputs.copy(), Status.OK, "schedule")
         held = sample.inputs.copy()  # the newest of the disturbances
         if state.inputs is not None:
-            held[self.problem.moved] = state.inputs[self.problem.moved]
+            held[self.layout.moved] = state.inputs[self.layout.moved]
         if sample.time < state.due - 1e-9:
             return replace(state, inputs=held.copy()), Decision(held.copy(), Status.OK, "economic_mpc")
-        state = replace(state, due=max(state.due, sample.time) + self.problem.move_s)
+        state = replace(state, due=max(state.due, sample.time) + self.layout.move_s)
         return self._optimise(state, held, sample, estimate)
 
     def _listen(self, state: MpcState, estimate: Estimate | None) -> MpcState:
@@ -181,7 +185,7 @@ class EconomicMpc:
     def _optimise(
         self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
     ) -> tuple[MpcState, Decision]:
-        model, moved = self.setup.model, self.problem.moved
+        model, moved = self.setup.model, self.layout.moved
         theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
         others = np.delete(held, moved)
         now = Arguments(
@@ -191,11 +195,11 @@ class EconomicMpc:
         if solution.verdict is Verdict.VALID:
             plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
             expected = self._plan(estimate.time, solution, now)
-            first = self.problem.inputs_of(solution.variables)[0]
+            first = self.layout.inputs_of(solution.variables)[0]
             return self._apply(plan, held, first, status, solution, expected)
-        if state.plan is not None and state.age + 1 < self.problem.horizon:
+        if state.plan is not None and state.age + 1 < self.layout.horizon:
             older = replace(state, age=state.age + 1)
-            planned = self.problem.inputs_of(state.plan)[older.age]
+            planned = self.layout.inputs_of(state.plan)[older.age]
             return self._apply(older, held, planned, Status.SHIFTED_PLAN, solution)
         if np.isfinite(held).all():
             return self._apply(state, held, held[moved], Status.HELD, solution)
@@ -206,17 +210,19 @@ class EconomicMpc:
     ) -> tuple[Solution, Status]:
         """Warm from the last plan, then once cold."""
         z = self._ode(estimate.time, estimate.state, held, theta)[3]
-        cold = self.problem.start(estimate.state, held[self.problem.moved], z)
+        cold = self.layout.start(estimate.state, held[self.layout.moved], z)
         if state.plan is None or state.age > 0:  # what is left of a plan from before a failure is no start
             return self.solver(now, self._solver_bounds, cold), Status.OK
-        solution = self.solver(now, self._solver_bounds, self.problem.shifted(state.plan), state.multipliers)
+        shifted = self.layout.shifted(state.plan)
+        multipliers = self.layout.shifted_multipliers(state.multipliers) if state.multipliers else None
+        solution = self.solver(now, self._solver_bounds, shifted, multipliers)
         if solution.verdict is Verdict.VALID or solution.seconds > self.budget_s:
             return solution, Status.OK
         return self.solver(now, self._solver_bounds, cold), Status.RETRIED
 
     def _plan(self, time: float, solution: Solution, now: FloatArray) -> Plan:
-        inputs = self.problem.inputs_of(solution.variables)
-        ends = time + self.problem.move_s * np.arange(1.0, self.problem.horizon + 1)
+        inputs = self.layout.inputs_of(solution.variables)
+        ends = time + self.layout.move_s * np.arange(1.0, self.layout.horizon + 1)
         (grade,) = self._grades(solution.variables, now)
         return Plan(ends, {name: inputs[:, i] for i, name in enumerate(MOVED)}, grade)
 
@@ -231,7 +237,7 @@ class EconomicMpc:
     ) -> tuple[MpcState, Decision]:
         inputs = held.copy()
         low, high = self._bounds.inputs.T
-        inputs[self.problem.moved] = np.clip(moved, low, high)  # a valid solution may miss a bound by its tolerance
+        inputs[self.layout.moved] = np.clip(moved, low, high)  # a valid solution may miss a bound by its tolerance
         who = {Status.OK: "economic_mpc", Status.RETRIED: "economic_mpc"}.get(status, status.name.lower())
         decision = Decision(inputs.copy(), status, who, solution.seconds, solution.message, plan)
         return replace(state, inputs=inputs), decision

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.collocation import DEGREE, MOVED, Problem
+from controllers.layout import DEGREE, MOVED, SLACKS, Layout
 
 
-def widened(solution: FloatArray, before: Problem, after: Problem, state: FloatArray) -> FloatArray:
+def widened(solution: FloatArray, before: Layout, after: Layout, state: FloatArray) -> FloatArray:
     """Variables of `after` (n,) from those of `before`: the same inputs and states, the further states as in `state`.
 
     Parameters
@@ -18,7 +18,7 @@ def widened(solution: FloatArray, before: Problem, after: Problem, state: FloatA
     solution
         Scaled variables of `before`.
     before, after
-        The problems; the states of `after` are those of `before` and then further ones.
+        Of the problems; the states of `after` are those of `before` and then further ones.
     state
         State of the model of `after` (nx,), whose further states stay as they are over the horizon.
     """
@@ -30,7 +30,7 @@ def widened(solution: FloatArray, before: Problem, after: Problem, state: FloatA
         holding_states = {0, *range(4, len(sizes), 2)}
         return np.concatenate([np.concatenate([p, more]) if i in holding_states else p for i, p in enumerate(parts)])
 
-    block = sum(before.stage_sizes)
-    stage = [nx, nu, nu, 2, *[nx, nz] * DEGREE]
+    block = before.block
+    stage = [nx, nu, nu, SLACKS, *[nx, nz] * DEGREE]
     stages = [wider(solution[k * block : (k + 1) * block], stage) for k in range(before.horizon)]
     return np.concatenate([*stages, wider(solution[before.horizon * block :], [nx, nu])])

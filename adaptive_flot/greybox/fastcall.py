@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -74,6 +75,10 @@ class FastCall:
         else:
             self._evaluate_quietly()
         return tuple([result.copy() for result in self._results])
+
+    def stats(self) -> dict[str, Any]:
+        """What a solver or integrator tells of its last evaluation."""
+        return dict(self._buffer.stats())
 
     def _evaluate_quietly(self) -> None:
         """An integrator may give up: then the results are NaN, and what it prints of its troubles is not shown."""

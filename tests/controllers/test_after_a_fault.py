@@ -57,7 +57,7 @@ def test_after_ten_failed_moves_it_decides_as_a_fresh_controller(
         state, decision = solver.decide(state, replace(sample, time=now), told)
         assert decision.status in (Status.SHIFTED_PLAN, Status.HELD) and np.isfinite(decision.inputs).all()
         low, high = case.controller._bounds.inputs.T
-        moved = decision.inputs[case.controller.problem.moved]
+        moved = decision.inputs[case.controller.layout.moved]
         assert (moved >= low).all() and (moved <= high).all()
     now = 30.0 * (STEPS + 1)
     sample, estimate = replace(sample, time=now), replace(estimate, time=now)

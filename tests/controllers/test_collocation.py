@@ -7,8 +7,11 @@ import pytest
 
 from adaptive_flot.economics import Prices, value_rates
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
-from controllers.collocation import Arguments, Bounds, Problem
-from controllers.nlp_solvers import SOLVERS, Solver, Verdict, verify
+from controllers.collocation import Problem
+from controllers.layout import Bounds
+from controllers.nlp_solvers import SOLVERS, make_solver
+from controllers.stage import Arguments
+from controllers.verification import Verdict, Verifier
 
 MOVE_S, HORIZON = 30.0, 8
 PRICES = 1000 * np.array([*Prices().values(), 1e-3, 1e-3])
@@ -37,34 +40,35 @@ def arguments(model: Model, **changes: object) -> FloatArray:
 def cold(problem: Problem, model: Model) -> FloatArray:
     x = steady_state(model, HELD).state
     gas = np.array([HELD[0] / model.parameter_values[model.index("parameters", "A")]])
-    return problem.start(x, HELD[[0, 2]], gas)
+    return problem.layout.start(x, HELD[[0, 2]], gas)
 
 
 def test_the_plan_is_what_the_cell_does(problem: Problem, model: Model) -> None:
     """States of the plan against the fast step under the planned inputs: the collocation error of 30 s moves."""
-    found = Solver(problem, "ipopt", 10.0)(arguments(model), problem.bounds(BOUNDS), cold(problem, model))
+    found = make_solver(problem, "ipopt", 10.0)(arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model))
     assert found.verdict is Verdict.VALID
-    inputs = problem.inputs_of(found.variables)
+    inputs = problem.layout.inputs_of(found.variables)
     held = np.column_stack([inputs[:, 0], np.full(HORIZON, HELD[1]), inputs[:, 1]])
     run = Stepper(model, 1.0).simulate(steady_state(model, HELD).state, np.repeat(held, int(MOVE_S), axis=0))
-    block = sum(problem.stage_sizes)
-    planned = np.array([found.variables[k * block : k * block + 9] * problem.x_scale for k in range(1, HORIZON)])
+    block = problem.layout.block
+    planned = np.array([found.variables[k * block : k * block + 9] * problem.layout.x_scale for k in range(1, HORIZON)])
     done = run.states[int(MOVE_S) - 1 :: int(MOVE_S)][: HORIZON - 1]
     np.testing.assert_allclose(planned / done, 1.0, atol=3e-3)
 
 
 def test_both_solvers_find_the_same_plan(problem: Problem, model: Model) -> None:
-    now, bounds, first = arguments(model), problem.bounds(BOUNDS), cold(problem, model)
-    plans = [problem.inputs_of(Solver(problem, name, 10.0)(now, bounds, first).variables) for name in SOLVERS]
+    now, bounds, first = arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model)
+    plans = [
+        problem.layout.inputs_of(make_solver(problem, name, 10.0)(now, bounds, first).variables) for name in SOLVERS
+    ]
     np.testing.assert_allclose(plans[0] / plans[1], 1.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_nothing_is_rebuilt_when_an_argument_changes(problem: Problem, model: Model, solver: str) -> None:
     """Estimate, state, previous inputs, disturbance, limit, bias, prices and bounds are arguments of one function."""
-    built = Solver(problem, solver, 10.0)
-    function = built._solve
-    plain = built(arguments(model), problem.bounds(BOUNDS), cold(problem, model))
+    built = make_solver(problem, solver, 10.0)
+    plain = built(arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model))
     theta = model.parameter_values.copy()
     theta[model.index("parameters", "C")] *= 1.1
     for changes in (
@@ -75,30 +79,32 @@ def test_nothing_is_rebuilt_when_an_argument_changes(problem: Problem, model: Mo
         {"prices": PRICES * np.array([1, 1, 3e4, 1, 1, 1])},
         {"previous": np.array([1.2e-3, 0.38])},
     ):
-        other = built(arguments(model, **changes), problem.bounds(BOUNDS), cold(problem, model))
+        other = built(arguments(model, **changes), problem.layout.bounds(BOUNDS), cold(problem, model))
         assert other.verdict is Verdict.VALID
-        assert not np.allclose(problem.inputs_of(other.variables), problem.inputs_of(plain.variables), rtol=1e-4)
+        assert not np.allclose(
+            problem.layout.inputs_of(other.variables), problem.layout.inputs_of(plain.variables), rtol=1e-4
+        )
     narrow = Bounds(np.array([[9.05e-4, 1.5e-3], [0.33, 0.42]]), BOUNDS.moves, BOUNDS.level)
-    other = built(arguments(model), problem.bounds(narrow), cold(problem, model))
-    assert np.max(problem.inputs_of(other.variables)[:, 0]) <= 1.5e-3 * (1 + 1e-4)
-    assert built._solve is function
+    other = built(arguments(model), problem.layout.bounds(narrow), cold(problem, model))
+    assert np.max(problem.layout.inputs_of(other.variables)[:, 0]) <= 1.5e-3 * (1 + 1e-4)
 
 
 def test_plans_keep_bounds_and_moves(problem: Problem, model: Model) -> None:
-    found = Solver(problem, "fatrop", 10.0)(arguments(model), problem.bounds(BOUNDS), cold(problem, model))
-    inputs = np.vstack([HELD[[0, 2]], problem.inputs_of(found.variables)])
+    found = make_solver(problem, "fatrop", 10.0)(arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model))
+    inputs = np.vstack([HELD[[0, 2]], problem.layout.inputs_of(found.variables)])
     assert np.all(np.abs(np.diff(inputs, axis=0)) <= BOUNDS.moves * (1 + 1e-3))
     assert np.all(inputs[1:] >= BOUNDS.inputs[:, 0] * (1 - 1e-4)) and np.all(inputs <= BOUNDS.inputs[:, 1] * (1 + 1e-4))
 
 
 def test_verification_catches_what_a_solver_may_return(problem: Problem, model: Model) -> None:
-    bounds, now, start = problem.bounds(BOUNDS), arguments(model), cold(problem, model)
-    good = Solver(problem, "ipopt", 10.0)(now, bounds, start).variables
-    assert verify(problem, good, now, bounds) == (Verdict.VALID, "")
-    assert verify(problem, good * np.nan, now, bounds)[0] is Verdict.NOT_FINITE
+    bounds, now, start = problem.layout.bounds(BOUNDS), arguments(model), cold(problem, model)
+    good = make_solver(problem, "ipopt", 10.0)(now, bounds, start).variables
+    verify = Verifier(problem)
+    assert verify(good, now, bounds) == (Verdict.VALID, "")
+    assert verify(good * np.nan, now, bounds)[0] is Verdict.NOT_FINITE
     outside = good.copy()
-    outside[sum(problem.stage_sizes) + 9] += 5.0  # an input of the second stage, far beyond its bound and its moves
-    verdict, message = verify(problem, outside, now, bounds)
+    outside[problem.layout.block + 9] += 5.0  # an input of the second stage, far beyond its bound and its moves
+    verdict, message = verify(outside, now, bounds)
     assert verdict is Verdict.VIOLATED
     assert "air_flow" in message and message.count(";") <= 5
 
@@ -106,7 +112,9 @@ def test_verification_catches_what_a_solver_may_return(problem: Problem, model: 
 def test_an_infeasible_problem_names_the_worst_constraints(problem: Problem, model: Model) -> None:
     """A range of the set-point that no allowed move reaches: the verdict is not VALID, the message says what breaks."""
     impossible = Bounds(np.array([BOUNDS.inputs[0], [0.40, 0.42]]), BOUNDS.moves, BOUNDS.level)
-    found = Solver(problem, "ipopt", 5.0)(arguments(model), problem.bounds(impossible), cold(problem, model))
+    found = make_solver(problem, "ipopt", 5.0)(
+        arguments(model), problem.layout.bounds(impossible), cold(problem, model)
+    )
     assert found.verdict is Verdict.VIOLATED
     assert "level_setpoint" in found.message and " by " in found.message
 

@@ -13,7 +13,7 @@ from adaptive_flot.greybox import Stepper
 from adaptive_flot.protocols import ControllerSetup, Decision, Status, full_parameters
 from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc import EconomicMpc, MpcState
-from controllers.nlp_solvers import Solution, Verdict
+from controllers.verification import Solution, Verdict
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_a_failed_solve_plays_the_plan_then_holds(case: ControllerCase, monkeypa
     assert isinstance(controller, EconomicMpc)
     state, _ = run(case, start(case), slice(0, 1))
     assert state.plan is not None
-    planned = controller.problem.inputs_of(state.plan)
+    planned = controller.layout.inputs_of(state.plan)
     monkeypatch.setattr(controller, "solver", broken("no luck"))
     low, high = controller._bounds.inputs.T
     before = np.empty(3)
@@ -84,7 +84,7 @@ def test_a_failed_solve_plays_the_plan_then_holds(case: ControllerCase, monkeypa
         assert decision.message == "no luck" and np.isfinite(decision.inputs).all()
         if k < 6:
             assert decision.status is Status.SHIFTED_PLAN
-            np.testing.assert_allclose(decision.inputs[controller.problem.moved], np.clip(planned[k], low, high))
+            np.testing.assert_allclose(decision.inputs[controller.layout.moved], np.clip(planned[k], low, high))
         else:
             assert decision.status is Status.HELD
             np.testing.assert_array_equal(decision.inputs, before)

@@ -7,8 +7,10 @@ import pytest
 
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
 from adaptive_flot.greybox.effects import Effect
-from controllers.collocation import Arguments, Problem
-from controllers.nlp_solvers import SOLVERS, Solver, Verdict
+from controllers.collocation import Problem
+from controllers.nlp_solvers import SOLVERS, make_solver
+from controllers.stage import Arguments
+from controllers.verification import Verdict
 from tests.controllers.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES
 
 NOW = 360.0
@@ -27,9 +29,11 @@ def plan(problem: Problem, solver: str, time: float = NOW, bias: float = 0.0) ->
     x0 = steady_state(model, HELD, time=time).state
     now = Arguments(x0, HELD[[0, 2]], model.parameter_values, HELD[[1]], 0.2, bias, PRICES, time).vector()
     gas = np.array([HELD[0] / model.parameter_values[model.index("parameters", "A")]])
-    found = Solver(problem, solver, 10.0)(now, problem.bounds(BOUNDS), problem.start(x0, HELD[[0, 2]], gas))
+    found = make_solver(problem, solver, 10.0)(
+        now, problem.layout.bounds(BOUNDS), problem.layout.start(x0, HELD[[0, 2]], gas)
+    )
     assert found.verdict is Verdict.VALID, found.message
-    return problem.inputs_of(found.variables), np.array(problem.grades(found.variables, now)).ravel()
+    return problem.layout.inputs_of(found.variables), np.array(problem.grades(found.variables, now)).ravel()
 
 
 def simulated(model: Model, inputs: FloatArray) -> FloatArray:
