@@ -12,6 +12,7 @@ from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.experiment import leading, plan_experiment
 from adaptive_flot.discovery.fit import Fit, Fitter
 from adaptive_flot.discovery.gate import Gate, gate
+from adaptive_flot.discovery.joint import search_jointly, wants_joint
 from adaptive_flot.discovery.noise import proportional
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
@@ -112,6 +113,9 @@ def discover(
         return Discovery(_insufficient(replace(checked, reasons=(reason,)), began), model, checked)
     problem, base = prepared
     found = search(problem, base, model, processes=processes, progress=progress)
+    if wants_joint(problem, found):
+        problem, found = search_jointly(problem, found, processes=processes, progress=progress)
+        base = found.base
     judgement = judge(found)
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)

@@ -12,7 +12,7 @@ from typing import cast
 
 import numpy as np
 
-from adaptive_flot.discovery.noise import CLIP, MOST_LAGS, Noise, fit_noise
+from adaptive_flot.discovery.noise import Noise
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -91,10 +91,10 @@ def loss_of(
 ) -> tuple[float, Noise]:
     """Minus two log-likelihood on some rows; with the noise model given, or fitted to these rows."""
     weighted = (problem.measured - predicted) / problem.weights
-    noise = noise or fit_noise(weighted, rows, problem.floor, MOST_LAGS if problem.whiten else 0)
+    noise = noise or problem.noise(weighted, rows)
     e = noise.whiten(weighted)[rows]
     present = np.isfinite(e)
-    squares = np.minimum(np.abs(np.where(present, e, 0)), CLIP) ** 2
+    squares = np.minimum(np.abs(np.where(present, e, 0)), problem.clip) ** 2
     return float(np.sum(squares) + 2 * np.sum(np.log(noise.std) * present.sum(axis=0))), noise
 
 
@@ -242,7 +242,7 @@ class _Search:
         return y[:, columns], dy[:, columns, :]
 
     def _objective(self, z: FloatArray, predicted: FloatArray, noise: Noise) -> float:
-        if not np.isfinite(predicted).all():
+        if not np.all(np.abs(predicted) < 1e100):
             return np.inf
         value = loss_of(self.problem, predicted, self.fitter.rows, noise)[0]
         return value + float(np.sum(((z - self.prior_centre) / self.prior) ** 2))
@@ -254,7 +254,7 @@ class _Search:
             self._turn(self._telling_directions())
         z = self.centre.copy()
         predicted, slope = self._jacobian(z)
-        if not (np.isfinite(predicted).all() and np.isfinite(slope).all()):
+        if not (np.isfinite(predicted).all() and _moderate(slope)):
             return None
         noise = self._first_noise()
         for turn in range(rounds):
@@ -313,7 +313,7 @@ class _Search:
             if gained < max(TOLERANCE, SLOW * (first - value)):
                 break
             predicted, fresh = self._jacobian(z)
-            if not np.isfinite(fresh).all():
+            if not _moderate(fresh):
                 break
             slope = fresh
         return z, predicted, slope
@@ -326,7 +326,7 @@ class _Search:
         e = noise.whiten((self.problem.measured - predicted) / w)[rows]
         J = noise.whiten(slope / w[:, :, None])[rows]
         present = np.isfinite(e)
-        inside = present & (np.abs(np.where(present, e, 0)) <= CLIP)
+        inside = present & (np.abs(np.where(present, e, 0)) <= self.problem.clip)
         e = np.where(inside, e, 0)[inside]
         J = J[inside]
         prior = 1 / self.prior**2
@@ -377,6 +377,11 @@ class _Search:
             loss + float(penalty),
             self.directions,
         )
+
+
+def _moderate(slope: FloatArray) -> bool:
+    """Whether a derivative can be squared: a run near the edge of stability has larger ones."""
+    return bool(np.all(np.abs(slope) < 1e100))
 
 
 def _alike(a: Noise, b: Noise) -> bool:

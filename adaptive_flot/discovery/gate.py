@@ -54,7 +54,7 @@ def gate(record: Dataset, model: Model) -> Gate:
     reasons: list[str] = []
     for j, q in enumerate(model.outputs):
         if np.isfinite(outputs[:, j]).any():
-            notes += _clean(outputs[:, j], q.name)
+            notes += _clean(outputs[:, j], q.name, q.name in model.edges)
     measured = [q.name for j, q in enumerate(model.outputs) if np.isfinite(outputs[:, j]).any()]
     usable = int(np.isfinite(outputs).any(axis=1).sum())
     if not measured:
@@ -82,8 +82,8 @@ def _flat(y: FloatArray) -> bool:
     return seen.size == 0 or float(np.ptp(seen)) == 0.0
 
 
-def _clean(y: FloatArray, name: str) -> list[str]:
-    """Set unusable samples of one output to NaN, in place; say what they were."""
+def _clean(y: FloatArray, name: str, edges: bool = False) -> list[str]:
+    """Set unusable samples of one output to NaN, in place; say what they were. `edges`: the process may stay at one."""
     notes = []
     present = np.flatnonzero(np.isfinite(y))
     values = y[present]
@@ -97,6 +97,9 @@ def _clean(y: FloatArray, name: str) -> list[str]:
     for edge, word in ((values.max(), "highest"), (values.min(), "lowest")):
         at = np.isclose(y, edge, rtol=0, atol=1e-9 * float(np.ptp(values)))
         if at.sum() > max(CLIPPED_SHARE * len(values), 5) and len(np.unique(values)) > 0.2 * len(values):
+            if edges:
+                notes.append(f"{name}: {int(at.sum())} samples at the {word} value kept, as the process may stay there")
+                continue
             y[at] = np.nan
             notes.append(f"{name}: {int(at.sum())} samples clipped at the {word} value left out")
     values = y[np.isfinite(y)]

@@ -60,11 +60,13 @@ class Noise:
         return np.array(found)
 
 
-def clipped_std(e: FloatArray) -> float:
+def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
     """Return the standard deviation of the finite entries, each counted up to CLIP of it (Huber's proposal 2)."""
     z = e[np.isfinite(e)]
     if z.size == 0:
         return float("nan")
+    if not robust:
+        return float(np.sqrt(np.mean(z**2)))
     std = 1.4826 * float(np.median(np.abs(z))) or float(np.sqrt(np.mean(z**2)))
     for _ in range(30):
         if std <= 0:
@@ -76,20 +78,26 @@ def clipped_std(e: FloatArray) -> float:
     return std
 
 
-def fit_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray, orders: int = MOST_LAGS) -> Noise:
+def white_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray) -> Noise:
+    """White noise with the plain standard deviation of a weighted residual (N, m) on some rows (N,)."""
+    std = np.array([clipped_std(r[rows], robust=False) for r in residual.T])
+    return Noise(np.maximum(std, floor), np.zeros((len(std), MOST_LAGS)))
+
+
+def fit_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray) -> Noise:
     """Noise model of a weighted residual (N, m), fitted on the rows (N,) that are true; NaN where missing.
 
-    The order of the autoregression (0 to `orders`) is chosen per output by the Bayesian information criterion. `floor`
-    (m,) is the smallest standard deviation believed.
+    The order of the autoregression (up to MOST_LAGS) is chosen per output by the Bayesian information criterion.
+    `floor` (m,) is the smallest standard deviation believed.
     """
     m = residual.shape[1]
     lags, std = np.zeros((m, MOST_LAGS)), np.zeros(m)
     for j in range(m):
-        std[j], lags[j] = _one_output(residual[:, j], rows, orders)
+        std[j], lags[j] = _one_output(residual[:, j], rows)
     return Noise(np.maximum(std, floor), lags)
 
 
-def _one_output(r: FloatArray, rows: NDArray[np.bool_], orders: int) -> tuple[float, FloatArray]:
+def _one_output(r: FloatArray, rows: NDArray[np.bool_]) -> tuple[float, FloatArray]:
     nothing = np.zeros(MOST_LAGS)
     first = clipped_std(r[rows])
     if not first > 0:
@@ -102,7 +110,7 @@ def _one_output(r: FloatArray, rows: NDArray[np.bool_], orders: int) -> tuple[fl
     if count < FEWEST_PAIRS:
         return first, nothing
     best, chosen = np.inf, (first, nothing)
-    for order in range(orders + 1):
+    for order in range(MOST_LAGS + 1):
         a = np.zeros(MOST_LAGS)
         if order:
             a[:order] = np.linalg.lstsq(past[usable, :order], clipped[usable], rcond=None)[0]

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from adaptive_flot.discovery.noise import CLIP, Noise, fit_noise, white_noise
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
@@ -41,8 +42,8 @@ class Problem:
     floor
         Smallest noise believed (m,).
     whiten
-        Whether residuals are whitened. Not where model error outweighs the noise by far: there a noise model would
-        explain the error away, and what counts is the free run.
+        Whether residuals are whitened and clipped. Not where model error outweighs the noise by far: there a noise
+        model would explain the error away, and its largest values are the physics that is looked for.
     """
 
     record: Dataset
@@ -52,6 +53,15 @@ class Problem:
     weights: FloatArray
     floor: FloatArray
     whiten: bool = True
+
+    @property
+    def clip(self) -> float:
+        """Standard deviations up to which an innovation counts."""
+        return CLIP if self.whiten else float("inf")
+
+    def noise(self, weighted: FloatArray, rows: BoolArray) -> Noise:
+        """Noise model of a weighted residual (N, m) on some rows (N,)."""
+        return (fit_noise if self.whiten else white_noise)(weighted, rows, self.floor)
 
     @property
     def measured(self) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from adaptive_flot.discovery.catalogue import Candidate, Variant
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.noise import CLIP, Noise, fit_noise
+from adaptive_flot.discovery.noise import CLIP, Noise
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.greybox.model import FloatArray
@@ -52,6 +52,7 @@ class Scorer:
 
     def __init__(self, problem: Problem, fit: Fit, responses: Responses, candidates: list[Candidate]) -> None:
         self.problem, self.fit, self.candidates = problem, fit, candidates
+        self.drivers = responses.drivers
         self.rows = problem.rows("estimate")
         self._count = int(np.isfinite(problem.measured[self.rows]).sum())
         variants = [v for c in candidates for v in c.variants]
@@ -114,7 +115,7 @@ class Scorer:
         table = np.full(r.shape, np.nan)
         table[present] = left
         full[self.rows] = table * std
-        return fit_noise(full, self.rows, self.problem.floor)
+        return self.problem.noise(full, self.rows)
 
     def scores(self) -> list[Score]:
         """Scores of all candidates, best first."""

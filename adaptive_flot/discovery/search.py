@@ -28,9 +28,6 @@ SUBSTANCE = 0.1
 SHORTLIST_FURTHER = 5
 BEAM = 2
 """Alternatives of one round that the next extends."""
-COSTLY = 600_000
-"""Rows times squared states of a record at which the search is this narrow; a smaller one is searched more widely."""
-WIDEST = 5
 
 
 @dataclass(frozen=True)
@@ -106,24 +103,24 @@ def search(
     """
     fitter = Fitter(problem)
     progress("score")
-    scorer, sites = _scorer(problem, base)
+    scorer, sites = scorer_of(problem, base)
     rounds = [_round(problem, fitter, base, scorer, [None], processes, progress)]
     near = _near(fitter, base, nominal)
     if near is not None:
-        again, _ = _scorer(problem, near)
+        again, _ = scorer_of(problem, near)
         rounds = [_merged(rounds[0], _round(problem, fitter, base, again, [None], processes, progress))]
     accepted: list[Round] = []
     best: Alternative | None = None
-    left = _left(scorer, rounds[0].threshold)
-    while _better(problem, base, best, rounds[-1]):
+    left = what_is_left(scorer, rounds[0].threshold)
+    while better(problem, base, best, rounds[-1]):
         accepted.append(rounds[-1])
         best = rounds[-1].alternatives[0]
         progress("what is left")
-        scorer, _ = _scorer(problem, best.fit)
-        left = _left(scorer, _threshold(scorer))
+        scorer, _ = scorer_of(problem, best.fit)
+        left = what_is_left(scorer, threshold_of(scorer))
         if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left):
             break
-        beam = _beam(rounds[-1], best, BEAM * _width(problem, base))
+        beam = _beam(rounds[-1], best, BEAM)
         rounds.append(_round(problem, fitter, base, scorer, beam, processes, progress))
     return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites), accepted)
 
@@ -165,16 +162,19 @@ def _best_bic(rounds: list[Round]) -> float:
     return min(a.fit.bic for r in rounds for a in r.alternatives)
 
 
-def _scorer(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
+def scorer_of(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
+    """Scores along a fit, and the sites whose constant change is that of an adapted parameter."""
     responses = Responses(problem, fit)
     return Scorer(problem, fit, responses, catalogue(fit.model, responses)), responses.adapted_sites()
 
 
-def _threshold(scorer: Scorer) -> float:
+def threshold_of(scorer: Scorer) -> float:
+    """Penalised score that noise alone passes once in a hundred records."""
     return max(LEAST_EVIDENCE, float(np.quantile(scorer.null_gains(NULL_DRAWS, seed=0), NULL_QUANTILE)))
 
 
-def _left(scorer: Scorer, threshold: float) -> tuple[float, float]:
+def what_is_left(scorer: Scorer, threshold: float) -> tuple[float, float]:
+    """First-order gain of the best candidate that is left, and the threshold it is held against."""
     scores = scorer.scores()
     return (scores[0].gain if scores else 0.0), threshold
 
@@ -188,13 +188,13 @@ def _round(
     processes: int,
     progress: Callable[[str], None],
 ) -> Round:
-    threshold = _threshold(scorer)
+    threshold = threshold_of(scorer)
     scores = tuple(scorer.scores())
     found: list[Alternative] = []
     for k, before in enumerate(beam):
         if before is not None and k:
-            scorer, _ = _scorer(problem, before.fit)
-        wanted = shortlist(scorer, (SHORTLIST_FURTHER if before else SHORTLIST) * _width(problem, base))
+            scorer, _ = scorer_of(problem, before.fit)
+        wanted = shortlist(scorer, SHORTLIST_FURTHER if before else SHORTLIST)
         # a further effect must have a name: a pair of curves without one would explain anything
         wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
         progress("fit")
@@ -210,13 +210,7 @@ def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None
     return [best, *others[: width - 1]]
 
 
-def _width(problem: Problem, base: Fit) -> int:
-    """How much wider than the narrowest a search of this record can afford to be."""
-    cost = len(problem.record) * len(base.initial_state) ** 2
-    return int(np.clip(COSTLY // (2 * max(cost, 1)), 1, WIDEST))
-
-
-def _better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:
+def better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:
     """Whether the best alternative of a round brings evidence and, as a further effect, substance."""
     if not found.alternatives:
         return False

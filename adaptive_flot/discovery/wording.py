@@ -37,8 +37,7 @@ def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect
     if judgement.word == "named":
         return f"The model lacks this: {said}. {evidence}."
     if judgement.word == "class":
-        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
-        return f"The model lacks one of these, which this record can not tell apart: {members}. {evidence}."
+        return f"{_class_words(judgement)} {evidence}."
     if judgement.word == "unnamed":
         return f"The model lacks something without a known name: {said}. {evidence}."
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
@@ -46,3 +45,17 @@ def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
         f"none explains it well ({close}). {evidence}."
     )
+
+
+def _class_words(judgement: Judgement) -> str:
+    assert judgement.best is not None  # a class has a best member
+    sets = [a for a in (judgement.best, *judgement.rivals) if a.fit.bic - judgement.best.fit.bic < judgement.margin]
+    if all(len(a.names) == 1 for a in sets):
+        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
+        return f"The model lacks one of these, which this record can not tell apart: {members}."
+    sure = [n for n in judgement.best.names if all(n in a.names for a in sets)]
+    rest = "; ".join(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in sure) for a in sets)
+    first = "The model lacks several effects. "
+    if sure:
+        first += f"Certain: {', '.join(f'{s} by {d}' for s, d in sure)}. "
+    return f"{first}This record can not tell these apart, of which the first is kept: {rest}."

@@ -70,6 +70,7 @@ class Model:
     drivers: tuple[str, ...] = ()
     """Quantities that effects may depend on, in the order of a search; default all inputs and states."""
     known_effects: tuple[KnownEffect, ...] = ()
+    edges: tuple[str, ...] = ()
     """What a search may call by name; when empty, every site with every driver."""
     effects: tuple[Effect, ...] = ()
     """Effects attached by `with_effects`; their parameters and states follow those of the model."""

@@ -66,6 +66,7 @@ def make_model() -> Model:
         outputs=(Quantity("level", "V", "measured level of the lower tank", 0.0, 12.0, 1.0),),
         max_step_s=2.0,
         known_effects=KNOWN_EFFECTS,
+        edges=("level",),
         equations=_equations,
         initial_guess={"upper_level": 5.0, "lower_level": 5.0},
         starts_steady=False,
