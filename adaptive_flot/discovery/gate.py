@@ -90,6 +90,8 @@ def _clean(y: FloatArray, name: str, edges: bool = False) -> list[str]:
     if len(values) < FEWEST_ROWS or np.ptp(values) == 0:
         return [f"{name} is constant: left out"] if len(values) and np.ptp(values) == 0 and _blank(y) else []
     frozen = _frozen(values)
+    if edges:
+        frozen &= (values < values.max()) & (values > values.min())
     if frozen.any():
         y[present[frozen]] = np.nan
         notes.append(f"{name}: {int(frozen.sum())} samples of a frozen sensor left out")

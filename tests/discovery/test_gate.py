@@ -108,11 +108,11 @@ def test_an_input_that_hardly_moves_gives_no_driver(even: Dataset) -> None:
     assert checked.reasons == () and any("power hardly moves" in n for n in checked.notes)
 
 
-def test_a_record_in_other_units_can_not_be_simulated() -> None:
-    """Degrees Celsius in a model of kelvin: nothing is named."""
+def test_a_record_in_other_units_blames_nothing_but_the_sensor() -> None:
+    """Degrees Celsius in a model of kelvin: a thermometer with a wrong zero is the one name that would be right."""
     record = _record(lambda y: y - 273.15)
     verdict = discover(heated_tank(), record).verdict
-    assert verdict.word != "named", verdict
+    assert all((e.effect.site, e.effect.driver) == ("thermometer", "constant") for e in verdict.effects), verdict
 
 
 def test_a_model_that_breaks_down_is_insufficient() -> None:

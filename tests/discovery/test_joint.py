@@ -28,7 +28,7 @@ def record(noise: FloatArray, effects: tuple[Effect, ...] = ()) -> Dataset:
     n = len(noise)
     rng = np.random.default_rng(3)
     pump = np.repeat(rng.uniform(1.0, 4.0, n // 20 + 1), 20)[:n, None]
-    bare = Dataset("tanks", 4.0 * np.arange(n), 4.0, pump, np.full((n, 1), np.nan))
+    bare = Dataset("tanks", 4.0 * np.arange(n, dtype=float), 4.0, pump, np.full((n, 1), np.nan))
     plant = MODEL.with_effects(effects)
     y = RecordSimulator(plant, 4.0).outputs(bare, np.array([5.0, 5.0]), plant.parameter_values)
     return replace(bare, outputs=y + noise[:, None])
