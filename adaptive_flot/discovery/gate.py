@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from adaptive_flot.discovery.problem import BoolArray
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
@@ -91,7 +92,7 @@ def _clean(y: FloatArray, name: str, edges: bool = False) -> list[str]:
         return [f"{name} is constant: left out"] if len(values) and np.ptp(values) == 0 and _blank(y) else []
     frozen = _frozen(values)
     if edges:
-        frozen &= (values < values.max()) & (values > values.min())
+        frozen = np.logical_and(frozen, (values < values.max()) & (values > values.min()))
     if frozen.any():
         y[present[frozen]] = np.nan
         notes.append(f"{name}: {int(frozen.sum())} samples of a frozen sensor left out")
@@ -129,7 +130,7 @@ def _blank(y: FloatArray) -> bool:
     return True
 
 
-def _frozen(values: FloatArray) -> FloatArray:
+def _frozen(values: FloatArray) -> BoolArray:
     """Mask of samples in long runs of one value, if most other samples differ from their neighbours."""
     same = np.diff(values) == 0
     mask = np.zeros(len(values), dtype=bool)
