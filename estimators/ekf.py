@@ -86,11 +86,12 @@ class Ekf:
         if not outlier_std > 0:
             raise ModelError(f"ekf: outlier_std = {outlier_std:g}; give a positive number of standard deviations")
         self.setup = setup
+        self.outlier_std = outlier_std
         self.coordinates = Coordinates.of(setup.model, setup.parameters)
         self.layout = layout(setup, integrated=walk == "integrated")
         drift = drift_of(setup, drift_per_hour, "ekf")
         self.noise = process_noise(setup, self.coordinates, self.layout, drift, state_noise)
-        self._columns = setup.model.indices("outputs", setup.outputs)
+        self.columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
         self._step = FastCall(
             filter_step(setup, self.coordinates, self.layout, outlier_std),
@@ -104,7 +105,7 @@ class Ekf:
 
     def update(self, state: EkfState, sample: Sample) -> tuple[EkfState, Estimate]:
         """Predict, compare, correct; see `Estimator.update`."""
-        measured, driving, present = driving_outputs(sample, self._columns, len(self.setup.model.outputs))
+        measured, driving, present = driving_outputs(sample, self.columns, len(self.setup.model.outputs))
         p = self._p if sample.parameters is None else sample.parameters
         z, P, prediction, expected_std, _, flags = self._step(
             state.z, state.P, self.noise, state.time, sample.inputs, p, state.noise_std, driving, present
