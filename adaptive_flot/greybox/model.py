@@ -10,12 +10,12 @@ writes the equations into a `Scope`::
         m.output("level", m.site("level_sensor", level))
 
 Every quantity in which physics may be missing passes through a named *site*. A site returns its value unchanged;
-`Model.with_effects` attaches an
-`Effect` there without touching the equations.
+`Model.with_effects` attaches an `Effect` there without touching the equations.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -130,15 +130,16 @@ class Model:
         """
         new = list(self.parameters)
         for name, value in values.items():
-            i = self.index("parameters", name)
-            p = new[i]
+            p = new[i := self.index("parameters", name)]
             if not (np.isfinite(value) and p.lower <= value <= p.upper):
                 raise RangeError(
                     f"parameter {p.name!r} = {value:g} {p.unit} is outside its physical range "
                     f"[{p.lower:g}, {p.upper:g}] {p.unit}; give a value inside it"
                 )
             new[i] = replace(p, value=float(value))
-        return replace(self, parameters=tuple(new))
+        _, other = self.kept, copy.copy(self)  # the values are arguments of all functions: both models share these
+        object.__setattr__(other, "parameters", tuple(new))
+        return other
 
     def with_effects(self, effects: Iterable[Effect]) -> Model:
         """Return this model with further effects; coefficients become parameters, filters become states.
@@ -240,7 +241,7 @@ class Model:
 
     @cached_property
     def kept(self) -> dict[Hashable, ca.Function]:
-        """Functions derived from this model, by what they are: made at first use, shared by all that use the model."""
+        """Functions derived from this model, by what they are; shared with models of other parameter values."""
         return {}
 
     @cached_property

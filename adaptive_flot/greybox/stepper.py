@@ -86,7 +86,7 @@ class Stepper:
     @cached_property
     def call(self) -> FastCall:
         """The step as a NumPy function `(x, t, u, p) -> (x_next, y, s)`."""
-        return FastCall(self.step, as_machine_code=self._compiled)
+        return FastCall(self._ready(self.step))
 
     def outputs_at(self, state: FloatArray, time: float, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
         """Outputs and signals (ny + ns,) at one instant: the first row of a table."""
@@ -220,10 +220,15 @@ class Stepper:
         name = function.name()
 
         def make() -> ca.Function:
-            step = self._kept((name, wrt, "compiled"), lambda: compiled(function)) if self._compiled else function
-            return step.mapaccum(f"{name}_x{rows}", rows, carried)
+            return self._ready(function, wrt).mapaccum(f"{name}_x{rows}", rows, carried)
 
         return self._kept((name, wrt, rows), make)
+
+    def _ready(self, function: ca.Function, wrt: tuple[str, ...] = ()) -> ca.Function:
+        """A function of the step, as machine code where the model asks for it."""
+        if not self._compiled:
+            return function
+        return self._kept((function.name(), wrt, "compiled"), lambda: compiled(function))
 
     def _kept(self, key: tuple[Hashable, ...], make: Callable[[], ca.Function]) -> ca.Function:
         """Function made once for all steppers of the model with the same interval and method."""
