@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from scipy.signal import lfilter
 
+from adaptive_flot.discovery.gate import LEAST_RANGE
 from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms import spline_basis
@@ -26,8 +27,6 @@ LAGS_S = (5.0, 15.0, 45.0, 120.0)
 DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
 SPILL_QUANTILES = (0.5, 0.7, 0.85, 0.95)
 """A spill is scored with its edge at these quantiles of the level."""
-LEAST_RANGE = 0.02
-"""A driver that moves by less than this share of its mean tells nothing about a dependence."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.experiment import leading, plan_experiment
+from adaptive_flot.discovery.explained import nothing_explained
 from adaptive_flot.discovery.fit import Fit, Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
@@ -112,6 +113,9 @@ def discover(
         reason = f"the model can not simulate the record: check the units of its columns and the model '{model.name}'"
         return Discovery(_insufficient(replace(checked, reasons=(reason,)), began), model, checked)
     problem, base = prepared
+    unexplained = nothing_explained(problem, base)
+    if unexplained:
+        return Discovery(_insufficient(replace(checked, reasons=(unexplained,)), began), base.model, checked)
     found = search(problem, base, model, processes=processes, progress=progress)
     if wants_joint(problem, found):
         problem, found = search_jointly(problem, found, processes=processes, progress=progress)

@@ -17,7 +17,9 @@ FROZEN_ROWS = 30
 CLIPPED_SHARE = 0.03
 """Share of a signal that sits exactly at its largest or smallest value from which it counts as clipped."""
 LEAST_MOVE = 5e-3
-"""An input moves when its spread is at least this share of its mean."""
+"""Where no input spreads by this share of its mean, nothing moves."""
+LEAST_RANGE = 0.02
+"""One that spreads by less than this share of its mean tells nothing about a dependence."""
 OUTLIER_SHARE = 0.15
 """Share of samples far outside from which a signal is an outlier storm."""
 NEIGHBOURS = 9
@@ -62,8 +64,8 @@ def gate(record: Dataset, model: Model) -> Gate:
         reasons.append("no output has a usable measurement")
     elif usable < FEWEST_ROWS:
         reasons.append(f"only {usable} usable samples; {FEWEST_ROWS} are needed")
-    moving = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if _moves(u)]
-    still = [q.name for q in model.inputs if q.name not in moving]
+    moving = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if _moves(u, LEAST_MOVE)]
+    still = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if not _moves(u, LEAST_RANGE)]
     if not moving:
         reasons.append(f"no input moves ({', '.join(still)}): nothing that depends on them can be told from a constant")
     elif still:
@@ -73,9 +75,9 @@ def gate(record: Dataset, model: Model) -> Gate:
     return Gate(replace(record, outputs=outputs), tuple(reasons), tuple(notes))
 
 
-def _moves(u: FloatArray) -> bool:
-    spread = float(np.quantile(u, 0.99) - np.quantile(u, 0.01))
-    return spread > LEAST_MOVE * max(float(np.mean(np.abs(u))), 1e-300)
+def _moves(u: FloatArray, share: float) -> bool:
+    spread = float(np.quantile(u, 0.98) - np.quantile(u, 0.02))
+    return spread > share * max(float(np.mean(np.abs(u))), 1e-300)
 
 
 def _flat(y: FloatArray) -> bool:

@@ -7,11 +7,12 @@ from pathlib import Path
 from adaptive_flot.errors import CellError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import construct, load
-from adaptive_flot.processes import cascaded_tanks, flotation
+from adaptive_flot.processes import cascaded_tanks, flotation, zinc_level
 from adaptive_flot.processes.model_file import find_model_file, is_model_file, load_model_file
 from adaptive_flot.resources import cell_file
 
-PROCESSES = ("flotation", "cascaded-tanks")
+PROCESSES = ("flotation", "cascaded-tanks", "zinc-level")
+WITHOUT_CELL = {"cascaded-tanks": cascaded_tanks.make_model, "zinc-level": zinc_level.make_model}
 
 
 def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path | None = None) -> Model:
@@ -20,8 +21,8 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     Parameters
     ----------
     name
-        `flotation`, `cascaded-tanks`, `module:factory` of a function without arguments that returns a `Model`, or the
-        path of a model file (relative to `folder` or to here).
+        `flotation`, `cascaded-tanks`, `zinc-level`, `module:factory` of a function without arguments that returns a
+        `Model`, or the path of a model file (relative to `folder` or to here).
     cell
         Cell file for the flotation model: a path (relative to `folder` or to here), or the name of a shipped one.
     folder
@@ -45,8 +46,8 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
         raise PluginError(f"unknown model {name!r}; {known}, or a model file, or your own as my_file:make_model")
     if cell is not None:
         raise CellError(f"model {name!r} takes no cell file; leave 'cell' out")
-    if name == "cascaded-tanks":
-        return cascaded_tanks.make_model()
+    if name in WITHOUT_CELL:
+        return WITHOUT_CELL[name]()
     try:
         model = construct(load(name, {}, "model", folder), name, "model")
     except ModelError as error:

@@ -9,6 +9,7 @@ from adaptive_flot.discovery.discover import Discovery, discover
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.processes import zinc_level
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
@@ -17,6 +18,8 @@ from adaptive_flot.processes.model_writer import save_model
 def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
     """Read the record to search and, from the published file of the tanks benchmark, the one that only reports.
 
+    The published files of the tanks and of the zinc cell are read as they are; else see `read_dataset`.
+
     Raises
     ------
     DataError, RangeError
@@ -24,6 +27,8 @@ def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
     """
     if model.name == "cascaded-tanks":
         return read_benchmark(path)
+    if model.name == "zinc-level":
+        return zinc_level.read_record(path), None
     return read_dataset(path, model), None
 
 

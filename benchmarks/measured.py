@@ -1,0 +1,74 @@
+"""Discovery on measured data and on the shared examples: `python -m benchmarks.measured [FOLDER]`.
+
+FOLDER holds `examples/` (records with answers beside them) and `data/` (measured records); default ../shared beside the
+repository. Nothing of it is part of the repository. Every verdict is printed, whatever it is; nothing is tuned to it.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from adaptive_flot.discovery.parallel import available_processes
+from adaptive_flot.discovery.verdict import Verdict
+from adaptive_flot.processes.registry import make_model
+from adaptive_flot.runner.discover import discover_file
+
+SHARED = Path(__file__).parents[1].parent / "shared"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A record, the model to judge it with, and the right answer where there is one."""
+
+    name: str
+    path: Path
+    model: str
+    answer: str
+    right: frozenset[tuple[str, str]] = frozenset()
+
+    def judge(self, verdict: Verdict) -> str:
+        """Whether a verdict is the answer: its word, and the site and driver of each effect."""
+        if not self.answer:
+            return ""
+        named = {(e.effect.site, e.effect.driver) for e in verdict.effects}
+        return "yes" if verdict.word == self.answer and named <= self.right else "no"
+
+
+def cases(folder: Path) -> Iterator[Case]:
+    """Everything the folder holds."""
+    answers = folder / "examples" / "answers.json"
+    for name, answer in json.loads(answers.read_text()).items() if answers.is_file() else ():
+        right = {(s, d) for s in answer.get("site", ()) for d in answer.get("driver", ())}
+        yield Case(name, folder / "examples" / f"{name}.csv", "flotation", answer["verdict"], frozenset(right))
+    data = folder / "data"
+    yield Case("zinc cell", data / "flotation-cell-zinc" / "flotation-cell.csv", "zinc-level", "insufficient")
+    yield Case("cascaded tanks", data / "cascaded-tanks" / "dataBenchmark.csv", "cascaded-tanks", "")
+
+
+def main(folder: Path) -> int:
+    """Judge and print; 2 where there is nothing to judge."""
+    found = [case for case in cases(folder) if case.path.is_file()]
+    if not found:
+        print(f"{folder}: no examples/ and no data/ there; give their folder: python -m benchmarks.measured FOLDER")
+        return 2
+    table = Table("record", "verdict", "effects", "first output: before -> after (noise)", "ok", "s", show_lines=True)
+    console = Console(width=None if Console().is_terminal else 150)
+    for case in found:
+        v = discover_file(case.path, make_model(case.model), processes=available_processes()).verdict
+        console.print(f"{case.name}: {v.reason}", highlight=False, markup=False)
+        effects = "; ".join(f"{e.effect.site} by {e.effect.driver}" for e in v.effects)
+        error = next((f"{c.before:.4g} -> {c.after:.4g} ({c.noise:.2g}) {c.unit}" for c in v.error), "")
+        table.add_row(case.name, v.word, effects, error, case.judge(v), f"{v.seconds:.0f}")
+    console.print(table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else SHARED))
