@@ -85,6 +85,13 @@ class TrueRun:
         found = bound(self.linear, course or course_of(self.adapted), self._noise(more or {}), self._first_covariance())
         return found[:, -q:, -q:]
 
+    def fits(self, covariance: FloatArray) -> FloatArray:
+        """Fits in percent (q,), as estimators are given them, of errors with this covariance (N, q, q)."""
+        late = self.scenario.starts + self.scenario.dt > self.scenario.fits_after + 1e-9
+        variance = np.diagonal(covariance, axis1=1, axis2=2)[late].sum(axis=0)
+        fits: FloatArray = 100.0 * (1.0 - np.sqrt(variance) / np.linalg.norm(self.adapted[late], axis=0))
+        return fits
+
     def _noise(self, more: Mapping[str, float]) -> FloatArray:
         s, model = self.scenario, self.scenario.plant_model
         driving = np.isin(np.arange(len(model.outputs)), model.indices("outputs", s.setup.outputs))

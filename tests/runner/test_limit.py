@@ -35,3 +35,13 @@ def test_more_sensors_lower_the_bound_of_the_ridge() -> None:
     assert alone.shape == (2400, 2, 2)
     assert (np.diagonal(more, axis1=1, axis2=2) <= np.diagonal(alone, axis1=1, axis2=2) * (1 + 1e-9)).all()
     assert np.sqrt(more[-1, 1, 1] / alone[-1, 1, 1]) < 0.9
+
+
+def test_a_fit_of_the_bound_is_that_of_an_error_of_its_size() -> None:
+    """One percent of the truth at every time is a fit of 99; what comes before the fits is of no account."""
+    scenario = load_scenario("paper_scenario_1")
+    run = TrueRun(scenario, 1, scenario.schedule(1))
+    covariance = np.zeros((2400, 2, 2))
+    covariance[:, 0, 0], covariance[:, 1, 1] = (0.01 * run.adapted[:, 0]) ** 2, (0.05 * run.adapted[:, 1]) ** 2
+    covariance[:600] *= 1e6
+    np.testing.assert_allclose(run.fits(covariance), [99.0, 95.0], rtol=1e-12)

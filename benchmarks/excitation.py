@@ -1,0 +1,96 @@
+"""How well n and C can be told apart depends on the inputs: `python -m benchmarks.excitation`.
+
+The plant of paper scenario 1 (ramps of C, then n; the grade alone measured) under other input sequences: the fit that
+the posterior Cramer-Rao bound allows (told when the parameters turn, see `adaptive_flot.greybox.bound`), with the grade
+and with more sensors, and the fits that the estimators reach. Medians over a few seeds; the sequences of the paper are
+not published, so a published fit of C is that of one unknown row of this table.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from adaptive_flot.runner.limit import MORE_SENSORS, TrueRun
+from adaptive_flot.runner.profiles import InputProfile
+from adaptive_flot.runner.scenario import Scenario, load_scenario
+from adaptive_flot.runner.study import run_scenario
+
+ESTIMATORS = ("ekf", "imm")
+SEEDS = 5
+AIR, FEED, LEVEL = "air_flow_m3_s", "feed_flow_m3_s", "level_setpoint_m"
+LOW, HIGH = 9.05e-4, 2.17e-3
+_PROFILE: TypeAdapter[InputProfile] = TypeAdapter(InputProfile)
+
+
+def sequences() -> dict[str, dict[str, dict[str, Any]]]:
+    """Name to the inputs that differ from paper scenario 1."""
+    level = {"profile": "random", "between": [0.33, 0.42], "seed": "per_run"}
+    air = {"profile": "random", "between": [LOW, HIGH], "every_s": 60, "seed": 1}
+    still_air = {"profile": "constant", "value": 1.5e-3}
+    return {
+        "as shipped: air up in 40 steps, level every 160 s": {},
+        "air down (paper scenario 2)": {AIR: {"profile": "staircase", "from": HIGH, "to": LOW, "every_s": 60}},
+        "level every 40 s": {LEVEL: {**level, "every_s": 40}},
+        "level every 640 s": {LEVEL: {**level, "every_s": 640}},
+        "level at rest": {LEVEL: {"profile": "constant", "value": 0.38}},
+        "air at rest": {AIR: still_air},
+        "air and level at rest": {AIR: still_air, LEVEL: {"profile": "constant", "value": 0.38}},
+        "air at random every 60 s": {AIR: air},
+        "air at random every 60 s, level every 40 s": {AIR: air, LEVEL: {**level, "every_s": 40}},
+        "... and feed +-20 % every 100 s": {
+            AIR: air,
+            LEVEL: {**level, "every_s": 40},
+            FEED: {"profile": "random", "between": [1.34e-4, 2.0e-4], "every_s": 100, "seed": 2},
+        },
+    }
+
+
+def with_inputs(scenario: Scenario, inputs: dict[str, dict[str, Any]]) -> Scenario:
+    """The scenario under other inputs."""
+    profiles = {column: _PROFILE.validate_python(content) for column, content in inputs.items()}
+    changed = {"inputs": {**scenario.file.inputs, **profiles}}
+    return replace(scenario, file=scenario.file.model_copy(update=changed))
+
+
+def medians(scenario: Scenario, estimators: Sequence[str], seeds: Sequence[int]) -> list[str]:
+    """Median fits of n / C: bound, bound with more sensors, each estimator; last the correlation at the bound."""
+    bounds, more, ties = [], [], []
+    for seed in seeds:
+        run = TrueRun(scenario, seed, scenario.schedule(seed))
+        P = run.limit()
+        late = P[scenario.initial_rows :]
+        bounds.append(run.fits(P))
+        more.append(run.fits(run.limit(more=MORE_SENSORS)))
+        ties.append(np.median(late[:, 0, 1] / np.sqrt(late[:, 0, 0] * late[:, 1, 1])))
+    runs = run_scenario(scenario, estimators, seeds) if estimators else []
+    reached = [np.array([[r.fit["n"], r.fit["C"]] for r in runs if r.estimator == name]) for name in estimators]
+    cells = [np.median(np.array(values), axis=0).tolist() for values in (bounds, more, *reached)]
+    return [*(f"{n:.2f} / {c:.2f}" for n, c in cells), f"{np.median(np.array(ties)):.3f}"]
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds, from 1 on")
+    parser.add_argument("--bound-only", action="store_true", help="run no estimator")
+    options = parser.parse_args()
+    estimators: tuple[str, ...] = () if options.bound_only else ESTIMATORS
+    scenario = load_scenario("paper_scenario_1")
+    heads = ("bound", "bound, more sensors", *estimators, "correlation at the bound")
+    table = Table("inputs", *heads, title=f"Fits of n / C in percent, medians of seeds 1 to {options.seeds}")
+    for name, inputs in track(sequences().items(), "excitation", console=Console(stderr=True)):
+        table.add_row(name, *medians(with_inputs(scenario, inputs), estimators, range(1, options.seeds + 1)))
+    Console(width=None if Console().is_terminal else 150).print(table)
+
+
+if __name__ == "__main__":
+    main()
