@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,10 +25,12 @@ from controllers.collocation import Problem
 from controllers.grade_bias import GradeBias
 from controllers.layout import MOVED, Bounds
 from controllers.nlp_solvers import FailingSolver, Solver, make_solver
+from controllers.probing import AIR, ProbeState, Probing, price
 from controllers.stage import Arguments
 from controllers.verification import Solution, Verdict
 from controllers.widening import widened
 
+OWN = "economic_mpc"
 VALUE_SCALE = 1000.0
 """Prices are scaled so that the objective is of order 1 to 100: solvers' tolerances then mean something."""
 
@@ -54,6 +56,8 @@ class MpcState:
         the limit for good.
     heard
         Time of the newest grade in that filter [s].
+    probe
+        Last dip and what probing has cost; None without probing.
     """
 
     row: int
@@ -64,6 +68,7 @@ class MpcState:
     age: int
     bias: float
     heard: float
+    probe: ProbeState | None = None
 
 
 class EconomicMpc:
@@ -94,6 +99,8 @@ class EconomicMpc:
         Time constant of the grade bias filter [s].
     budget_s
         Wall-clock time of a solve; there is no second try when the first took longer.
+    probing
+        Options of `Probing`: dips of the air flow that tell the parameters apart; default none.
 
     Raises
     ------
@@ -113,6 +120,7 @@ class EconomicMpc:
         backoff: float = 0.001,
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
+        probing: Mapping[str, float] | None = None,
     ) -> None:
         if setup.limits is None or setup.prices is None:
             raise ModelError("economic_mpc needs limits and prices; add 'limits' and 'economics' to the scenario")
@@ -136,12 +144,13 @@ class EconomicMpc:
         )
         self._solver_bounds = self.layout.bounds(self._bounds)
         self._bias = GradeBias(setup.model.index("outputs", "concentrate_grade"), setup.dt, bias_time_s)
+        self.probing = None if probing is None else Probing(limits, move_s, **probing)
         self._ode = FastCall(setup.model.ode)
         self._grades = FastCall(self.problem.grades)
 
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
-        return MpcState(0, time, None, None, None, 0, 0.0, time)
+        return MpcState(0, time, None, None, None, 0, 0.0, time, None if self.probing is None else ProbeState(time))
 
     def with_failing_solver(self) -> EconomicMpc:
         """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
@@ -172,7 +181,7 @@ class EconomicMpc:
         if state.inputs is not None:
             held[self.layout.moved] = state.inputs[self.layout.moved]
         if sample.time < state.due - 1e-9:
-            return replace(state, inputs=held.copy()), Decision(held.copy(), Status.OK, "economic_mpc")
+            return replace(state, inputs=held.copy()), Decision(held.copy(), Status.OK, self._own(state, sample.time))
         state = replace(state, due=max(state.due, sample.time) + self.layout.move_s)
         return self._optimise(state, held, sample, estimate)
 
@@ -192,6 +201,8 @@ class EconomicMpc:
             estimate.state, held[moved], theta, others, self.grade_limit, state.bias, self._prices, estimate.time
         ).vector()
         solution, status = self._solve(state, now, held, estimate, theta)
+        if solution.verdict is Verdict.VALID and self.probing is not None:
+            state, solution = self._probe(self.probing, state, now, held, estimate, solution)
         if solution.verdict is Verdict.VALID:
             plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
             expected = self._plan(estimate.time, solution, now)
@@ -220,6 +231,21 @@ class EconomicMpc:
             return solution, Status.OK
         return self.solver(now, self._solver_bounds, cold), Status.RETRIED
 
+    def _probe(
+        self, probing: Probing, state: MpcState, now: FloatArray, held: FloatArray, estimate: Estimate, free: Solution
+    ) -> tuple[MpcState, Solution]:
+        """Put a dip in front of a valid plan where one is due, has a valid plan itself, and can be paid."""
+        probe, air = state.probe, float(held[self.layout.moved[AIR]])
+        if probe is None or not probing.is_due(probe, estimate, air):
+            return state, free
+        bounds = probing.bounds(air, self.layout, self._solver_bounds)
+        asked = self.solver(now, bounds, free.variables, free.multipliers)
+        if asked.verdict is not Verdict.VALID:
+            return state, free
+        cost = price(self.problem, free.variables, asked.variables, now) / VALUE_SCALE
+        probe, paid = probing.pay(probe, cost, estimate.time)
+        return replace(state, probe=probe), replace(asked, seconds=free.seconds + asked.seconds) if paid else free
+
     def _plan(self, time: float, solution: Solution, now: FloatArray) -> Plan:
         inputs = self.layout.inputs_of(solution.variables)
         ends = time + self.layout.move_s * np.arange(1.0, self.layout.horizon + 1)
@@ -227,17 +253,16 @@ class EconomicMpc:
         return Plan(ends, {name: inputs[:, i] for i, name in enumerate(MOVED)}, grade)
 
     def _apply(
-        self,
-        state: MpcState,
-        held: FloatArray,
-        moved: FloatArray,
-        status: Status,
-        solution: Solution,
-        plan: Plan | None = None,
+        self, state: MpcState, held: FloatArray, to: FloatArray, status: Status, by: Solution, plan: Plan | None = None
     ) -> tuple[MpcState, Decision]:
         inputs = held.copy()
         low, high = self._bounds.inputs.T
-        inputs[self.layout.moved] = np.clip(moved, low, high)  # a valid solution may miss a bound by its tolerance
-        who = {Status.OK: "economic_mpc", Status.RETRIED: "economic_mpc"}.get(status, status.name.lower())
-        decision = Decision(inputs.copy(), status, who, solution.seconds, solution.message, plan)
+        inputs[self.layout.moved] = np.clip(to, low, high)  # a valid solution may miss a bound by its tolerance
+        own = OWN if plan is None else self._own(state, plan.time[0] - self.layout.move_s)
+        who = own if status in (Status.OK, Status.RETRIED) else status.name.lower()
+        decision = Decision(inputs.copy(), status, who, by.seconds, by.message, plan)
         return replace(state, inputs=inputs), decision
+
+    @staticmethod
+    def _own(state: MpcState, time: float) -> str:
+        return "probing" if state.probe is not None and time < state.probe.until - 1e-9 else OWN
