@@ -38,7 +38,7 @@ ModelOption = Annotated[
     typer.Option(
         "--model",
         callback=_file_here,
-        help="flotation, cascaded-tanks, a model file (YAML), or my_file:make_model.",
+        help="flotation, cascaded-tanks, zinc-level, iron-columns, a model file (YAML), or my_file:make_model.",
     ),
 ]
 CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML), or the name of a shipped one.")]

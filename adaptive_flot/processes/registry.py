@@ -7,12 +7,16 @@ from pathlib import Path
 from adaptive_flot.errors import CellError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import construct, load
-from adaptive_flot.processes import cascaded_tanks, flotation, zinc_level
+from adaptive_flot.processes import cascaded_tanks, flotation, iron_columns, zinc_level
 from adaptive_flot.processes.model_file import find_model_file, is_model_file, load_model_file
 from adaptive_flot.resources import cell_file
 
-PROCESSES = ("flotation", "cascaded-tanks", "zinc-level")
-WITHOUT_CELL = {"cascaded-tanks": cascaded_tanks.make_model, "zinc-level": zinc_level.make_model}
+WITHOUT_CELL = {
+    "cascaded-tanks": cascaded_tanks.make_model,
+    "zinc-level": zinc_level.make_model,
+    "iron-columns": iron_columns.make_model,
+}
+PROCESSES = ("flotation", *WITHOUT_CELL)
 
 
 def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path | None = None) -> Model:
@@ -21,8 +25,8 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     Parameters
     ----------
     name
-        `flotation`, `cascaded-tanks`, `zinc-level`, `module:factory` of a function without arguments that returns a
-        `Model`, or the path of a model file (relative to `folder` or to here).
+        `flotation`, another of `PROCESSES`, `module:factory` of a function without arguments that returns a `Model`, or
+        the path of a model file (relative to `folder` or to here).
     cell
         Cell file for the flotation model: a path (relative to `folder` or to here), or the name of a shipped one.
     folder

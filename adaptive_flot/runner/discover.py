@@ -9,7 +9,7 @@ from adaptive_flot.discovery.discover import Discovery, discover
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.processes import zinc_level
+from adaptive_flot.processes import iron_columns, zinc_level
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
@@ -18,7 +18,7 @@ from adaptive_flot.processes.model_writer import save_model
 def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
     """Read the record to search and, from the published file of the tanks benchmark, the one that only reports.
 
-    The published files of the tanks and of the zinc cell are read as they are; else see `read_dataset`.
+    The published files of the tanks, the zinc cell and the iron columns are read as they are; else see `read_dataset`.
 
     Raises
     ------
@@ -27,8 +27,9 @@ def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
     """
     if model.name == "cascaded-tanks":
         return read_benchmark(path)
-    if model.name == "zinc-level":
-        return zinc_level.read_record(path), None
+    readers = {"zinc-level": zinc_level.read_record, "iron-columns": iron_columns.read_record}
+    if model.name in readers:
+        return readers[model.name](path), None
     return read_dataset(path, model), None
 
 
