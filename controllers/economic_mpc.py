@@ -24,10 +24,10 @@ from adaptive_flot.protocols import (
 from controllers.collocation import Problem
 from controllers.grade_bias import GradeBias
 from controllers.layout import MOVED, Bounds
-from controllers.nlp_solvers import FailingSolver, Solver, make_solver
+from controllers.nlp_solvers import FailingSolver, make_solver
 from controllers.probing import AIR, ProbeState, Probing, price
 from controllers.stage import Arguments
-from controllers.verification import Solution, Verdict
+from controllers.verification import Solution, Solver, Verdict
 from controllers.widening import widened
 
 OWN = "economic_mpc"
@@ -88,7 +88,7 @@ class EconomicMpc:
     move_s
         Length of a move [s], a multiple of the sampling interval.
     solver
-        `ipopt` or `fatrop`.
+        `ipopt`, `fatrop` or `rti`.
     move_cost
         Cost of a move by the whole scale of an input (1e-3 m3/s of air, 0.1 m of level), squared [cu].
     grade_penalty

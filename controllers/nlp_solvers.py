@@ -1,14 +1,15 @@
-"""NLP solvers by name: interior-point methods of CasADi, warm started from the plan of the move before.
+"""NLP solvers by name: real-time iterations (`real_time_iteration.py`), and interior-point methods of CasADi.
 
-Both follow the central path only down to a small barrier parameter and stop there. What is left of the barrier costs
-less than 1e-5 of the objective and keeps the next start well inside the feasible set: ipopt, which takes the
-multipliers of the move before, needs 6 iterations instead of 14; fatrop, which can not take them, 7 instead of 20.
+These are warm started from the plan of the move before. Both follow the central path only down to a small barrier
+parameter and stop there. What is left of the barrier costs less than 1e-5 of the objective and keeps the next start
+well inside the feasible set: ipopt, which takes the multipliers of the move before, needs 6 iterations instead of 14;
+fatrop, which can not take them, 7 instead of 20.
 """
 
 from __future__ import annotations
 
 import time
-from typing import Any, Protocol
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -19,26 +20,13 @@ from adaptive_flot.greybox.model import FloatArray
 from controllers.collocation import Problem
 from controllers.derivatives import Assembled
 from controllers.layout import Multipliers
-from controllers.verification import Solution, Verifier, no_solution
+from controllers.real_time_iteration import RealTimeIteration
+from controllers.verification import Solution, Solver, Verifier, no_solution
 
 BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
 """Barrier parameter in units of the objective (see `VALUE_SCALE` of the controller): ipopt keeps this one, fatrop
 begins with it and takes one or two smaller ones."""
-SOLVERS = ("ipopt", "fatrop")
-
-
-class Solver(Protocol):
-    """Finds a plan. Never raises: a failure is a verdict."""
-
-    def __call__(
-        self,
-        arguments: FloatArray,
-        bounds: dict[str, FloatArray],
-        start: FloatArray,
-        multipliers: Multipliers | None = None,
-    ) -> Solution:
-        """Solve from a start (n,), warm if multipliers are given; arguments as in `stage.Arguments.vector`."""
-        ...
+SOLVERS = ("ipopt", "fatrop", "rti")
 
 
 def make_solver(problem: Problem, name: str, budget_s: float) -> Solver:
@@ -51,6 +39,8 @@ def make_solver(problem: Problem, name: str, budget_s: float) -> Solver:
     """
     if name not in SOLVERS:
         raise ModelError(f"economic_mpc: unknown solver {name!r}; {near_match(name, SOLVERS)}")
+    if name == "rti":
+        return RealTimeIteration(problem, InteriorPoint(problem, "fatrop", budget_s))
     return InteriorPoint(problem, name, budget_s)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 
@@ -60,6 +61,20 @@ def no_solution(size: int, constraints: int, message: str, seconds: float = 0.0)
     """What a solver returns that found nothing: NaN for variables (size,) and multipliers."""
     nothing, lost = np.full(size, np.nan), np.full(constraints, np.nan)
     return Solution(nothing, (nothing, lost), Verdict.NOT_FINITE, message, 0, seconds)
+
+
+class Solver(Protocol):
+    """Finds a plan. Never raises: a failure is a verdict."""
+
+    def __call__(
+        self,
+        arguments: FloatArray,
+        bounds: dict[str, FloatArray],
+        start: FloatArray,
+        multipliers: Multipliers | None = None,
+    ) -> Solution:
+        """Solve from a start (n,), warm if multipliers are given; arguments as in `stage.Arguments.vector`."""
+        ...
 
 
 class Verifier:
