@@ -90,7 +90,8 @@ def plan_panels(case: Case, run: Run) -> list[Panel]:
     """A few plans over the inputs and the grade that came; each shown plan starts where the one before ends."""
     limits = case.scenario.limits
     assert limits is not None
-    table, shown = case.shown(run), chosen_plans(run.plans)
+    table = case.shown(run)
+    shown = chosen_plans(run.plans[run.plans["planned_at_s"] >= table["time_s"].iloc[0]])
     panels = []
     for q in case.scenario.model.inputs:
         if q.column in run.plans:

@@ -11,6 +11,7 @@ from adaptive_flot.report import compare, distributions, figures, series, tables
 from adaptive_flot.report.closed_loop_pictures import Sections, closed_loop_sections
 from adaptive_flot.report.fault_table import fault_table
 from adaptive_flot.report.findings import below_published, candidates, findings
+from adaptive_flot.report.inquiries import Watch, watch_section
 from adaptive_flot.report.limit import LimitPart, limit_part
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Panel
@@ -32,6 +33,7 @@ class Chapter:
     findings: list[str]
     spread: Picture | None
     course: Sections
+    watch: Watch | None
     parameters: Picture
     parameter_table: Table
     limit: LimitPart | None
@@ -117,6 +119,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         if case.closed_loop
         else [("Inputs", [_add(album, *_inputs(case))])]
     )
+    watch = watch_section(case, _first(case), album)
     parameters, outputs = (_add(album, *made) for made in (_parameters(case), _outputs(case)))
     return Chapter(
         anchor=anchor,
@@ -126,6 +129,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         fits=tables.fits_table(case),
         findings=findings(case),
         course=course,
+        watch=watch,
         parameters=parameters,
         parameter_table=tables.parameter_table(case),
         limit=limit_part(case, album),
