@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import time
 
 import pytest
@@ -52,3 +53,19 @@ def test_a_daemon_may_have_no_children_and_calls_by_itself() -> None:
     mine, its = receiver.recv()
     worker.join()
     assert mine == its != os.getpid()
+
+
+def test_a_search_ends_with_a_run_that_was_killed() -> None:
+    """Its end of a pipe closes, which else only happens when the hour is over."""
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+
+    def run() -> None:
+        Background(lambda: time.sleep(3600))
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    killed = multiprocessing.get_context("fork").Process(target=run)
+    killed.start()
+    killed.join()
+    sender.close()
+    with pytest.raises(EOFError):  # every process that held the other end is gone
+        receiver.recv()
