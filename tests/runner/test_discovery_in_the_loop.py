@@ -88,9 +88,14 @@ def same(one: Run, two: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("estimator", "effects"),
-    [("rpem", (growth(0.0),)), ("rpem", (growth(0.0), LATE_FEED)), ("ekf", (LATE_FEED,)), ("fixed", (LATE_FEED,))],
-    ids=["rpem", "rpem, states", "ekf, states", "fixed, states"],
+    ("estimator", "effects", "more"),
+    [
+        ("rpem", (growth(0.0),), CLOSED),
+        ("rpem", (growth(0.0), LATE_FEED), {}),
+        ("ekf", (LATE_FEED,), {}),
+        ("fixed", (LATE_FEED,), {}),
+    ],
+    ids=["rpem, closed loop", "rpem, states", "ekf, states", "fixed, states"],
 )
 def test_an_effect_of_size_zero_changes_nothing(
     write_scenario: WriteScenario,
@@ -98,16 +103,41 @@ def test_an_effect_of_size_zero_changes_nothing(
     alarming: None,
     estimator: str,
     effects: tuple[Effect, ...],
+    more: dict[str, Any],
 ) -> None:
     """Estimates, decisions and predictions after the model was extended are those of the run without, to the bit."""
-    plain = {"seeds": [1], "estimators": {estimator: {"use": estimator}}, **CLOSED}
-    keep = Finding(Verdict("named", "stub"), Extension(effects))
-    monkeypatch.setattr(supervisor, "search_record", lambda setup, record, processes: keep)
-    (watched,) = runs(write_scenario({**plain, "discovery": OPTIONS}), estimator)
-    (unwatched,) = runs(write_scenario(plain), estimator)
+    watched, unwatched = with_and_without(write_scenario, monkeypatch, estimator, effects, more)
     assert watched.inquiries is not None and [i.extended for i in watched.inquiries] == [True]
     assert unwatched.inquiries is None
     same(watched, unwatched)
+
+
+def test_further_states_of_no_effect_do_not_bump_the_inputs(
+    write_scenario: WriteScenario, monkeypatch: pytest.MonkeyPatch, alarming: None
+) -> None:
+    """The optimal control problem has more variables then, so its solution is the same to the solver's tolerance only;
+    the plan before is its start."""
+    watched, unwatched = with_and_without(write_scenario, monkeypatch, "rpem", (LATE_FEED,), CLOSED)
+    assert watched.inquiries and watched.inquiries[0].extended
+    for column in ("air_flow_m3_s", "level_setpoint_m"):
+        np.testing.assert_allclose(watched.table[column], unwatched.table[column], rtol=1e-4)
+    assert set(watched.table["control_status"]) == {"ok"}
+
+
+def with_and_without(
+    write: WriteScenario,
+    monkeypatch: pytest.MonkeyPatch,
+    estimator: str,
+    effects: tuple[Effect, ...],
+    more: dict[str, Any],
+) -> tuple[Run, Run]:
+    """The run whose model is extended by the effects, all else kept, and the run that nobody watches."""
+    plain = {"seeds": [1], "estimators": {estimator: {"use": estimator}}, **more}
+    keep = Finding(Verdict("named", "stub"), Extension(effects))
+    monkeypatch.setattr(supervisor, "search_record", lambda setup, record, processes: keep)
+    (watched,) = runs(write({**plain, "discovery": OPTIONS}), estimator)
+    (unwatched,) = runs(write(plain), estimator)
+    return watched, unwatched
 
 
 @pytest.mark.parametrize("fitted", [True, False], ids=["state fitted", "state carried over"])
