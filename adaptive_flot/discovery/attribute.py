@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.catalogue import finer
+from adaptive_flot.discovery.events import event_scores
 from adaptive_flot.discovery.fit import MOST_STEPS, Fit, Fitter
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
@@ -23,7 +24,10 @@ SHORTLIST = 10
 FORMS_EACH = 2
 FIRST_STEPS = 3
 """Gauss-Newton steps of the first heat, in which every candidate runs."""
-FINALISTS = 3
+FINALISTS = 4
+SURE_FINALISTS = 3
+NEAR_FINALIST = 0.5
+"""A finalist beyond the third must have gained at least this share of what the first gained."""
 LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
 
@@ -101,7 +105,8 @@ def refit(
     """Fit each shortlisted candidate on top of `before` (the base model by default), best first.
 
     The searches start from the fit that the scorer was linearised along. In two heats: all in their best form with a
-    few steps, then the finalists in several forms to the end.
+    few steps, then the finalists in several forms to the end; last, what only a finished fit can start: events in time,
+    and the constant that a dependence may have come to.
     """
     start = scorer.fit
 
@@ -114,13 +119,37 @@ def refit(
         found = [_alternative(base, start, s, f, before) for s, f in zip(jobs, fits, strict=True) if f]
         return sorted(found, key=lambda a: a.fit.bic)
 
-    first = heat(scores, FIRST_STEPS)
-    finalists = [a.names[-1] for a in first[:FINALISTS]]
+    first = heat([_first_form(scorer, s) for s in scores], FIRST_STEPS)
+    enough = NEAR_FINALIST * max((start.loss - first[0].fit.loss) if first else 0.0, 0.0)
+    finalists = [
+        a.names[-1] for i, a in enumerate(first[:FINALISTS]) if i < SURE_FINALISTS or start.loss - a.fit.loss > enough
+    ]
     jobs = [f for s in scores if s.candidate.name in finalists for f in _forms(scorer, s)]
+    last = heat(jobs, MOST_STEPS)
     best: dict[tuple[tuple[str, str], ...], Alternative] = {}
-    for a in sorted([*heat(jobs, MOST_STEPS), *first], key=lambda a: a.fit.bic):
+    for a in sorted(
+        [*heat([*_constants(scorer, last), *_events(scores, last)], MOST_STEPS), *last, *first], key=lambda a: a.fit.bic
+    ):
         best.setdefault(a.names, a)
     return sorted(best.values(), key=lambda a: a.fit.bic)
+
+
+def _constants(scorer: Scorer, fitted: list[Alternative]) -> list[Score]:
+    """The constant change at the sites of the best fits, from what a dependence on a driver came to.
+
+    A dependence that turned out flat is that constant, which has the better name.
+    """
+    at = {s.candidate.site.name: s for s in scorer.scores() if s.candidate.driver == "constant"}
+    found: dict[str, Score] = {}
+    for a in fitted[:FINALISTS]:
+        effect = a.effects[-1]
+        site, c = effect.site, effect.coefficients
+        values = [v for k, v in c.items() if k.startswith(("value", "amplitude"))]
+        if effect.driver in ("constant", "time", "lag", "delay") or site not in at or site in found or not values:
+            continue
+        shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
+        found[site] = replace(shift, start={"amplitude": float(np.mean(values))})
+    return list(found.values())
 
 
 def _alternative(base: Fit, start: Fit, score: Score, bare: Fit, before: Alternative | None) -> Alternative:
@@ -145,10 +174,36 @@ def _forms(scorer: Scorer, score: Score) -> list[Score]:
         if key not in found and s.gain > 0.5 * score.gain:
             found[key] = s
     forms = []
+    in_time = score.candidate.driver == "time"
+    if in_time:  # events start from the curve
+        found = {k: v for k, v in found.items() if k[0] == "curve"} or found
     for s in list(found.values())[:FORMS_EACH]:
         fine = finer(s.variant, s.start)
-        forms.append(replace(s, variant=fine[0], start=fine[1]) if fine else s)
+        if fine:
+            forms.append(replace(s, variant=fine[0], start=fine[1]))
+        if not fine or in_time:
+            forms.append(s)
     return forms
+
+
+def _first_form(scorer: Scorer, score: Score) -> Score:
+    """The form of the first heat: a curve in time for all that depends on time, as that has no local optima."""
+    if score.candidate.driver != "time":
+        return score
+    curves = [s for s in scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"]
+    return curves[0] if curves and curves[0].gain > 0.5 * score.gain else score
+
+
+def _events(scores: list[Score], fitted: list[Alternative]) -> list[Score]:
+    """Events at the sites of fitted curves in time, started from the best curve of each."""
+    by_name = {s.candidate.name: s for s in scores}
+    found: dict[tuple[str, str], list[Score]] = {}
+    for a in fitted:
+        effect, name = a.effects[-1], a.names[-1]
+        wanted = effect.driver == "time" and effect.form == "curve" and name not in found
+        if wanted and len(found) < SURE_FINALISTS:
+            found[name] = event_scores(by_name[name], effect)
+    return [s for group in found.values() for s in group]
 
 
 def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int) -> Fit | None:

@@ -22,6 +22,7 @@ ONSETS = 18
 TIME_KNOTS = 7
 DRIVER_KNOTS = 4
 FINE_KNOTS = 8
+FINE_TIME_KNOTS = 14
 """Knots of the curve of a finalist: a hard limit or a threshold must not be told apart from its site by its shape."""
 LAGS_S = (5.0, 15.0, 45.0, 120.0)
 DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
@@ -186,13 +187,14 @@ def _knots(values: FloatArray) -> tuple[float, ...] | None:
 def finer(variant: Variant, start: Mapping[str, float]) -> tuple[Variant, dict[str, float]] | None:
     """The same curve with more knots, and the start values that draw the coarse one; None for other forms."""
     effect = variant.effect
-    if effect.form != "curve" or effect.driver == "time":
+    if effect.form != "curve":
         return None
     coarse = [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
-    knots = tuple(float(k) for k in np.linspace(coarse[0], coarse[-1], FINE_KNOTS))
+    count = FINE_TIME_KNOTS if effect.driver == "time" else FINE_KNOTS
+    knots = tuple(float(k) for k in np.linspace(coarse[0], coarse[-1], count))
     values = spline_values(np.array(knots), coarse) @ [start[f"value_{k + 1}"] for k in range(len(coarse))]
     fine = Effect(effect.site, effect.driver, "curve", settings={"knots": knots}, mode=effect.mode)
-    names = tuple(f"value_{k + 1}" for k in range(FINE_KNOTS))
+    names = tuple(f"value_{k + 1}" for k in range(count))
     return Variant(fine, (), names), dict(zip(names, map(float, values), strict=True))
 
 

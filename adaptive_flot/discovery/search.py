@@ -25,6 +25,8 @@ LEAST_EVIDENCE = 10.0
 """Drop of the information criterion that an effect must bring."""
 SUBSTANCE = 0.1
 """A further effect must remove at least this share of the excess error that the base model has on the confirm share."""
+FLAT = 0.02
+"""A dependence must remove at least this share of the excess error beyond what the constant at its site removes."""
 SHORTLIST_FURTHER = 5
 BEAM = 2
 """Alternatives of one round that the next extends."""
@@ -202,7 +204,20 @@ def _round(
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
     for a in sorted(found, key=lambda a: a.fit.bic):
         unique.setdefault(frozenset(a.names), a)
-    return Round(scores, threshold, tuple(unique.values()))
+    return Round(scores, threshold, _without_flat(problem, base, list(unique.values())))
+
+
+def _without_flat(problem: Problem, base: Fit, found: list[Alternative]) -> tuple[Alternative, ...]:
+    """Leave out dependences that turned out flat: those that add next to nothing to a constant at the same site."""
+    constants = {(a.names[:-1], a.names[-1][0]): a for a in found if a.names[-1][1] == "constant"}
+
+    def flat(a: Alternative) -> bool:
+        constant = constants.get((a.names[:-1], a.names[-1][0]))
+        if constant is None or constant is a or a.names[-1][1] in ("lag", "delay"):
+            return False
+        return _excess(problem, constant.fit, a.fit) < FLAT * _excess(problem, base, a.fit)
+
+    return tuple(a for a in found if not flat(a))
 
 
 def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None]:
