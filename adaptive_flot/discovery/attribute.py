@@ -119,19 +119,24 @@ def refit(
         found = [_alternative(base, start, s, f, before) for s, f in zip(jobs, fits, strict=True) if f]
         return sorted(found, key=lambda a: a.fit.bic)
 
-    first = heat([_first_form(scorer, s) for s in scores], FIRST_STEPS)
+    scores = [scorer.refined(s) for s in scores]
+    first = _best_of_each(heat([f for s in scores for f in _first_forms(scorer, s)], FIRST_STEPS))
     enough = NEAR_FINALIST * max((start.loss - first[0].fit.loss) if first else 0.0, 0.0)
     finalists = [
         a.names[-1] for i, a in enumerate(first[:FINALISTS]) if i < SURE_FINALISTS or start.loss - a.fit.loss > enough
     ]
     jobs = [f for s in scores if s.candidate.name in finalists for f in _forms(scorer, s)]
     last = heat(jobs, MOST_STEPS)
+    followers = heat([*_constants(scorer, last), *_events(scores, last)], MOST_STEPS)
+    return _best_of_each([*followers, *last, *first])
+
+
+def _best_of_each(found: list[Alternative]) -> list[Alternative]:
+    """The best fit of each name, best first."""
     best: dict[tuple[tuple[str, str], ...], Alternative] = {}
-    for a in sorted(
-        [*heat([*_constants(scorer, last), *_events(scores, last)], MOST_STEPS), *last, *first], key=lambda a: a.fit.bic
-    ):
+    for a in sorted(found, key=lambda a: a.fit.bic):
         best.setdefault(a.names, a)
-    return sorted(best.values(), key=lambda a: a.fit.bic)
+    return list(best.values())
 
 
 def _constants(scorer: Scorer, fitted: list[Alternative]) -> list[Score]:
@@ -175,9 +180,10 @@ def _forms(scorer: Scorer, score: Score) -> list[Score]:
             found[key] = s
     forms = []
     in_time = score.candidate.driver == "time"
-    if in_time:  # events start from the curve
-        found = {k: v for k, v in found.items() if k[0] == "curve"} or found
-    for s in list(found.values())[:FORMS_EACH]:
+    kept = list(found.values())[:FORMS_EACH]
+    if in_time:  # the best of all, and the curve that events start from
+        kept = [score, *(s for k, s in found.items() if k[0] == "curve" and score.variant.effect.form != "curve")]
+    for s in kept:
         fine = finer(s.variant, s.start)
         if fine:
             forms.append(replace(s, variant=fine[0], start=fine[1]))
@@ -186,12 +192,12 @@ def _forms(scorer: Scorer, score: Score) -> list[Score]:
     return forms
 
 
-def _first_form(scorer: Scorer, score: Score) -> Score:
-    """The form of the first heat: a curve in time for all that depends on time, as that has no local optima."""
+def _first_forms(scorer: Scorer, score: Score) -> list[Score]:
+    """The forms of the first heat: the best one, and for what depends on time its curve too."""
     if score.candidate.driver != "time":
-        return score
-    curves = [s for s in scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"]
-    return curves[0] if curves and curves[0].gain > 0.5 * score.gain else score
+        return [score]
+    curves = [s for s in scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"][:1]
+    return [score] if score.variant.effect.form == "curve" else [score, *curves]
 
 
 def _events(scores: list[Score], fitted: list[Alternative]) -> list[Score]:

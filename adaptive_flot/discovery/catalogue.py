@@ -131,22 +131,32 @@ def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:
     span = high - low
     onsets = np.linspace(low, high, ONSETS + 2)[1:-1]
     for onset in onsets:
-        step = Effect(site.name, "time", "step", settings={"width": max(2.0, span / 1000)})
-        values = (time >= onset).astype(float)
-        yield Variant(step, (Course(site.name, values, offset),), ("amplitude",), (("onset", float(onset)),))
+        yield event(site, "step", time, float(onset), 0.0, offset)
     for duration in (0.15 * span, 0.4 * span):
         for onset in onsets[:-2:3]:
-            values = np.clip((time - onset) / duration, 0, 1)
-            ramp = Effect(site.name, "time", "ramp")
-            start = (("onset", float(onset)), ("duration", float(duration)))
-            yield Variant(ramp, (Course(site.name, values, offset),), ("amplitude",), start)
+            yield event(site, "ramp", time, float(onset), duration, offset)
     for onset in onsets[:-2:3]:
-        values = 1 - np.exp(-np.maximum(time - onset, 0) / (0.1 * span))
-        washout = Effect(site.name, "time", "washout")
-        start = (("onset", float(onset)), ("time_constant", 0.1 * span))
-        yield Variant(washout, (Course(site.name, values, offset),), ("amplitude",), start)
+        yield event(site, "washout", time, float(onset), 0.1 * span, offset)
     knots = tuple(float(k) for k in np.linspace(low, high, TIME_KNOTS))
     yield _curve(site, "time", time, knots, offset)
+
+
+def event(site: Site, form: str, time: FloatArray, onset: float, length: float, offset: bool) -> Variant:
+    """A step, ramp or washout at a site, from an onset; `length` is the ramp's duration or the time constant [s]."""
+    since = np.maximum(time - onset, 0)
+    settings: dict[str, float] = {}
+    start: tuple[tuple[str, float], ...] = (("onset", onset),)
+    if form == "step":
+        values = (time >= onset).astype(float)
+        settings["width"] = max(2.0, float(time[-1] - time[0]) / 1000)
+    elif form == "ramp":
+        values = np.minimum(since / length, 1)
+        start += (("duration", length),)
+    else:
+        values = 1 - np.exp(-since / length)
+        start += (("time_constant", length),)
+    effect = Effect(site.name, "time", form, settings=settings)
+    return Variant(effect, (Course(site.name, values, offset),), ("amplitude",), start)
 
 
 def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states: Sequence[str]) -> Iterator[Variant]:

@@ -7,17 +7,21 @@ coloured noise nor soaked up by the very effect that is looked for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.catalogue import Candidate, Variant
+from adaptive_flot.discovery.catalogue import ONSETS, Candidate, Variant, event
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.noise import CLIP, Noise
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.greybox.model import FloatArray
 
+REFINED = 33
+"""Onsets that are tried around one of the catalogue."""
+LENGTHS = (0.3, 0.55, 1.0, 1.8)
+"""Factors of a duration or time constant that are tried with each."""
 PRIOR_SHARE = 0.3
 """Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
 ABSORBED = 1e-7
@@ -52,7 +56,7 @@ class Scorer:
 
     def __init__(self, problem: Problem, fit: Fit, responses: Responses, candidates: list[Candidate]) -> None:
         self.problem, self.fit, self.candidates = problem, fit, candidates
-        self.drivers = responses.drivers
+        self.drivers, self._responses = responses.drivers, responses
         self.rows = problem.rows("estimate")
         self._count = int(np.isfinite(problem.measured[self.rows]).sum())
         variants = [v for c in candidates for v in c.variants]
@@ -149,6 +153,34 @@ class Scorer:
         values = beta * self._size[columns]
         start = {n: float(v) for n, v in zip(variant.coefficients, values, strict=True) if n}
         return Score(candidate, variant, gain, gain - penalty, {**start, **dict(variant.start)})
+
+    def refined(self, score: Score) -> Score:
+        """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima."""
+        start = dict(score.variant.start)
+        if "onset" not in start:
+            return score
+        time = self.problem.record.time
+        reach = (time[-1] - time[0]) / (ONSETS + 1)
+        length = start.get("duration", start.get("time_constant", 0.0))
+        site, form = score.candidate.site, score.variant.effect.form
+        variants = [
+            event(site, form, time, float(onset), length * factor, site.mode == "offset")
+            for onset in start["onset"] + reach * np.linspace(-1, 1, REFINED)
+            for factor in (LENGTHS if length else (1.0,))
+            if time[0] < onset < time[-1]
+        ]
+        answers = self._responses.of([v.courses[0] for v in variants]) / self.problem.weights[:, :, None]
+        columns = self.noise.whiten(answers)[self.rows][self._present]
+        columns -= self._base @ (self._base.T @ columns)
+        gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
+        best = int(np.argmax(gains))
+        if gains[best] <= score.gain:
+            return score
+        amplitude = float(columns[:, best] @ self.residual / np.sum(columns[:, best] ** 2))
+        found = variants[best]
+        penalised = score.penalised + float(gains[best]) - score.gain
+        values = {"amplitude": amplitude, **dict(found.start)}
+        return replace(score, variant=found, gain=float(gains[best]), penalised=penalised, start=values)
 
     def null_gains(self, draws: int, seed: int) -> FloatArray:
         """Largest penalised score (draws,) of the catalogue on white noise: the null law of the search.
