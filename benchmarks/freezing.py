@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from adaptive_flot.runner.scenario import load_scenario
@@ -43,10 +42,12 @@ def main() -> None:
     """Measure and print."""
     scenario = load_scenario(SCENARIO)
     scenario = replace(scenario, file=scenario.file.model_copy(update={"estimators": VARIANTS, "cases": []}))
-    jobs = [(name, seed) for name in VARIANTS for seed in SEEDS]
+    jobs = [(seed, name) for seed in SEEDS for name in VARIANTS]
     found: dict[str, list[Run]] = {name: [] for name in VARIANTS}
-    for name, seed in track(jobs, SCENARIO, console=Console(stderr=True)):
+    done = Console(stderr=True)
+    for seed, name in jobs:
         found[name] += run_scenario(scenario, [name], [seed], controllers=[CONTROLLER])
+        done.print(f"seed {seed}, {name}: {', '.join(row(found[name][-1:]))}", markup=False, highlight=False)
     table = Table("estimator", title=f"{SCENARIO}, {CONTROLLER}, seeds {SEEDS[0]} to {SEEDS[-1]}: median and range")
     for column in (*next(iter(found.values()))[0].fit, "low information %", "value cu/h", "below limit %"):
         table.add_column(column, justify="right")
