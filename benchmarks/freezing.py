@@ -26,8 +26,9 @@ VARIANTS = {
 
 
 def spread(values: list[float], digits: int) -> str:
-    """Median [lowest, highest]."""
-    return f"{np.median(values):.{digits}f} [{min(values):.{digits}f}, {max(values):.{digits}f}]"
+    """Median, and [lowest, highest] of several."""
+    shown = f"{np.median(values):.{digits}f}"
+    return shown if len(values) == 1 else f"{shown} [{min(values):.{digits}f}, {max(values):.{digits}f}]"
 
 
 def row(runs: list[Run]) -> list[str]:
@@ -47,7 +48,7 @@ def main() -> None:
     done = Console(stderr=True)
     for seed, name in jobs:
         found[name] += run_scenario(scenario, [name], [seed], controllers=[CONTROLLER])
-        done.print(f"seed {seed}, {name}: {', '.join(row(found[name][-1:]))}", markup=False, highlight=False)
+        done.print(f"seed {seed}, {name}: {', '.join(row(found[name][-1:]))}", soft_wrap=True)
     table = Table("estimator", title=f"{SCENARIO}, {CONTROLLER}, seeds {SEEDS[0]} to {SEEDS[-1]}: median and range")
     for column in (*next(iter(found.values()))[0].fit, "low information %", "value cu/h", "below limit %"):
         table.add_column(column, justify="right")

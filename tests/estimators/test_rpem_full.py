@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,8 @@ import pytest
 
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.processes.cascaded_tanks import read_benchmark
+from adaptive_flot.processes.registry import make_model
 from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, full_parameters
 from benchmarks.forgetting import Recursion, stabilised
 from estimators.rpem import Rpem, RpemState
@@ -189,3 +193,21 @@ def _unforgotten(case: CellCase, factor: float, share: float) -> FloatArray:
     before = (np.linalg.inv(case.prior.covariance) - (1 - factor) * np.linalg.inv(A)) / factor
     covariance = np.linalg.inv(before).astype(np.float64)
     return (covariance + covariance.T) / 2
+
+
+def test_on_the_cascaded_tanks_the_full_recursion_predicts_better(shared_file: Callable[[str], Path]) -> None:
+    """Measured data: the level remembers for minutes, so the one-step gradient sees a small part of what theta does."""
+    model = make_model("cascaded-tanks")
+    record, _ = read_benchmark(shared_file("data/cascaded-tanks/dataBenchmark.csv"))
+    setup = Setup(model, record.dt, model.names("parameters"), ("level",))
+    first = record.outputs[0, 0]
+    nominal = model.parameter_values
+    prior = Prior(record.time[0], np.array([first, first]), nominal, np.diag((0.3 * nominal) ** 2), np.array([0.1]))
+    samples = tuple(
+        Sample(float(t), u, y) for t, u, y in zip(record.time[1:], record.inputs[1:], record.outputs[1:], strict=True)
+    )
+    errors = []
+    for estimator in (Rpem(setup), rpem_full(setup)):
+        found = np.array([e.innovation[0] for e in replay(estimator, prior, samples)])
+        errors.append(float(np.sqrt(np.mean(found[len(found) // 2 :] ** 2))))
+    assert errors[1] < 0.7 * errors[0], errors
