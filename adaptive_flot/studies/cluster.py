@@ -14,6 +14,13 @@ from distributed import Client, LocalCluster
 from adaptive_flot.errors import StudyError
 from adaptive_flot.greybox.rows import core_count
 
+SETTINGS = {
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+    # the cluster watches itself: nobody reads it here, and it takes 5 % of each core
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.gil.enabled": False,
+}
 CONNECT_S = 15.0
 """Longest wait for a scheduler to answer and for its first worker to be there."""
 
@@ -38,7 +45,7 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     for name in (*logging.root.manager.loggerDict, "distributed", "asyncio", "tornado"):
         if name.partition(".")[0] in ("distributed", "asyncio", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-    with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}):
+    with dask.config.set(SETTINGS):
         if scheduler is None:
             with _embedded(workers or core_count()) as cluster, Client(cluster) as client:
                 yield client
