@@ -8,6 +8,7 @@ from adaptive_flot.protocols import AnyController, AnyPlant
 from adaptive_flot.runner.faults import ControllerFault
 from adaptive_flot.runner.faulty_controller import FaultyController
 from adaptive_flot.runner.faulty_plant import FaultyPlant
+from adaptive_flot.runner.frozen_values import FrozenValues
 from adaptive_flot.runner.scenario import Scenario
 
 
@@ -20,6 +21,9 @@ def with_faults(
         rows = len(scenario.starts)
         draws = np.stack([np.random.default_rng([seed, 4, i]).random((rows, 2)) for i in range(len(around))], axis=1)
         plant = FaultyPlant(plant, around, scenario.model, scenario.dt, draws)
+    watched = {name: m.frozen_after_s for name, m in scenario.file.measurements.items() if m.frozen_after_s is not None}
+    if watched:
+        plant = FrozenValues(plant, scenario.model, watched)
     return plant, with_controller_faults(scenario, controller)
 
 

@@ -25,6 +25,8 @@ class Measurement(_Part):
     """Time between two measurements; default every sampling interval."""
     dead_time_s: float = Field(default=0.0, ge=0)
     """Time from taking a measurement to knowing it."""
+    frozen_after_s: float | None = Field(default=None, gt=0)
+    """A value that repeats itself to the bit for so long counts as missing; default it is believed."""
 
 
 class DisturbancePart(_Part):
