@@ -16,6 +16,8 @@ from adaptive_flot.greybox.stepper import Stepper
 
 POINTS = 161
 BAND = 1.96
+FREE = 3.0
+"""Where the curve at its middle is so many times as uncertain as its shape, only the shape is shown."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,9 @@ class EffectCurve:
         The change and its 95 % band (K,), linearised in the coefficients.
     seen
         Values of the driver along the record (N - 1,).
+    anchor
+        Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
+        adapted parameters; None where it can.
     """
 
     effect: Effect
@@ -47,6 +52,7 @@ class EffectCurve:
     low: FloatArray
     high: FloatArray
     seen: FloatArray
+    anchor: float | None = None
 
 
 def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, ...]:
@@ -94,11 +100,24 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     c = np.array([effect.coefficients[t.name] for t in effect.terms])
     middle = np.array([float(g(v, c)) for v in x])
     gradient = np.array([np.array(slope(v, c)).ravel() for v in x])
-    std = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, _covariance(fit, names), gradient), 0))
+    covariance, anchor = _covariance(fit, names), None
+    std = _spread(gradient, covariance)
+    if effect.shape.static is not None:
+        typical = float(np.median(seen))
+        there = np.array(slope(typical, c)).ravel()
+        shape_only = _spread(gradient - there, covariance)
+        if _spread(there[None], covariance)[0] > FREE * np.max(shape_only):
+            anchor, std, middle = typical, shape_only, middle - float(g(typical, c))
     shown = np.exp if relative else np.asarray
     low, change, high = (shown(middle + k * BAND * std) for k in (-1, 0, 1))
     unit = "-" if relative else (site.unit or "")
-    return EffectCurve(effect, units.get(effect.driver, ""), unit, relative, x, change, low, high, seen)
+    return EffectCurve(effect, units.get(effect.driver, ""), unit, relative, x, change, low, high, seen, anchor)
+
+
+def _spread(gradient: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Standard deviation (K,) of values with the derivatives (K, q)."""
+    found: FloatArray = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0))
+    return found
 
 
 def _covariance(fit: Fit, names: Sequence[str]) -> FloatArray:

@@ -112,6 +112,11 @@ def _curve_picture(found: Discovery, problem: Problem, after: Fit, album: Album)
         f"{tables.effect_text([(c.effect.site, c.effect.driver) for c in curves])}: {told}, over what the record "
         "covers, with the 95 % band from the covariance of the fit. Below: how often the record was there."
     )
+    if any(c.anchor is not None for c in curves):
+        caption += (
+            " Shown relative to the middle of the record, which is all it tells: a constant change at this site is "
+            "one of the adapted parameters."
+        )
     return album.add(curve_figure(curves), caption, "Curve of the effect over its driver")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.curve import effect_curves
 from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.experiment import leading
 from adaptive_flot.discovery.search import Search
@@ -110,3 +111,13 @@ def test_the_machine_readable_verdict_is_that_of_the_design(draught: Discovery) 
     assert set(error) == {"unit", "before", "after", "noise", "reduction95", "block"} and error["unit"] == "K"
     assert told["tests"]["ljung_box_before"] < 1e-6 < told["tests"]["ljung_box_after"]
     assert set(told["parameters"]) == {"efficiency", "loss"} == set(told["absorbed"])
+
+
+def test_the_curve_shows_the_shape_where_a_constant_is_an_adapted_parameter(draught: Discovery) -> None:
+    """Any constant factor on the loss is the parameter `loss`: the band is that of (fan / middle)^0.6 and holds it."""
+    assert draught.problem is not None and draught.after is not None
+    (curve,) = effect_curves(draught.problem, draught.after, 1)
+    assert curve.anchor is not None
+    truth = (curve.driver / curve.anchor) ** 0.6
+    assert np.all(curve.low <= curve.high) and np.max(curve.high - curve.low) < 0.1
+    assert np.mean((curve.low - 1e-9 <= truth) & (truth <= curve.high + 1e-9)) > 0.9
