@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check format bench bench-discovery bench-discovery-quick lock clean
+.PHONY: help install demo test check format bench bench-discovery bench-discovery-quick bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -47,6 +47,10 @@ bench-discovery: $(READY) ## Judge 300 records with a hidden effect, rivals besi
 
 bench-discovery-quick: $(READY) ## The same on the first 30 records (minutes)
 	@$(BIN)/python -m benchmarks.hidden_effects full --count 30 --method correlation $(BENCH_ARGS)
+
+bench-measured: $(READY) ## Discovery on measured records and shared examples in ../shared (minutes)
+	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)
+	@$(BIN)/python -m benchmarks.mining_plant
 
 lock: ## Pin the dependencies again in requirements.lock (uv, in a throw-away environment)
 	@$(require_python)
