@@ -148,6 +148,7 @@ def judge(found: Search) -> Judgement:
     shortcoming = found.left - found.left_threshold
     margin = max(LEAST_MARGIN, shortcoming)
     close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < margin]
+    close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
     rivals = tuple(found.alternatives[1:6])
     if _only_drift(best, found.adapted_sites):
@@ -164,6 +165,21 @@ def judge(found: Search) -> Judgement:
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
+
+
+def _only_adds_to(a: Alternative, b: Alternative) -> bool:
+    """Whether `a` makes a constant change of `b` depend on a signal, for no gain in likelihood to speak of.
+
+    The dependence holds the constant as a special case: no record and no test can tell it from there.
+    """
+    if len(a.names) != len(b.names):
+        return False
+    other = [(x, y) for x, y in zip(sorted(a.names), sorted(b.names), strict=True) if x != y]
+    if len(other) != 1:
+        return False
+    (site, driver), (where, constant) = other[0]
+    signal = driver not in ("constant", "time", "lag", "delay", "saturation")
+    return site == where and constant == "constant" and signal and b.fit.loss - a.fit.loss < LEAST_MARGIN
 
 
 def _only_drift(a: Alternative, adapted: tuple[str, ...]) -> bool:

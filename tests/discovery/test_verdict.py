@@ -44,6 +44,10 @@ def _search(draught: Discovery, *found: tuple[tuple[str, str], bool, float], lef
         ([(BY_HEATER, False, 0.0), (BY_FAN, True, 50.0)], 0.0, "unnamed"),
         ([(BY_HEATER, False, 0.0), (("thermometer", "power"), False, 2.0)], 0.0, "abstain"),
         ([(BY_FAN, True, 0.0), (BY_HEATER, True, 95.0)], 150.0, "abstain"),  # no better than no effect at all
+        # a dependence that holds the constant as a special case and gains nothing is no other cause
+        ([(("heat_loss", "constant"), True, 0.0), (BY_FAN, True, 8.6)], 0.0, "named"),
+        ([(BY_FAN, True, 0.0), (("heat_loss", "constant"), True, 2.0)], 0.0, "named"),
+        ([(("heat_loss", "constant"), True, 0.0), (BY_FAN, True, 8.6), (BY_HEATER, True, 9.0)], 0.0, "class"),
         ([((s, "fan_speed"), True, 1.0 * k) for k, s in enumerate("abcd")], 0.0, "abstain"),  # too many to be a class
     ],
 )
