@@ -24,6 +24,8 @@ from adaptive_flot.greybox.stepper import Stepper
 
 DRIFT = 0.3
 """Standard deviation of an adapted parameter, and of what changes with time, in a test: as a share of its value."""
+RUN_AWAY = 1e9
+"""Standard deviations beyond which a simulated test says nothing: the model has left its range."""
 LONG_AGO = 1e6
 """Time [s] before a test of the step that stands for a held effect."""
 
@@ -93,10 +95,15 @@ def _uncertain(fit: Fit, held: Model, problem: Problem) -> tuple[tuple[str, ...]
 
 
 def separation(a: Prediction, b: Prediction) -> float:
-    """Separation of two predictions of one test: d' (I + X X')^-1 d, whitened, by least squares with a unit prior."""
+    """Separation of two predictions of one test: d' (I + X X')^-1 d, whitened, from the singular values of X.
+
+    NaN where a prediction is no number or has run away: nobody would plan a test by it.
+    """
     d = a.white - b.white
     X = np.hstack([a.uncertain, b.uncertain])
-    if not (np.isfinite(d).all() and np.isfinite(X).all()):
+    if not (np.all(np.abs(d) < RUN_AWAY) and np.all(np.abs(X) < RUN_AWAY)):
         return float("nan")
-    beta = np.linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ d)
-    return float(d @ (d - X @ beta))
+    turned, size, _ = np.linalg.svd(X, full_matrices=False)
+    along = turned.T @ d
+    across = d - turned @ along  # what no uncertain parameter touches, and what is left along each that is uncertain
+    return float(across @ across + np.sum(along**2 / (1 + size**2)))

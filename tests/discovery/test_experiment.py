@@ -49,6 +49,15 @@ def test_what_an_uncertain_parameter_can_do_is_no_separation() -> None:
     assert np.isnan(separation(a, _prediction(np.full(50, np.nan), np.zeros((50, 0)))))
 
 
+@pytest.mark.parametrize("size", [1e3, 1e8, 1e80, np.inf])
+def test_a_prediction_that_runs_away_is_no_test(size: float) -> None:
+    """Never negative, however uncertain a prediction is, and none where a run left the range of its model."""
+    rng = np.random.default_rng(0)
+    a, b = (Prediction(np.zeros((5, 1)), w, size * rng.standard_normal((5, 2))) for w in (np.ones(5), np.zeros(5)))
+    found = separation(a, b)
+    assert 0 <= found <= 5 if size <= 1e8 else np.isnan(found)
+
+
 def test_signals_stay_in_their_limits_and_move_only_what_may_move(even: Dataset) -> None:
     inputs = heated_tank().inputs
     where = input_range(even.inputs, inputs)
