@@ -17,7 +17,8 @@ from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.parallel import available_processes
 from adaptive_flot.discovery.problem import Problem, make_problem
 from adaptive_flot.discovery.search import search

@@ -12,7 +12,8 @@ import numpy as np
 
 from adaptive_flot.discovery.catalogue import finer
 from adaptive_flot.discovery.events import event_scores
-from adaptive_flot.discovery.fit import MOST_STEPS, Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer

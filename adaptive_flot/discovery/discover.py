@@ -11,7 +11,8 @@ import numpy as np
 from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.experiment import leading, plan_experiment
 from adaptive_flot.discovery.explained import nothing_explained
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
 from adaptive_flot.discovery.noise import proportional

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.joint_fits import (
     LAST_STEPS,
     JointFits,

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from statsmodels.tsa.stattools import acf
 
 from adaptive_flot.discovery.attribute import Alternative, fixed_coefficients, limited, shape_bounds
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer

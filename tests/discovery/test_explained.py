@@ -10,7 +10,7 @@ import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.explained import LEAST_EXPLAINED, nothing_explained, regression_shares
-from adaptive_flot.discovery.fit import Fitter
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.problem import make_problem
 from adaptive_flot.errors import DataError
 from adaptive_flot.processes.registry import make_model

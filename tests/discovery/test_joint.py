@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.gate import gate
 from adaptive_flot.discovery.joint import dominated
 from adaptive_flot.discovery.joint_fits import correlation_time, cross_validated

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.catalogue import Candidate, catalogue, finer, spline_values
-from adaptive_flot.discovery.fit import Fit, Fitter
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.problem import Problem, make_problem
 from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.discovery.scoring import Scorer

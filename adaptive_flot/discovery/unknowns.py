@@ -1,0 +1,117 @@
+"""What a fit is free to move: parameters, and those combinations of the initial state that the record can tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import cast
+
+import numpy as np
+
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.steady_state import steady_state
+
+DIRECTION_PRIOR = 5.0
+"""Standard deviation of the weak prior of a direction of the initial state, in units of the states' scales."""
+PRIOR_SCALES = 20.0
+"""Standard deviation of the weak prior of an effect's coefficients, in units of their scale."""
+
+
+class Unknowns:
+    """Unknowns z: the q free parameters over their scale, then the r free directions of the initial state.
+
+    Attributes
+    ----------
+    names
+        Free parameters (q,), the adapted ones first.
+    lower, upper, centre
+        Range and start of z (q + r,).
+    prior, prior_centre
+        Standard deviation and centre of the weak prior of z (q + r,).
+    directions
+        Free combinations of the initial state (nx, r).
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        model: Model,
+        free: tuple[str, ...],
+        start: Mapping[str, float],
+        like: Fit | None,
+        bounds: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.problem, self.model = problem, model
+        self.names = (*problem.adapted, *(n for n in free if n not in problem.adapted))
+        self.where = model.indices("parameters", self.names)
+        parameters = [model.parameters[i] for i in self.where]
+        if like is not None:
+            start = {**{p.name: p.value for p in like.model.parameters}, **start}
+        self.base = np.array([start.get(p.name, p.value) for p in model.parameters])
+        self.x0 = self._first_state(like)
+        self.q = len(self.names)
+        self.scale = np.array([p.scale for p in parameters])
+        low = [max(p.lower, bounds.get(p.name, (-np.inf, np.inf))[0]) for p in parameters]
+        high = [min(p.upper, bounds.get(p.name, (-np.inf, np.inf))[1]) for p in parameters]
+        shapes = {e.parameter(c.name) for e in model.effects for c in e.terms if c.shape}
+        unbound = [i < len(problem.adapted) or p.name in shapes for i, p in enumerate(parameters)]
+        self._range = np.array(low) / self.scale, np.array(high) / self.scale
+        self._prior = np.where(unbound, np.inf, PRIOR_SCALES)
+        self._prior_centre = np.array([p.value for p in parameters]) / self.scale
+        directions = np.zeros((len(self.x0), 0)) if like is None else like.directions
+        self.turn(np.vstack([directions, np.zeros((len(self.x0) - len(directions), directions.shape[1]))]))
+
+    def turn(self, directions: FloatArray) -> None:
+        """Make these directions (nx, r) of the initial state the free ones."""
+        r = directions.shape[1]
+        self.directions = directions
+        self.lower = np.concatenate([self._range[0], np.full(r, -np.inf)])
+        self.upper = np.concatenate([self._range[1], np.full(r, np.inf)])
+        self.prior = np.concatenate([self._prior, np.full(r, DIRECTION_PRIOR)])
+        self.prior_centre = np.concatenate([self._prior_centre, np.zeros(r)])
+        start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r)])
+        self.centre = np.clip(start, self.lower, self.upper)
+
+    def _first_state(self, like: Fit | None) -> FloatArray:
+        record, n = self.problem.record, len(self.model.states)
+        if record.initial_state is not None and n == len(record.initial_state):
+            return record.initial_state
+        if like is not None:
+            known = like.initial_state
+        else:
+            guess = np.array([self.model.initial_guess.get(s.name, s.scale) for s in self.model.states])
+            if not self.model.starts_steady:
+                return guess
+            try:
+                known = steady_state(self.model, record.inputs[0], self.base).state
+            except RangeError:
+                return guess
+        if len(known) == n:
+            return known.copy()
+        return self._settled_filters(known)
+
+    def _settled_filters(self, known: FloatArray) -> FloatArray:
+        """Initial state with the states of new effects where they are at rest beside the known ones."""
+        record, nx = self.problem.record, len(self.model.states)
+        x = np.concatenate([known, np.ones(nx - len(known))])
+        new = slice(len(known), nx)
+        arguments = record.time[0], x, record.inputs[0], self.base
+        slope = np.array(self.model.ode.factory("slope", ["t", "x", "u", "p"], ["jac:xdot:x"])(*arguments))
+        rate = np.array(self.model.ode(*arguments)[0]).ravel()
+        x[new] -= np.linalg.lstsq(slope[new, new], rate[new], rcond=None)[0]
+        return x
+
+    def unpack(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Parameters (np,) and initial state (nx,), kept inside the physical range of each state."""
+        p = self.base.copy()
+        p[self.where] = z[: self.q] * self.scale
+        x0 = self.x0 + self.directions @ z[self.q :]
+        lower = np.array([s.lower for s in self.model.states])
+        upper = np.array([s.upper for s in self.model.states])
+        return p, cast(FloatArray, np.clip(x0, lower, upper))
+
+    def initial_gradient(self) -> FloatArray:
+        """Derivative of the initial state by z (nx, q + r)."""
+        return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
