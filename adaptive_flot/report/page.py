@@ -96,14 +96,16 @@ def made_by(command: str, more: Iterable[tuple[str, str]] = ()) -> list[tuple[st
 
 
 def number(value: float, form: str = ".2f") -> str:
-    """Return a number as text with a true minus sign; a dash where it is not finite.
+    """Return a number as text with a true minus sign, none before a zero; a dash where it is not finite.
 
-    >>> number(-1.5), number(float("nan")), number(0.2, "+.1f")
-    ('−1.50', '–', '+0.2')
+    >>> number(-1.5), number(float("nan")), number(0.2, "+.1f"), number(-0.004)
+    ('−1.50', '–', '+0.2', '0.00')
     """
     if not -float("inf") < value < float("inf"):
         return "–"
-    return f"{value:{form}}".replace("-", MINUS)
+    text = f"{value:{form}}"
+    zero = not any(digit in text for digit in "123456789")
+    return text.lstrip("-") if zero else text.replace("-", MINUS)
 
 
 @cache
