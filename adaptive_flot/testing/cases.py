@@ -30,6 +30,7 @@ from adaptive_flot.protocols import (
 ADAPTED = ("growth_exponent", "coalescence_rate")
 ROWS = 40
 NOISE_STD = 1e-3
+"""As a share of an output."""
 
 
 @dataclass(frozen=True)
@@ -57,21 +58,24 @@ def estimator_case(
     *,
     model: Model | None = None,
     parameters: Sequence[str] = ADAPTED,
+    outputs: Sequence[str] = ("concentrate_grade",),
     **options: Any,
 ) -> EstimatorCase:
     """Build a case for an estimator class or factory, called as `factory(setup, **options)`.
 
-    `model` is the laboratory cell unless given: a cell with effects, say; `parameters` are those to adapt.
+    `model` is the laboratory cell unless given: a cell with effects, say; `parameters` are those to adapt, `outputs`
+    those that drive the adaptation.
     """
-    setup = Setup(model or _cell(), 1.0, tuple(parameters))
+    setup = Setup(model or _cell(), 1.0, tuple(parameters), tuple(outputs))
     inputs, samples, _ = _record(setup, seed)
+    size = np.abs([sample.outputs for sample in samples]).mean(axis=0)[setup.model.indices("outputs", setup.outputs)]
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     prior = Prior(
         time=0.0,
         state=steady_state(setup.model, inputs[0]).state,
         parameters=nominal,
         covariance=np.diag((0.02 * nominal) ** 2),
-        noise_std=np.full(len(setup.outputs), NOISE_STD),
+        noise_std=NOISE_STD * size,
     )
     return EstimatorCase(factory(setup, **options), prior, samples)
 
@@ -120,7 +124,7 @@ def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...], Fl
     p = np.tile(model.parameter_values, (ROWS, 1))
     p[:, model.index("parameters", "n")] *= np.linspace(1.0, 1.02, ROWS)
     run = Stepper(model, setup.dt).simulate(steady_state(model, inputs[0]).state, inputs, p)
-    outputs = run.outputs * (1 + 1e-3 * generator.standard_normal(run.outputs.shape))
+    outputs = run.outputs * (1 + NOISE_STD * generator.standard_normal(run.outputs.shape))
     samples = (Sample(float(t), u, y) for t, u, y in zip(run.time, inputs, outputs, strict=True))
     return inputs, tuple(samples), run.states
 

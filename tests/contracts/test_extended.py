@@ -17,6 +17,7 @@ from adaptive_flot.testing import (
     estimator_case,
     run_estimator,
 )
+from tests.contracts.test_contracts import ESTIMATOR_CASES
 
 EXPONENT = "bubble_size_by_air_flow.exponent"
 
@@ -40,8 +41,9 @@ def extended(model: Model) -> Model:
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_estimator_with_an_extended_model(name: str, extended: Model) -> None:
     """All checks of the kit, with n, C and the exponent of the effect adapted."""
-    factory = load(name, ESTIMATORS, "estimator")
-    case = estimator_case(factory, model=extended, parameters=("growth_exponent", "coalescence_rate", EXPONENT))
+    address, options = ESTIMATOR_CASES[name]
+    names = ("growth_exponent", "coalescence_rate", EXPONENT)
+    case = estimator_case(load(address, ESTIMATORS, "estimator"), model=extended, parameters=names, **options)
     for check in ESTIMATOR_CHECKS:
         check(case)
 
