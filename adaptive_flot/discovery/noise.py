@@ -43,12 +43,13 @@ class Noise:
 
     def whiten(self, series: FloatArray) -> FloatArray:
         """Whitened series over the innovation's standard deviation; series (N, m) or (N, m, q), weighted already."""
-        shape = (1, -1) + (1,) * (series.ndim - 2)
         white = series.copy()
-        for i in range(self.lags.shape[1]):
-            white[i + 1 :] -= self.lags[:, i].reshape(shape) * series[: -(i + 1)]
-        scaled: FloatArray = white / self.std.reshape(shape)
-        return scaled
+        for j, lags in enumerate(self.lags):
+            for i, lag in enumerate(lags):
+                if lag or series.ndim == 2:  # a value that is missing takes those with it that look back to it
+                    white[i + 1 :, j] -= lag * series[: -(i + 1), j]
+            white[:, j] /= self.std[j]
+        return white
 
     def stationary_std(self) -> FloatArray:
         """Standard deviation of the noise itself (m,), from its spectrum."""

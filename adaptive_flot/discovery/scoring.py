@@ -24,6 +24,8 @@ LENGTHS = (0.3, 0.55, 1.0, 1.8)
 """Factors of a duration or time constant that are tried with each."""
 PRIOR_SHARE = 0.3
 """Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
+DEPENDENT = 1e-12
+"""Share of the strongest combination of a variant's answers below which one is rounding, in squares."""
 ABSORBED = 1e-7
 """Share of an answer that must be left after projection; less is rounding, in which anything can be found."""
 
@@ -66,21 +68,25 @@ class Scorer:
         residual = fit.residual(problem) / problem.weights
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in courses])
         self.noise = self._clean_noise(residual, answers, nuisance, variants)
-        e = self.noise.whiten(residual)[self.rows]
-        self._present = np.isfinite(e)
-        base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self.rows][self._present])
+        e = self.noise.whiten(residual)
+        self._present = np.isfinite(e) & self.rows[:, None]
+        base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
         self._base = base
-        columns = self.noise.whiten(answers)[self.rows][self._present]
-        size = np.linalg.norm(columns, axis=0)
+        columns = self.noise.whiten(answers)[self._present]
+        columns *= self._size  # from here on in standard deviations of the prior
+        size = np.einsum("ij,ij->j", columns, columns)
         columns -= base @ (base.T @ columns)
-        columns[:, np.linalg.norm(columns, axis=0) < ABSORBED * size] = 0.0  # what is left is rounding
-        self._columns = columns
+        left = np.einsum("ij,ij->j", columns, columns)
+        columns[:, left < ABSORBED**2 * size] = 0.0  # what is left is rounding
         self.residual = self._project(np.clip(e[self._present], -1e3, 1e3))
+        self._columns = columns
+        self._along = columns.T @ self.residual
         self._slices: list[slice] = []
         at = 0
         for v in variants:
             self._slices.append(slice(at, at + len(v.courses)))
             at += len(v.courses)
+        self._grams = {s.start: columns[:, s].T @ columns[:, s] for s in self._slices}
 
     @staticmethod
     def _prior(offset: bool, responses: Responses, site: str) -> float:
@@ -142,10 +148,8 @@ class Scorer:
         return sorted(found, key=lambda s: -s.penalised)
 
     def _score(self, candidate: Candidate, variant: Variant, columns: slice) -> Score:
-        X = self._columns[:, columns] * self._size[columns]
-        A = X.T @ X
-        A += 1e-9 * np.trace(A) / len(A) * np.eye(len(A)) + 1e-30 * np.eye(len(A))
-        b = X.T @ self.residual
+        A, b = self._grams[columns.start], self._along[columns]
+        A = A + (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A))
         beta = np.linalg.solve(A, b)
         gain = float(b @ beta)
         shapes = len(variant.start)
@@ -170,7 +174,7 @@ class Scorer:
             if time[0] < onset < time[-1]
         ]
         answers = self._responses.of([v.courses[0] for v in variants]) / self.problem.weights[:, :, None]
-        columns = self.noise.whiten(answers)[self.rows][self._present]
+        columns = self.noise.whiten(answers)[self._present]
         columns -= self._base @ (self._base.T @ columns)
         gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
         best = int(np.argmax(gains))
@@ -188,17 +192,16 @@ class Scorer:
         Parametric bootstrap: the whitened residual is drawn as white Gaussian noise and projected like the real one.
         """
         rng = np.random.default_rng(seed)
-        E = rng.standard_normal((self._columns.shape[0], draws))
-        E -= self._base @ (self._base.T @ E)
+        along = self._columns.T @ rng.standard_normal((len(self._columns), draws))
         best = np.full(draws, -np.inf)
         at = 0
         for candidate in self.candidates:
             for variant in candidate.variants:
-                X = self._columns[:, self._slices[at]]
+                columns = self._slices[at]
                 at += 1
-                Q, R = np.linalg.qr(X)
-                good = np.abs(np.diag(R)) > 1e-9 * max(np.abs(np.diag(R)).max(), 1e-30)
-                gain = np.sum((Q[:, good].T @ E) ** 2, axis=0)
-                penalty = (X.shape[1] + len(variant.start)) * np.log(self._count)
+                strength, turned = np.linalg.eigh(self._grams[columns.start])
+                good = strength > max(DEPENDENT * strength[-1], 1e-60)
+                gain = np.sum((turned[:, good].T @ along[columns]) ** 2 / strength[good, None], axis=0)
+                penalty = (len(variant.courses) + len(variant.start)) * np.log(self._count)
                 best = np.maximum(best, gain - penalty)
         return best

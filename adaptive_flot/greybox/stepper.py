@@ -73,6 +73,7 @@ class Stepper:
         self.accurate = accurate
         self._key = ("stepper", self.dt, self.substeps, accurate)
         self._compiled = model.compiled and not accurate  # IDAS is machine code already
+        self._records: dict[tuple[str, tuple[str, ...], int], FastCall] = {}
 
     @property
     def step(self) -> ca.Function:
@@ -144,8 +145,9 @@ class Stepper:
         parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         for rows in _chunks(len(u)):
             accumulated = self._accumulated(self.step, (), rows.stop - rows.start, 1)
-            found = accumulated(x, t[rows], u[rows].T, p if p.ndim == 1 else p[rows].T)
-            parts.append((np.array(found[0]).T, np.array(found[1]).T, np.array(found[2]).T))
+            by_row = np.tile(p[:, None], rows.stop - rows.start) if p.ndim == 1 else p[rows].T
+            found = accumulated(x[:, None], t[None, rows], u[rows].T, by_row)
+            parts.append((found[0].T, found[1].T, found[2].T))
             x = parts[-1][0][-1]
         widths = (len(q) for q in (self.model.states, self.model.outputs, self.model.signals))
         xs, ys, ss = (np.vstack([np.empty((0, w)), *(part[i] for part in parts)]) for i, w in enumerate(widths))
@@ -188,11 +190,10 @@ class Stepper:
         for rows in _chunks(len(u)):
             count = rows.stop - rows.start
             accumulated = self._accumulated(function, tuple(wrt), count, 2)
-            xs, gs, y, dy = accumulated(x, gradient, t[rows], u[rows].T, p)
-            x = np.array(xs)[:, -1]
-            gradient = np.array(gs)[:, -q:]
-            ys.append(np.array(y).T)
-            dys.append(np.array(dy).reshape(-1, count, q).transpose(1, 0, 2))
+            xs, gs, y, dy = accumulated(x[:, None], gradient, t[None, rows], u[rows].T, np.tile(p[:, None], count))
+            x, gradient = xs[:, -1], gs[:, -q:]
+            ys.append(y.T)
+            dys.append(dy.reshape(-1, count, q).transpose(1, 0, 2))
         return Sensitivities(np.vstack(ys), np.concatenate(dys), x, gradient)
 
     def sensitivity_step(self, wrt: Sequence[str], unknowns: int | None = None) -> ca.Function:
@@ -214,7 +215,7 @@ class Stepper:
 
         return self._kept(("sensitivity", wrt, q), make)
 
-    def _accumulated(self, function: ca.Function, wrt: tuple[str, ...], rows: int, carried: int) -> ca.Function:
+    def _accumulated(self, function: ca.Function, wrt: tuple[str, ...], rows: int, carried: int) -> FastCall:
         # mapaccum carries only the first argument unless told how many: with a state and its sensitivity it must be
         # 2, else the sensitivity silently forgets the past.
         name = function.name()
@@ -222,7 +223,11 @@ class Stepper:
         def make() -> ca.Function:
             return self._ready(function, wrt).mapaccum(f"{name}_x{rows}", rows, carried)
 
-        return self._kept((name, wrt, rows), make)
+        key = name, wrt, rows
+        if key not in self._records:
+            whole = self._kept(key, make)
+            self._records[key] = FastCall(whole, [*whole.name_in(), *whole.name_out()])
+        return self._records[key]
 
     def _ready(self, function: ca.Function, wrt: tuple[str, ...] = ()) -> ca.Function:
         """A function of the step, as machine code where the model asks for it."""
