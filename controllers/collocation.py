@@ -58,8 +58,7 @@ class Problem:
         grades = grade.map("grades", "serial", horizon, [2], [])(variables, self.begin, p)
         each = ca.Function("stage_constraints", [w, stage.after, begin, vector], [stage.constraints], CSE)
         lines = each.map("lines", "serial", horizon, [3], [])(variables, after, self.begin, p)
-        initial = variables[: layout.state_size, 0] - self._now(p)
-        g = self.joined(initial, lines)
+        g = self.joined(self.initial(x, p), lines)
         self.nlp: dict[str, Any] = {"x": x, "f": -ca.sum1(terms), "g": g, "p": p}
         self.terms = ca.Function("terms", [x, p], [terms])
         self.grades = ca.Function("grades", [x, p], [grades.T])
@@ -76,6 +75,10 @@ class Problem:
         stages = ca.reshape(x[: layout.horizon * layout.block], layout.block, layout.horizon)
         last = x[layout.horizon * layout.block :]
         return stages, ca.horzcat(stages[: layout.state_size, 1:], last)
+
+    def initial(self, x: ca.MX, p: ca.MX) -> ca.MX:
+        """Residual of the initial condition (state_size,)."""
+        return x[: self.layout.state_size] - self._now(p)
 
     def joined(self, initial: ca.MX, lines: ca.MX) -> ca.MX:
         """One vector of the initial condition and the other constraints of each stage (rows of a stage, horizon)."""

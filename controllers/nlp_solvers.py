@@ -3,7 +3,7 @@
 These are warm started from the plan of the move before. Both follow the central path only down to a small barrier
 parameter and stop there. What is left of the barrier costs less than 1e-5 of the objective and keeps the next start
 well inside the feasible set: ipopt, which takes the multipliers of the move before, needs 6 iterations instead of 14;
-fatrop, which can not take them, 7 instead of 20.
+fatrop, which can not take them, 6 instead of 20.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from controllers.real_time_iteration import RealTimeIteration
 from controllers.verification import Solution, Solver, Verifier, no_solution
 
 BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
-"""Barrier parameter in units of the objective (see `VALUE_SCALE` of the controller): ipopt keeps this one, fatrop
-begins with it and takes one or two smaller ones."""
+"""Barrier parameter in units of the objective (see `VALUE_SCALE` of the controller). A larger one for fatrop would
+save an iteration, but then plans are not exact enough to tell what a dip of the air flow costs (`probing.py`)."""
 SOLVERS = ("ipopt", "fatrop", "rti")
 
 
@@ -112,7 +112,7 @@ def _fatrop(problem: Problem) -> dict[str, Any]:
         "structure_detection": "auto",
         "equality": problem.equality,
         "fatrop.print_level": 0,
-        "fatrop.tol": 10 * BARRIER["fatrop"],  # what is left of the barrier counts as an error
+        "fatrop.tol": 50 * BARRIER["fatrop"],  # what is left of the barrier counts as an error
         "fatrop.compl_inf_tol": 1.0,
         "fatrop.barrier_tol_factor": 9.0,
         "fatrop.mu_init": BARRIER["fatrop"],

@@ -28,6 +28,8 @@ MOST_STEPS = 4
 LEAST_CURVATURE = 1e-3
 """Of the objective by a scaled input, and by a slack that has none: the programme must be strictly convex."""
 UNBOUNDED = 1e9
+RESULTS = ("lines", "jacobian", "gradient", "hessian")
+"""Of `Derivatives.together`."""
 
 
 class RealTimeIteration:
@@ -44,7 +46,7 @@ class RealTimeIteration:
     def __init__(self, problem: Problem, cold: Solver) -> None:
         self.problem, self.layout, self._cold = problem, problem.layout, cold
         self._derivatives = Derivatives(problem)
-        self._linearise = FastCall(self._all(), matrices=("jacobian", "gradient", "hessian"))
+        self._linearise = FastCall(self._all(), matrices=RESULTS)
         self._inequalities = np.hstack([self.layout.rows[kind] for kind in ("moves", "grade", "level")])
         size, rows = self.layout.horizon * (INPUTS + SLACKS), self._inequalities.size
         dense = {"h": ca.Sparsity.dense(size, size), "a": ca.Sparsity.dense(rows, size)}
@@ -54,12 +56,12 @@ class RealTimeIteration:
     def _all(self) -> ca.Function:
         x, p = self.problem.nlp["x"], self.problem.nlp["p"]
         lam = ca.MX.sym("lam", self.problem.nlp["g"].numel())
-        of, begin = self._derivatives, self.problem.begin
-        stages, _ = self.problem.split(x)
-        lines = ca.reshape(lam[self.layout.stage_rows.ravel().tolist()], -1, self.layout.horizon)
-        _, curvature = of.hessian(stages, begin, p, 1.0, lines)
-        results = [self.problem.nlp["g"], of.jacobian(stages, begin, p), of.gradient(stages, begin, p), curvature]
-        return ca.Function("all", [x, p, lam], results, ["x", "p", "lam"], ["g", "jacobian", "gradient", "hessian"])
+        layout, begin = self.layout, self.problem.begin
+        stages, after = self.problem.split(x)
+        multipliers = ca.reshape(lam[layout.stage_rows.ravel().tolist()], -1, layout.horizon)
+        results = list(self._derivatives.together()(stages, after, begin, p, 1.0, multipliers))
+        initial = self.problem.initial(x, p)
+        return ca.Function("all", [x, p, lam], [initial, *results], ["x", "p", "lam"], ["initial", *RESULTS])
 
     def __call__(
         self,
@@ -108,12 +110,12 @@ class RealTimeIteration:
 
     def _linearised(self, x: FloatArray, arguments: FloatArray, lam: FloatArray) -> Linearised:
         layout, of = self.layout, self._derivatives
-        g, jacobian, gradient, hessian = self._linearise(x, arguments, lam)
+        initial, lines, jacobian, gradient, hessian = self._linearise(x, arguments, lam)
         J = np.zeros((layout.horizon, layout.stage_rows.shape[1], layout.block))
         J[:, of.jacobian_pattern.rows, of.jacobian_pattern.columns] = jacobian.T
         H = np.zeros((layout.horizon, layout.block, layout.block))
         H[:, of.hessian_pattern.rows, of.hessian_pattern.columns] = hessian.T
-        return Linearised(g[layout.stage_rows], J, g[layout.rows["initial"][0]], gradient.T, H)
+        return Linearised(lines.T, J, initial, gradient.T, H)
 
 
 def _inputs_first(chosen: FloatArray) -> FloatArray:
