@@ -17,6 +17,7 @@ from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.report import compare_tables
 from adaptive_flot.report import page as report
 from adaptive_flot.report.compare_findings import findings
+from adaptive_flot.report.unsolved import unsolved_table
 from adaptive_flot.runner.comparison import compare_runs
 from adaptive_flot.runner.estimate import RecordEstimate
 from adaptive_flot.runner.scenario import Scenario
@@ -119,7 +120,7 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
         return
     comparison = compare_runs(scenario, runs)
     makers = (compare_tables.outcome_table, compare_tables.status_table, compare_tables.time_table)
-    found = [make(comparison) for make in makers]
+    found = [*(make(comparison) for make in makers), unsolved_table(runs)]
     print_comparison([table for table in found if table is not None], findings(comparison))
 
 

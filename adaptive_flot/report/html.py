@@ -16,6 +16,7 @@ from adaptive_flot.report.limit import LimitPart, limit_part
 from adaptive_flot.report.page import Album, Page, Picture, Table, made_by, render
 from adaptive_flot.report.plotdata import Panel
 from adaptive_flot.report.series import Case
+from adaptive_flot.report.unsolved import unsolved_table
 from adaptive_flot.runner.comparison import compare_runs
 from adaptive_flot.runner.scenario import Scenario
 from adaptive_flot.runner.study import Run
@@ -43,6 +44,7 @@ class Chapter:
     initial: Table
     statuses: Table
     faults: Table | None
+    unsolved: Table | None
 
 
 def write_run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], path: Path | str, command: str = "") -> None:
@@ -140,6 +142,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         initial=tables.initial_table(case),
         statuses=tables.status_table(case),
         faults=fault_table(case),
+        unsolved=unsolved_table(case.runs),
     )
 
 

@@ -24,8 +24,8 @@ def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.D
     `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std` and for each pair of them
     `_correlation` (as `n_C_correlation`), as the estimator claims them; for others that move or are measured `_true`,
     `_known` (NaN where the plant, or the estimator's model, has no such parameter); then `status` of the estimator,
-    `control_status`, `decided_by`, the `faults` of a scenario that has any, and, where a controller optimised,
-    `solve_seconds`.
+    `control_status`, `decided_by`, the `faults` of a scenario that has any, `control_message` where an optimisation
+    failed (the constraints that were in the way), and, where a controller optimised, `solve_seconds`.
     """
     columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
     columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps, setup)
@@ -35,6 +35,8 @@ def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.D
     columns["decided_by"] = [s.decision.decided_by for s in steps]
     if scenario.file.faults:
         columns["faults"] = ["; ".join((*s.plant.faults, *s.decision.faults)) for s in steps]
+    if any(s.decision.message for s in steps):
+        columns["control_message"] = [s.decision.message for s in steps]
     solve = np.array([s.decision.solve_seconds for s in steps])
     if np.isfinite(solve).any():
         columns["solve_seconds"] = solve

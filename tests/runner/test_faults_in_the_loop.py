@@ -13,6 +13,7 @@ import yaml
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.protocols import Decision, Estimate, Sample, Status
+from adaptive_flot.report.unsolved import unsolved_table
 from adaptive_flot.runner.injection import with_faults
 from adaptive_flot.runner.scenario import load_scenario
 from adaptive_flot.runner.scenario_plant import make_plant
@@ -94,6 +95,18 @@ def test_the_loop_runs_on_within_its_limits_and_counts_what_happened(runs: list[
             failed = run.table["faults"].str.contains("solver_failure|nan_state")
             assert run.table["control_status"][failed].tolist() == ["shifted_plan"] * 3
             assert run.table["control_status"].iloc[-1] == "ok"
+
+
+def test_what_was_wrong_with_a_failed_solve_is_told(runs: list[Run]) -> None:
+    """In the table of the run, and once for each who decided then in report and on the command line."""
+    found = unsolved_table(runs)
+    assert found is not None
+    rows = [(row[0], row[3], row[4], row[5:]) for row in found.rows]
+    assert rows == [
+        ("economic_mpc", "shifted_plan", "the solver was made to fail", ("422", "2")),
+        ("economic_mpc", "shifted_plan", "state or estimate is not finite", ("482", "1")),
+    ]
+    assert unsolved_table(runs[1:]) is None
 
 
 def test_after_every_fault_it_decides_as_a_fresh_controller(runs: list[Run], solves: list[Solve]) -> None:
