@@ -23,8 +23,8 @@ def unsolved_table(runs: Sequence[Run]) -> Table | None:
     )
     if len(rows) > MOST_ROWS:
         caption += f" {len(rows) - MOST_ROWS} further rows are in the time series, column control_message."
-    header = ("Controller", "Estimator", "Seed", "Decided by", "What was wrong", "First at [s]", "Times")
-    return Table(caption, header, tuple(rows[:MOST_ROWS]), words=5)
+    header = ("Controller", "Estimator", "Seed", "Decided by", "First at [s]", "Times", "What was wrong")
+    return Table(caption, header, tuple(rows[:MOST_ROWS]), words=len(header))
 
 
 def _rows(run: Run) -> list[tuple[str, ...]]:
@@ -33,6 +33,6 @@ def _rows(run: Run) -> list[tuple[str, ...]]:
     failed = run.table[run.table["control_message"].fillna("") != ""]
     found: pd.DataFrame = failed.groupby(["decided_by", "control_message"], sort=False)["time_s"].agg(["min", "size"])
     return [
-        (run.controller, run.estimator, str(run.seed), str(who), str(words), number(first, "g"), str(count))
+        (run.controller, run.estimator, str(run.seed), str(who), number(first, "g"), str(count), str(words))
         for (who, words), first, count in zip(found.index, found["min"], found["size"], strict=True)
     ]

@@ -110,6 +110,38 @@ def test_without_a_plan_it_holds_and_without_finite_inputs_it_is_safe(
     np.testing.assert_array_equal(decision.inputs, case.setup.schedule[0])
 
 
+@pytest.mark.parametrize(("share", "tries"), [(0.9, 2), (1.1, 1)])
+def test_a_second_try_is_made_within_the_budget_only(
+    case: ControllerCase, monkeypatch: pytest.MonkeyPatch, share: float, tries: int
+) -> None:
+    """A warm start that fails is followed by a cold one, unless it used up the time of the step."""
+    controller = case.controller
+    assert isinstance(controller, EconomicMpc)
+    state, _ = run(case, start(case), slice(0, 1))
+    took, calls, fails = share * controller.budget_s, [], broken("no luck")
+
+    def solve(*given: Any) -> Solution:
+        calls.append(given)
+        failed: Solution = fails(*given)
+        return replace(failed, seconds=took)
+
+    monkeypatch.setattr(controller, "solver", solve)
+    _, decision = controller.decide(state, replace(case.samples[0], time=31.0), case.estimates[0])
+    assert len(calls) == tries and decision.status is Status.SHIFTED_PLAN
+
+
+def test_ipopt_stops_where_its_time_is_up(case: ControllerCase) -> None:
+    """At its start: to hold the inputs in a cell at rest is a plan that meets the constraints, so it is applied."""
+    hurried = controller_case(EconomicMpc, horizon=6, solver="ipopt", budget_s=1e-6)
+    state = hurried.controller.decide(hurried.controller.init(0.0), None, None)[0]
+    _, decision = hurried.controller.decide(state, case.samples[0], case.estimates[0])
+    _, free = run(case, start(case), slice(0, 1))
+    assert decision.status is Status.OK and decision.plan is not None and free[0].plan is not None
+    planned, held = decision.plan.inputs["level_setpoint"], case.samples[0].inputs[2]
+    np.testing.assert_allclose(planned, held, rtol=1e-3)
+    assert np.abs(free[0].plan.inputs["level_setpoint"] / held - 1).max() > 0.02
+
+
 def test_a_state_that_is_not_finite_does_not_poison_the_next_step(case: ControllerCase) -> None:
     """After one NaN estimate the controller decides as one that never saw it (from the same plan)."""
     state, _ = run(case, start(case), slice(0, 1))

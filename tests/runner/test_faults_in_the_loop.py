@@ -101,10 +101,10 @@ def test_what_was_wrong_with_a_failed_solve_is_told(runs: list[Run]) -> None:
     """In the table of the run, and once for each who decided then in report and on the command line."""
     found = unsolved_table(runs)
     assert found is not None
-    rows = [(row[0], row[3], row[4], row[5:]) for row in found.rows]
+    rows = [(row[0], *row[3:]) for row in found.rows]
     assert rows == [
-        ("economic_mpc", "shifted_plan", "the solver was made to fail", ("422", "2")),
-        ("economic_mpc", "shifted_plan", "state or estimate is not finite", ("482", "1")),
+        ("economic_mpc", "shifted_plan", "422", "2", "the solver was made to fail"),
+        ("economic_mpc", "shifted_plan", "482", "1", "state or estimate is not finite"),
     ]
     assert unsolved_table(runs[1:]) is None
 
