@@ -23,8 +23,8 @@ from adaptive_flot.greybox.model import Model
 SHORTLIST = 10
 """Candidates that are refitted in full."""
 FORMS_EACH = 2
-FIRST_STEPS = 3
-"""Gauss-Newton steps of the first heat, in which every candidate runs."""
+FIRST_STEPS = 6
+"""Steps of the first heat, in which every candidate runs."""
 FINALISTS = 4
 SURE_FINALISTS = 3
 NEAR_FINALIST = 0.5

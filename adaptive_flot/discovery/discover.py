@@ -127,7 +127,10 @@ def discover(
     verdict = _verdict(problem, checked, found, judgement, before, after, report_record)
     if judgement.best is not None and judgement.word != "none":
         progress("plan a test")
-        compared = leading(judgement.best, found.alternatives, judgement.margin)
+        compared = [
+            replace(a, fit=Fitter(problem).with_intervals(a.fit))
+            for a in leading(judgement.best, found.alternatives, judgement.margin)
+        ]
         planned = plan_experiment(problem, compared, LEAST_MARGIN, limits, processes)
         verdict = replace(verdict, experiment=planned)
     extended = after.model if judgement.word in ("named", "class", "unnamed") else before.model
@@ -151,11 +154,11 @@ def _prepare(
 
 def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:
     fitter = Fitter(problem, ("estimate", "confirm"))
-    before = fitter.fit(base.model, like=base, rounds=2) or base
+    before = fitter.with_intervals(fitter.fit(base.model, like=base, rounds=2) or base)
     if best is None:
         return before, before
     after = fitter.fit(best.fit.model, best.fit.names, like=best.fit, rounds=2) or best.fit
-    return before, after
+    return before, fitter.with_intervals(after)
 
 
 def on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tuple[Problem, Fit, Fit]:

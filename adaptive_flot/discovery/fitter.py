@@ -1,6 +1,6 @@
 """Fit one alternative: adapted parameters, initial state and effect coefficients, with its own noise model.
 
-Gauss-Newton with Marquardt damping on exact sensitivities of the whole record, for the criterion of `fit`.
+Gauss-Newton with Marquardt damping on sensitivities of the whole record, for the criterion of `fit`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from adaptive_flot.discovery.unknowns import Unknowns
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.record import RecordSimulator
 
-MOST_STEPS = 8
-"""Gauss-Newton steps for one noise model."""
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
+SHAPE_DAMPING = 0.1
+"""First damping where an onset or a time constant is free: an undamped step throws it out of the record."""
+MOST_STEPS = 16
+"""Steps for one noise model."""
 NOISE_ROUNDS = 3
 MOST_DIRECTIONS = 4
 """Combinations of the initial state that are free: those that the record tells most about."""
@@ -28,6 +31,9 @@ TOLERANCE = 0.1
 """A step that improves minus two log-likelihood by less ends the search: a fortieth of what any test asks for."""
 SLOW = 2e-3
 """Or one that improves it by less than this share of what the search has gained so far."""
+KEPT, SHAPE_KEPT = 0.5, 0.8
+"""Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
+constant change more."""
 
 
 class Fitter:
@@ -65,7 +71,7 @@ class Fitter:
         rounds
             How often the noise model is fitted again.
         steps
-            Most Gauss-Newton steps for one noise model.
+            Most steps for one noise model.
 
         Returns
         -------
@@ -74,6 +80,10 @@ class Fitter:
         """
         unknowns = Unknowns(self.problem, model, free, start or {}, like, bounds or {})
         return _Search(self, model, unknowns).run(rounds, steps, like)
+
+    def with_intervals(self, fit: Fit) -> Fit:
+        """The fit with the covariance of exact derivatives: those that a search ends with may be a few steps old."""
+        return self.fit(fit.model, fit.names, like=fit, rounds=0) or fit
 
 
 class _Search:
@@ -111,15 +121,22 @@ class _Search:
         predicted, slope = self._jacobian(z)
         if not (np.isfinite(predicted).all() and _moderate(slope)):
             return None
-        noise = self._first_noise()
+        noise, exact = self._first_noise(), True
         for turn in range(rounds):
-            z, predicted, slope = self._descend(z, predicted, slope, noise, steps)
+            if not exact:
+                predicted, slope = self._derived(z, predicted, slope)
+            z, predicted, slope, exact = self._descend(z, predicted, slope, noise, steps)
             if turn < rounds - 1:
                 before = noise
                 noise = loss_of(self.problem, predicted, self.fitter.rows)[1]
                 if turn and _alike(before, noise):
                     break
         return self._result(z, predicted, slope)
+
+    def _derived(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Predictions and exact derivatives at z, or what there is where these are beyond all bounds."""
+        there, fresh = self._jacobian(z)
+        return (there, fresh) if _moderate(fresh) else (predicted, slope)
 
     def _telling_directions(self) -> FloatArray:
         """Directions (nx, r) of the initial state, in scales of the states, that the record tells most about."""
@@ -147,31 +164,52 @@ class _Search:
 
     def _descend(
         self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise, steps: int
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+        """Steps for one noise model: what they come to, its predictions, their derivatives, and if these are exact.
+
+        Derivatives cost ten times what a prediction does. While a step gains about what it promised they are kept, and
+        corrected by what the step has shown (Broyden 1965, *Math. Comp.* 19:577); only exact ones may end the search.
+        """
         value = first = self._objective(z, predicted, noise)
-        damping = 1e-3
+        shaped = self.unknowns.shaped
+        damping, exact = SHAPE_DAMPING if shaped else FIRST_DAMPING, True
         for _ in range(steps):
-            step_of = self._step(z, predicted, slope, noise)
-            accepted = False
-            while damping < 1e8:
-                trial = np.clip(z + step_of(damping), self.unknowns.lower, self.unknowns.upper)
-                there = self._predict(trial)
-                new = self._objective(trial, there, noise)
-                if new < value:
-                    accepted = True
+            A, b = self._system(z, predicted, slope, noise)
+            found = self._tried(z, value, noise, self._step(z, A, b), damping)
+            if found is None and exact:
+                break
+            if found is not None:
+                trial, there, new, damping = found
+                moved, gained = trial - z, value - new
+                promised = float(2 * b @ moved - moved @ A @ moved)
+                kept = gained > (SHAPE_KEPT if shaped else KEPT) * promised
+                if kept:
+                    slope = _corrected(slope, moved, there - predicted, np.diag(A))
+                done = gained < max(TOLERANCE, SLOW * (first - new))
+                z, value, predicted = trial, new, there
+                enough, exact = done and exact, False
+                if enough:
                     break
-                damping *= 10
-            if not accepted:
-                break
-            gained, z, value, predicted = value - new, trial, new, there
-            damping = max(damping / 10, 1e-9)
-            if gained < max(TOLERANCE, SLOW * (first - value)):
-                break
-            predicted, fresh = self._jacobian(z)
+                if kept and not done:
+                    continue
+            there, fresh = self._jacobian(z)
             if not _moderate(fresh):
                 break
-            slope = fresh
-        return z, predicted, slope
+            predicted, slope, exact = there, fresh, True
+        return z, predicted, slope, exact
+
+    def _tried(
+        self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
+    ) -> tuple[FloatArray, FloatArray, float, float] | None:
+        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next."""
+        while damping < MOST_DAMPING:
+            trial = np.clip(z + step_of(damping), self.unknowns.lower, self.unknowns.upper)
+            there = self._predict(trial)
+            new = self._objective(trial, there, noise)
+            if new < value:
+                return trial, there, new, max(damping / 10, LEAST_DAMPING)
+            damping *= 10
+        return None
 
     def _system(
         self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
@@ -189,10 +227,8 @@ class _Search:
         b = J.T @ e - prior * (z - self.unknowns.prior_centre)
         return A, b
 
-    def _step(
-        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
-    ) -> Callable[[float], FloatArray]:
-        A, b = self._system(z, predicted, slope, noise)
+    def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
+        """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
         size = np.diag(A) + 1e-12 * np.max(np.diag(A))
         at_lower = (z <= self.unknowns.lower) & (b < 0)
         at_upper = (z >= self.unknowns.upper) & (b > 0)
@@ -232,6 +268,13 @@ class _Search:
             loss + float(penalty),
             self.unknowns.directions,
         )
+
+
+def _corrected(slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
+    """Derivatives (N, m, unknowns) that give the `change` (N, m) of the predictions along the step that made it."""
+    along = weight * moved
+    found: FloatArray = slope + (change - slope @ moved)[:, :, None] * (along / max(float(moved @ along), 1e-300))
+    return found
 
 
 def _moderate(slope: FloatArray) -> bool:

@@ -26,6 +26,8 @@ class Unknowns:
     ----------
     names
         Free parameters (q,), the adapted ones first.
+    shaped
+        Whether some of them shape an effect (an onset, a time constant): derivatives by these change from step to step.
     lower, upper, centre
         Range and start of z (q + r,).
     prior, prior_centre
@@ -56,6 +58,7 @@ class Unknowns:
         low = [max(p.lower, bounds.get(p.name, (-np.inf, np.inf))[0]) for p in parameters]
         high = [min(p.upper, bounds.get(p.name, (-np.inf, np.inf))[1]) for p in parameters]
         shapes = {e.parameter(c.name) for e in model.effects for c in e.terms if c.shape}
+        self.shaped = any(p.name in shapes for p in parameters)
         unbound = [i < len(problem.adapted) or p.name in shapes for i, p in enumerate(parameters)]
         self._range = np.array(low) / self.scale, np.array(high) / self.scale
         self._prior = np.where(unbound, np.inf, PRIOR_SCALES)

@@ -27,7 +27,6 @@ class Built:
 
     dae: ca.Function
     ode: ca.Function
-    tangent: ca.Function
     decay: ca.Function
     sites: tuple[Site, ...]
     site_values: ca.Function
@@ -89,12 +88,13 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
     decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
     values = ca.vertcat(*scope.site_values.values()) if scope.site_values else ca.SX(0, 1)
     site_values = ca.Function("site_values", [t, x, u, p, z], [ca.densify(values)], options)
-    return Built(dae, ode, _tangent(dae, decay), decay, tuple(scope.sites.values()), site_values)
+    return Built(dae, ode, decay, tuple(scope.sites.values()), site_values)
 
 
-def _tangent(dae: ca.Function, decay: ca.Function) -> ca.Function:
+def tangent(dae: ca.Function, decay: ca.Function, directions: int) -> ca.Function:
+    """Derivatives of the right-hand side along several directions at once: what they share is worked out once."""
     t, x, u, p, z = dae.sx_in()
-    dx, dp = ca.SX.sym("dx", x.numel()), ca.SX.sym("dp", p.numel())
+    dx, dp = ca.SX.sym("dx", x.numel(), directions), ca.SX.sym("dp", p.numel(), directions)
     rates, residual, y, _ = dae(t, x, u, p, z)
     known, direction = ca.vertcat(x, p), ca.vertcat(dx, dp)
     if z.numel():
@@ -102,14 +102,14 @@ def _tangent(dae: ca.Function, decay: ca.Function) -> ca.Function:
         moved = ca.jtimes(residual, known, direction)
         dz = -moved / slope if z.numel() == 1 else -ca.solve(slope, moved)
     else:
-        dz = ca.SX(0, 1)
+        dz = ca.SX(0, directions)
     both = ca.vertcat(rates, y, decay(t, x, u, p, z))
     change = ca.jtimes(both, ca.vertcat(known, z), ca.vertcat(direction, dz))
     nx = x.numel()
     return ca.Function(
         "tangent",
         [t, x, u, p, z, dx, dp],
-        [change[:nx], change[nx:-nx], change[-nx:]],
+        [change[:nx, :], change[nx:-nx, :], change[-nx:, :]],
         ["t", "x", "u", "p", "z", "dx", "dp"],
         ["dxdot", "dy", "ddecay"],
         {"cse": True},

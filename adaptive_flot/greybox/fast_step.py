@@ -88,8 +88,9 @@ def fast_step_along(
         """Slope, outputs and decay rates."""
         xdot, y, _, z = model.ode(time, state.value, u, p)
         decay = model.decay(time, state.value, u, p, z)
-        parts = [model.tangent(time, state.value, u, p, z, state.along[:, j], seeds[:, j]) for j in range(q)]
-        slopes = [_columns([part[i] for part in parts], n.numel()) for i, n in enumerate((xdot, y, decay))]
+        if not q:
+            return Moving(xdot, ca.SX(xdot.numel(), 0)), Moving(y, ca.SX(y.numel(), 0)), Moving(decay, state.along)
+        slopes = model.tangent(q)(time, state.value, u, p, z, state.along, seeds)
         return Moving(xdot, slopes[0]), Moving(y, slopes[1]), Moving(decay, slopes[2])
 
     def remainder(time: ca.SX, state: Moving, decay: Moving) -> Moving:
@@ -127,7 +128,7 @@ class _Weights:
 def _weights(decay: Moving, h: float) -> _Weights:
     """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
     n, q = decay.along.shape
-    z, dz = ca.SX.sym("z", n), ca.SX.sym("dz", n)
+    z, dz = ca.SX.sym("z", n), ca.SX.sym("dz", n, q)
     phi3 = _series(z, 3)
     phi2 = z * phi3 + 0.5
     phi1 = z * phi2 + 1
@@ -141,9 +142,11 @@ def _weights(decay: Moving, h: float) -> _Weights:
         h * (4 * phi3 - phi2),
     ]
     values = ca.Function("weights", [z], weights)(h * decay.value)
+    if not q:
+        return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
     slopes = ca.Function("weight_slopes", [z, dz], [ca.jtimes(w, z, dz) for w in weights])
-    moved = [slopes(h * decay.value, h * decay.along[:, j]) for j in range(q)]
-    return _Weights(*(Moving(v, _columns([m[i] for m in moved], n)) for i, v in enumerate(values)))
+    moved = slopes(h * decay.value, h * decay.along)
+    return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
 
 
 def _series(z: ca.SX, k: int) -> ca.SX:

@@ -24,7 +24,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError, RangeError, near_match
-from adaptive_flot.greybox.build import Built, build
+from adaptive_flot.greybox.build import Built, build, tangent
 from adaptive_flot.greybox.effects import Effect, check_distinct
 from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
 from adaptive_flot.greybox.scope import Scope, Site
@@ -36,14 +36,14 @@ __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Sc
 class Model:
     """Named quantities plus equations; building it compiles nothing and takes milliseconds.
 
-    Attributes `dae`, `ode`, `tangent` and `decay` are CasADi functions of `(t, x, u, p[, z])`:
+    Attributes `dae`, `ode` and `decay`, and what `tangent(q)` returns, are CasADi functions of `(t, x, u, p[, z])`:
 
     ========= ============================================= ==========================================
     function  arguments                                     results
     ========= ============================================= ==========================================
     `dae`     t, x (nx,), u (nu,), p (np,), z (nz,)         dx/dt (nx,), residual (nz,), y (ny,), s (ns,)
     `ode`     t, x, u, p                                    dx/dt, y, s, z, with z solved inside
-    `tangent` t, x, u, p, z, dx (nx,), dp (np,)             derivatives of dx/dt, y and decay along (dx, dp)
+    `tangent` t, x, u, p, z, dx (nx, q), dp (np, q)         derivatives of dx/dt, y and decay along q (dx, dp)
     `decay`   t, x, u, p, z                                 decay rate of each state (nx,), 0 where none is given
     ========= ============================================= ==========================================
 
@@ -212,10 +212,12 @@ class Model:
         """Explicit right-hand side with the algebraic loop closed inside, see the class."""
         return self._built.ode
 
-    @property
-    def tangent(self) -> ca.Function:
-        """Directional derivative of the right-hand side and the outputs, with z moving along; see the class."""
-        return self._built.tangent
+    def tangent(self, directions: int = 1) -> ca.Function:
+        """Derivatives of the right-hand side and the outputs along directions, with z moving along; see the class."""
+        key = "tangent", directions
+        if key not in self.kept:
+            self.kept[key] = tangent(self.dae, self.decay, directions)
+        return self.kept[key]
 
     @property
     def decay(self) -> ca.Function:
