@@ -1,39 +1,18 @@
-"""Fit one alternative: adapted parameters, initial state and effect coefficients, with its own noise model.
-
-Gauss-Newton with Marquardt damping on sensitivities of the whole record, for the criterion of `fit`.
-"""
+"""Fits of alternatives to one problem: adapted parameters, initial state and effect coefficients."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import cast
+from collections.abc import Mapping
 
-import numpy as np
-
-from adaptive_flot.discovery.fit import Fit, loss_of
-from adaptive_flot.discovery.noise import Noise
+from adaptive_flot.discovery.descent import Descent
+from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.unknowns import Unknowns
-from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.model import Model
 
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
-SHAPE_DAMPING = 0.1
-"""First damping where an onset or a time constant is free: an undamped step throws it out of the record."""
 MOST_STEPS = 16
 """Steps for one noise model."""
 NOISE_ROUNDS = 3
-MOST_DIRECTIONS = 4
-"""Combinations of the initial state that are free: those that the record tells most about."""
-TELLING = 3.0
-"""A combination counts when a change by one scale moves the outputs by this many standard deviations in all."""
-TOLERANCE = 0.1
-"""A step that improves minus two log-likelihood by less ends the search: a fortieth of what any test asks for."""
-SLOW = 2e-3
-"""Or one that improves it by less than this share of what the search has gained so far."""
-KEPT, SHAPE_KEPT = 0.5, 0.8
-"""Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
-constant change more."""
 
 
 class Fitter:
@@ -42,7 +21,6 @@ class Fitter:
     def __init__(self, problem: Problem, share: tuple[str, ...] = ("estimate",)) -> None:
         self.problem = problem
         self.rows = problem.rows(*share)
-        self.count = int(np.isfinite(problem.measured[self.rows]).sum())
 
     def fit(
         self,
@@ -79,208 +57,8 @@ class Fitter:
             None when the model can not simulate the record from the start values.
         """
         unknowns = Unknowns(self.problem, model, free, start or {}, like, bounds or {})
-        return _Search(self, model, unknowns).run(rounds, steps, like)
+        return Descent(self.problem, self.rows, model, unknowns).run(rounds, steps, like is None)
 
     def with_intervals(self, fit: Fit) -> Fit:
         """The fit with the covariance of exact derivatives: those that a search ends with may be a few steps old."""
         return self.fit(fit.model, fit.names, like=fit, rounds=0) or fit
-
-
-class _Search:
-    """One search."""
-
-    def __init__(self, fitter: Fitter, model: Model, unknowns: Unknowns) -> None:
-        self.fitter, self.problem, self.model, self.unknowns = fitter, fitter.problem, model, unknowns
-        self.simulator = RecordSimulator(model, fitter.problem.record.dt)
-
-    def _predict(self, z: FloatArray) -> FloatArray:
-        p, x0 = self.unknowns.unpack(z)
-        return self.simulator.outputs(self.problem.record, x0, p)[:, self.problem.columns]
-
-    def _jacobian(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Predictions (N, m) and their derivatives (N, m, unknowns)."""
-        p, x0 = self.unknowns.unpack(z)
-        gradient = self.unknowns.initial_gradient()
-        y, dy, _ = self.simulator.sensitivities(self.problem.record, x0, p, self.unknowns.names, gradient)
-        columns = list(self.problem.columns)
-        dy[:, :, : self.unknowns.q] *= self.unknowns.scale
-        return y[:, columns], dy[:, columns, :]
-
-    def _objective(self, z: FloatArray, predicted: FloatArray, noise: Noise) -> float:
-        if not np.all(np.abs(predicted) < 1e100):
-            return np.inf
-        value = loss_of(self.problem, predicted, self.fitter.rows, noise)[0]
-        return value + float(np.sum(((z - self.unknowns.prior_centre) / self.unknowns.prior) ** 2))
-
-    # -- search --------------------------------------------------------------------------------------------------------
-
-    def run(self, rounds: int, steps: int, like: Fit | None) -> Fit | None:
-        if like is None:
-            self.unknowns.turn(self._telling_directions())
-        z = self.unknowns.centre.copy()
-        predicted, slope = self._jacobian(z)
-        if not (np.isfinite(predicted).all() and _moderate(slope)):
-            return None
-        noise, exact = self._first_noise(), True
-        for turn in range(rounds):
-            if not exact:
-                predicted, slope = self._derived(z, predicted, slope)
-            z, predicted, slope, exact = self._descend(z, predicted, slope, noise, steps)
-            if turn < rounds - 1:
-                before = noise
-                noise = loss_of(self.problem, predicted, self.fitter.rows)[1]
-                if turn and _alike(before, noise):
-                    break
-        return self._result(z, predicted, slope)
-
-    def _derived(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Predictions and exact derivatives at z, or what there is where these are beyond all bounds."""
-        there, fresh = self._jacobian(z)
-        return (there, fresh) if _moderate(fresh) else (predicted, slope)
-
-    def _telling_directions(self) -> FloatArray:
-        """Directions (nx, r) of the initial state, in scales of the states, that the record tells most about."""
-        scale = np.array([s.scale for s in self.model.states])
-        self.unknowns.turn(np.diag(scale))
-        _, slope = self._jacobian(self.unknowns.centre)
-        weighted = slope[:, :, self.unknowns.q :] / (self.problem.weights * self._white_std())[:, :, None]
-        rows = weighted[self.fitter.rows].reshape(-1, len(scale))
-        if not np.isfinite(rows).all():
-            return np.zeros((len(scale), 0))
-        strength, turned = np.linalg.eigh(rows.T @ rows)
-        telling = [i for i in np.argsort(-strength)[:MOST_DIRECTIONS] if strength[i] > TELLING**2]
-        return cast(FloatArray, scale[:, None] * turned[:, telling])
-
-    def _white_std(self) -> FloatArray:
-        """Noise by differencing: it needs no model."""
-        weighted = self.problem.measured / self.problem.weights
-        d = np.diff(weighted, axis=0)
-        found = np.array([np.nanmedian(np.abs(c)) * 1.4826 / np.sqrt(2) for c in d.T])
-        return cast(FloatArray, np.maximum(np.nan_to_num(found), self.problem.floor))
-
-    def _first_noise(self) -> Noise:
-        """White, and large: the first steps must not be steered by what a wrong model leaves."""
-        return Noise(np.maximum(3 * self._white_std(), self.problem.floor), np.zeros((len(self.problem.columns), 1)))
-
-    def _descend(
-        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise, steps: int
-    ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-        """Steps for one noise model: what they come to, its predictions, their derivatives, and if these are exact.
-
-        Derivatives cost ten times what a prediction does. While a step gains about what it promised they are kept, and
-        corrected by what the step has shown (Broyden 1965, *Math. Comp.* 19:577); only exact ones may end the search.
-        """
-        value = first = self._objective(z, predicted, noise)
-        shaped = self.unknowns.shaped
-        damping, exact = SHAPE_DAMPING if shaped else FIRST_DAMPING, True
-        for _ in range(steps):
-            A, b = self._system(z, predicted, slope, noise)
-            found = self._tried(z, value, noise, self._step(z, A, b), damping)
-            if found is None and exact:
-                break
-            if found is not None:
-                trial, there, new, damping = found
-                moved, gained = trial - z, value - new
-                promised = float(2 * b @ moved - moved @ A @ moved)
-                kept = gained > (SHAPE_KEPT if shaped else KEPT) * promised
-                if kept:
-                    slope = _corrected(slope, moved, there - predicted, np.diag(A))
-                done = gained < max(TOLERANCE, SLOW * (first - new))
-                z, value, predicted = trial, new, there
-                enough, exact = done and exact, False
-                if enough:
-                    break
-                if kept and not done:
-                    continue
-            there, fresh = self._jacobian(z)
-            if not _moderate(fresh):
-                break
-            predicted, slope, exact = there, fresh, True
-        return z, predicted, slope, exact
-
-    def _tried(
-        self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
-    ) -> tuple[FloatArray, FloatArray, float, float] | None:
-        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next."""
-        while damping < MOST_DAMPING:
-            trial = np.clip(z + step_of(damping), self.unknowns.lower, self.unknowns.upper)
-            there = self._predict(trial)
-            new = self._objective(trial, there, noise)
-            if new < value:
-                return trial, there, new, max(damping / 10, LEAST_DAMPING)
-            damping *= 10
-        return None
-
-    def _system(
-        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
-    ) -> tuple[FloatArray, FloatArray]:
-        """Normal equations (A, b) of the whitened, clipped, regularised problem."""
-        rows, w = self.fitter.rows, self.problem.weights
-        e = noise.whiten((self.problem.measured - predicted) / w)[rows]
-        J = noise.whiten(slope / w[:, :, None])[rows]
-        present = np.isfinite(e)
-        inside = present & (np.abs(np.where(present, e, 0)) <= self.problem.clip)
-        e = np.where(inside, e, 0)[inside]
-        J = J[inside]
-        prior = 1 / self.unknowns.prior**2
-        A = J.T @ J + np.diag(prior)
-        b = J.T @ e - prior * (z - self.unknowns.prior_centre)
-        return A, b
-
-    def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
-        """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
-        size = np.diag(A) + 1e-12 * np.max(np.diag(A))
-        at_lower = (z <= self.unknowns.lower) & (b < 0)
-        at_upper = (z >= self.unknowns.upper) & (b > 0)
-        move = ~(at_lower | at_upper)
-
-        def step(damping: float) -> FloatArray:
-            found = np.zeros(len(b))
-            system = A[np.ix_(move, move)] + damping * np.diag(size[move])
-            found[move] = np.linalg.solve(system, b[move])
-            return found
-
-        return step
-
-    def _result(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> Fit | None:
-        if not np.isfinite(predicted).all():
-            return None
-        problem, rows = self.problem, self.fitter.rows
-        loss, noise = loss_of(problem, predicted, rows)
-        A, _ = self._system(z, predicted, slope, noise)
-        inverse = np.linalg.pinv(A, hermitian=True)[: self.unknowns.q, : self.unknowns.q]
-        covariance = cast(FloatArray, inverse * np.outer(self.unknowns.scale, self.unknowns.scale))
-        p, x0 = self.unknowns.unpack(z)
-        values = p[self.unknowns.where]
-        fitted = self.model.with_parameters(dict(zip(self.unknowns.names, map(float, values), strict=True)))
-        penalty = len(self.unknowns.names) * np.log(max(self.fitter.count, 2))
-        innovations = noise.whiten((problem.measured - predicted) / problem.weights)
-        return Fit(
-            fitted,
-            self.unknowns.names,
-            values,
-            covariance,
-            x0,
-            predicted,
-            innovations,
-            noise,
-            loss,
-            loss + float(penalty),
-            self.unknowns.directions,
-        )
-
-
-def _corrected(slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
-    """Derivatives (N, m, unknowns) that give the `change` (N, m) of the predictions along the step that made it."""
-    along = weight * moved
-    found: FloatArray = slope + (change - slope @ moved)[:, :, None] * (along / max(float(moved @ along), 1e-300))
-    return found
-
-
-def _moderate(slope: FloatArray) -> bool:
-    """Whether a derivative can be squared: a run near the edge of stability has larger ones."""
-    return bool(np.all(np.abs(slope) < 1e100))
-
-
-def _alike(a: Noise, b: Noise) -> bool:
-    return np.allclose(a.std, b.std, rtol=0.01) and np.allclose(a.lags, b.lags, atol=0.02)

@@ -112,4 +112,4 @@ def _left(problem: Problem, fit: Fit, together: float) -> float:
     scorer, _ = scorer_of(problem, fit)
     gain, _ = what_is_left(scorer, LEAST_EVIDENCE)
     share = min(gain / max(float(np.sum(scorer.residual**2)), 1e-300), 0.99)
-    return -Fitter(problem).count * float(np.log(1 - share)) / together
+    return -problem.count(problem.rows("estimate")) * float(np.log(1 - share)) / together

@@ -179,7 +179,7 @@ def correlation_time(problem: Problem, fit: Fit) -> float:
 
 def discount(problem: Problem, fit: Fit, rows: float) -> Fit:
     """The same fit with evidence counted once every `rows` rows."""
-    count = max(Fitter(problem).count / rows, 2.0)
+    count = max(problem.count(problem.rows("estimate")) / rows, 2.0)
     return replace(fit, bic=float(fit.loss / rows + len(fit.names) * np.log(count)))
 
 

@@ -63,6 +63,10 @@ class Problem:
         """Noise model of a weighted residual (N, m) on some rows (N,)."""
         return (fit_noise if self.whiten else white_noise)(weighted, rows, self.floor)
 
+    def count(self, rows: BoolArray) -> int:
+        """Number of measurements on some rows (N,)."""
+        return int(np.isfinite(self.measured[rows]).sum())
+
     @property
     def measured(self) -> FloatArray:
         """Measured outputs (N, m), NaN where missing."""
