@@ -151,7 +151,7 @@ class Imm:
         status = Status.OK if present.any() else Status.MISSING
         prediction = expected @ predictions
         variance = expected @ (stds**2 + (predictions[:, self._columns] - prediction[self._columns]) ** 2)
-        if not np.isfinite(flags[:, 0]).all():
+        if not (np.isfinite(flags[:, 0]).all() and np.isfinite(log_likelihood).all()):
             z, P, probability, status = state.z, state.P, state.probability, Status.NOT_FINITE
         else:
             weights = expected * np.exp(log_likelihood - log_likelihood.max())

@@ -182,7 +182,11 @@ def process_noise(
 
 
 def first_estimate(prior: Prior, coordinates: Coordinates, shape: Layout) -> tuple[FloatArray, FloatArray]:
-    """Z (n,) and its covariance (n, n) from a prior; drift rates are zero."""
+    """Z (n,) and its covariance (n, n) from a prior; drift rates are zero.
+
+    A direction of the coordinates that the prior leaves open beyond their range is taken as known to that range, whose
+    standard deviation is that of a uniform distribution (see `_limited`).
+    """
     nx, q = shape.nx, shape.q
     c = np.clip(coordinates.from_parameters(prior.parameters), coordinates.lower, coordinates.upper)
     z, P = np.zeros(shape.size), np.zeros((shape.size, shape.size))
@@ -192,8 +196,37 @@ def first_estimate(prior: Prior, coordinates: Coordinates, shape: Layout) -> tup
     if joint is None:
         joint = np.zeros((nx + q, nx + q))
         joint[nx:, nx:] = prior.covariance
-    P[: nx + q, : nx + q] = to_z @ joint @ to_z
+    P[: nx + q, : nx + q] = _limited(to_z @ joint @ to_z, (coordinates.upper - coordinates.lower) / np.sqrt(12.0))
     return z, P
+
+
+def _limited(P: FloatArray, widest: FloatArray) -> FloatArray:
+    """Covariance (nx + q, nx + q) whose last q entries have no more than a standard deviation `widest` (q,).
+
+    A record that says nothing along a direction leaves it open by any factor; a filter that linearises would then move
+    by any factor. Each such direction is measured once, without moving the mean, so that its standard deviation becomes
+    one unit of `widest`; the states that hang on it follow. What is known better, or has no range (infinity), is left
+    as it is, to the bit.
+    """
+    q = len(widest)
+    unit = np.where(np.isfinite(widest), widest, 2 * np.sqrt(np.maximum(q * np.diag(P)[-q:], 1e-300)))
+    sizes, directions = np.linalg.eigh(P[-q:, -q:] / np.outer(unit, unit))
+    if not (sizes > 1.0).any():
+        return P
+    # of the states, where the widest direction moves by one unit; what comes from a singular fit may be indefinite
+    spread = np.sqrt(np.maximum(np.diag(P)[:-q], 0.0) / sizes.max())
+    scale = np.concatenate([np.where(spread > 0, spread, 1.0), unit])
+    scaled = P / np.outer(scale, scale)
+    # by a factor of P: a variance of 1e14 would leave nothing of the others in a difference of covariances
+    variances, axes = np.linalg.eigh(scaled)
+    factor = axes * np.sqrt(np.maximum(variances, 0.0))
+    for direction in directions[:, sizes > 1.0].T:
+        a = factor[-q:].T @ direction
+        variance = max(a @ a, 1.0)
+        # (I - b a a')^2 = I - a a' (variance - 1) / variance^2: the measurement that leaves a variance of 1
+        factor = factor - (1.0 - variance**-0.5) / variance * np.outer(factor @ a, a)
+    limited: FloatArray = scale[:, None] * (factor @ factor.T) * scale
+    return limited
 
 
 def parameters_of(

@@ -9,9 +9,11 @@ import pytest
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
-from adaptive_flot.protocols import Setup
+from adaptive_flot.plugins import ESTIMATORS, load
+from adaptive_flot.protocols import Setup, Status
 from estimators.coordinates import Coordinates
 from estimators.ekf import Ekf
+from estimators.joint_filter import first_estimate, layout
 from estimators.pem import Pem
 from tests.estimators import toys
 from tests.estimators.conftest import CellCase, replay
@@ -87,3 +89,53 @@ def test_estimates_of_the_cell_lie_within_their_uncertainty(cell_case: CellCase)
     std = np.sqrt(np.diag(found[-1].covariance))
     assert np.all(np.abs(found[-1].parameters - truth) < 3 * std)
     assert np.abs(found[-1].innovation[0]) < 5 * found[-1].innovation_std[0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_direction_that_is_open_beyond_its_range_is_measured_once(cell_case: CellCase, seed: int) -> None:
+    """To the variance of that range, against the Kalman update; a prior that is known better stays as it is."""
+    setup = cell_case.setup
+    coordinates, shape = Coordinates.of(setup.model, setup.parameters), layout(setup)
+    theta, n = cell_case.prior.parameters, shape.size
+    to_prior = np.diag([*np.ones(shape.nx), *coordinates.slopes(coordinates.from_parameters(theta))])
+    widest = (coordinates.upper - coordinates.lower) / np.sqrt(12.0)
+    half = np.random.default_rng(seed).normal(size=(n, n))
+    half[shape.coordinates] *= widest[:, None]
+    joint = half @ half.T
+    largest, _ = _eigen(joint[shape.nx :, shape.nx :], widest)
+
+    def start(covariance: FloatArray) -> FloatArray:
+        prior = replace(cell_case.prior, joint_covariance=to_prior @ covariance @ to_prior)
+        return first_estimate(prior, coordinates, shape)[1]
+
+    known, wide = 0.99 / largest.max() * joint, 30.0 / largest.max() * joint
+    np.testing.assert_allclose(start(known), known, rtol=1e-13)
+    expected = wide
+    for size, direction in zip(*_eigen(wide[shape.nx :, shape.nx :], widest), strict=True):
+        if size > 1.0:
+            row = np.concatenate([np.zeros(shape.nx), direction / widest])
+            gain = expected @ row / (row @ expected @ row + size / (size - 1.0))
+            expected = expected - np.outer(gain, row @ expected)
+    np.testing.assert_allclose(start(wide), expected, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(_eigen(start(wide)[shape.nx :, shape.nx :], widest)[0].max(), 1.0, rtol=1e-9)
+
+
+def _eigen(covariance: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+    sizes, directions = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return sizes, directions.T
+
+
+@pytest.mark.parametrize("name", ["ekf", "imm", "mhe"])
+def test_a_first_record_that_said_nothing_along_the_ridge_is_no_end(cell_case: CellCase, name: str) -> None:
+    """Inputs at rest leave n and C open by any factor in a batch fit: the filters go on, and the grade is predicted."""
+    theta = cell_case.prior.parameters
+    ridge = theta * np.array([0.25, -1.0])
+    open_ = cell_case.prior.covariance + 1e14 * np.outer(ridge, ridge)
+    options = {"window_s": 12, "solve_every_s": 4} if name == "mhe" else {}
+    estimator = load(name, ESTIMATORS, "estimator")(cell_case.setup, **options)
+    found = replay(estimator, replace(cell_case.prior, covariance=open_), cell_case.samples)
+    for e in found:
+        assert np.isfinite(e.parameters).all() and np.isfinite(e.covariance).all() and np.isfinite(e.state).all()
+        assert e.status in (Status.OK, Status.PROJECTED)
+    grade = cell_case.setup.model.index("outputs", "concentrate_grade")
+    assert np.abs([e.innovation[grade] for e in found[-20:]]).mean() < 3e-3
