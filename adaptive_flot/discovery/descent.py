@@ -17,7 +17,7 @@ from adaptive_flot.discovery.unknowns import Unknowns
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.record import RecordSimulator
 
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e4
 SHAPE_DAMPING = 0.1
 """First damping where an onset or a time constant is free: an undamped step throws it out of the record."""
 MOST_DIRECTIONS = 4

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.attribute import SHORTLIST, Alternative, refit, shortlist
+from adaptive_flot.discovery.attribute import SHORTLIST, Alternative, shortlist
 from adaptive_flot.discovery.catalogue import catalogue
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
+from adaptive_flot.discovery.heats import Lane, refit
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.discovery.scoring import Score, Scorer
@@ -107,11 +108,9 @@ def search(
     fitter = Fitter(problem)
     progress("score")
     scorer, sites = scorer_of(problem, base)
-    rounds = [_round(problem, fitter, base, scorer, [None], processes, progress)]
     near = _near(fitter, base, nominal)
-    if near is not None:
-        again, _ = scorer_of(problem, near)
-        rounds = [_merged(rounds[0], _round(problem, fitter, base, again, [None], processes, progress))]
+    scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
+    rounds = [_round(problem, fitter, base, scorers, [None], processes, progress)]
     accepted: list[Round] = []
     best: Alternative | None = None
     left = what_is_left(scorer, rounds[0].threshold)
@@ -124,7 +123,7 @@ def search(
         if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left):
             break
         beam = _beam(rounds[-1], best, BEAM)
-        rounds.append(_round(problem, fitter, base, scorer, beam, processes, progress))
+        rounds.append(_round(problem, fitter, base, [scorer], beam, processes, progress))
     return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites), accepted)
 
 
@@ -140,14 +139,6 @@ def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
         return None
     bounds = {n: (v * (1 - NEAR), v * (1 + NEAR)) for n, v in own.items()}
     return fitter.fit(nominal, bounds=bounds, rounds=2)
-
-
-def _merged(a: Round, b: Round) -> Round:
-    """Best fit of each name of two rounds, and the scores of the second."""
-    best: dict[frozenset[tuple[str, str]], Alternative] = {}
-    for alternative in sorted([*a.alternatives, *b.alternatives], key=lambda x: x.fit.bic):
-        best.setdefault(frozenset(alternative.names), alternative)
-    return Round(b.scores, max(a.threshold, b.threshold), tuple(best.values()))
 
 
 def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:
@@ -186,22 +177,25 @@ def _round(
     problem: Problem,
     fitter: Fitter,
     base: Fit,
-    scorer: Scorer,
+    scorers: list[Scorer],
     beam: list[Alternative | None],
     processes: int,
     progress: Callable[[str], None],
 ) -> Round:
-    threshold = threshold_of(scorer)
-    scores = tuple(scorer.scores())
+    threshold = max(map(threshold_of, scorers))
+    scores = tuple(scorers[-1].scores())
     found: list[Alternative] = []
     for k, before in enumerate(beam):
         if before is not None and k:
-            scorer, _ = scorer_of(problem, before.fit)
-        wanted = shortlist(scorer, SHORTLIST_FURTHER if before else SHORTLIST)
-        # a further effect must have a name: a pair of curves without one would explain anything
-        wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
+            scorers = [scorer_of(problem, before.fit)[0]]
+        lanes = []
+        for scorer in scorers:
+            wanted = shortlist(scorer, SHORTLIST_FURTHER if before else SHORTLIST)
+            # a further effect must have a name: a pair of curves without one would explain anything
+            wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
+            lanes.append(Lane(scorer, wanted))
         progress("fit")
-        found += refit(fitter, base, scorer, wanted, before, processes, lambda: progress("fit"))
+        found += refit(fitter, base, lanes, before, processes, lambda: progress("fit"))
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
     for a in sorted(found, key=lambda a: a.fit.bic):
         unique.setdefault(frozenset(a.names), a)
