@@ -38,7 +38,8 @@ class Case:
         if not self.answer:
             return ""
         named = {(e.effect.site, e.effect.driver) for e in verdict.effects}
-        return "yes" if verdict.word == self.answer and named <= self.right else "no"
+        right = named <= self.right and bool(named) == (self.answer == "named")
+        return "yes" if right and verdict.word == self.answer else "no"
 
 
 def cases(folder: Path) -> Iterator[Case]:

@@ -112,11 +112,13 @@ def discover(
     prepared = _prepare(checked.record, model, names, CYCLE if report_record is None else WITHOUT_REPORT)
     if prepared is None:
         reason = f"the model can not simulate the record: check the units of its columns and the model '{model.name}'"
-        return Discovery(_insufficient(replace(checked, reasons=(reason,)), began), model, checked)
+        checked = replace(checked, reasons=(reason,))
+        return Discovery(_insufficient(checked, began), model, checked)
     problem, base = prepared
     unexplained = nothing_explained(problem, base)
     if unexplained:
-        return Discovery(_insufficient(replace(checked, reasons=(unexplained,)), began), base.model, checked)
+        checked = replace(checked, reasons=(unexplained,))
+        return Discovery(_insufficient(checked, began), base.model, checked, problem, before=base, after=base)
     found = search(problem, base, model, processes=processes, progress=progress)
     if wants_joint(problem, found):
         problem, found = search_jointly(problem, found, processes=processes, progress=progress)
@@ -147,7 +149,8 @@ def _prepare(
     first = Fitter(problem).fit(model, rounds=1)
     if first is None:
         return None
-    problem = problem.with_weights(proportional(first.residual(problem), first.predicted))
+    seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
+    problem = problem.with_weights(proportional(seen, first.predicted))
     base = Fitter(problem).fit(first.model, like=first, rounds=2)
     return (problem, base) if base else None
 
@@ -194,7 +197,8 @@ def _verdict(
     labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
     count = len(labels)
     absorbed = {
-        k: float(b / a - 1) for k, b, a in zip(labels, before.values[:count], final.values[:count], strict=True)
+        k: float(b / a - 1) if a else float("nan")
+        for k, b, a in zip(labels, before.values[:count], final.values[:count], strict=True)
     }
     tests = {f"ljung_box_before_{k}": p for k, p in whiteness(problem, before, raw=True).items()}
     tests |= {f"ljung_box_after_{k}": p for k, p in whiteness(problem, final, raw=True).items()}
@@ -232,9 +236,10 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
         others = tuple(
-            (a.names[i][0], a.names[i][1], a.fit.bic - best.fit.bic)
+            (*instead[0], a.fit.bic - best.fit.bic)
             for a in judgement.rivals
-            if len(a.names) == len(best.names) and a.names[i] != own
+            if len(instead := [n for n in a.names if n not in best.names]) == 1
+            and set(best.names) - set(a.names) == {own}
         )
         interval = {
             c: (v - 1.96 * std[effect.parameter(c)], v + 1.96 * std[effect.parameter(c)])

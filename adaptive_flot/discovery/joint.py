@@ -91,7 +91,8 @@ def search_jointly(
         return problem, found
     together = correlation_time(plain, min((r[0] for r in rounds), key=lambda a: a.fit.loss).fit)
     base = discount(plain, base, together)
-    tables = [Round((), LEAST_EVIDENCE, discounted(plain, base, r, together)) for r in rounds]
+    scores = tuple(scorer.scores())
+    tables = [Round(scores, LEAST_EVIDENCE, discounted(plain, base, r, together)) for r in rounds]
     best: Round | None = None
     for table in tables:
         reference = best.alternatives[0].fit if best else base
@@ -103,6 +104,7 @@ def search_jointly(
     chosen_fit = best.alternatives[0].fit
     seen = replace(plain, blocks=np.where(chosen == "estimate", "confirm", chosen))
     checked = verify(seen, *(cross_validated(plain, fit, processes) for fit in (base, chosen_fit)))
+    checked = replace(checked, where="by cross-validation, on rows that also helped to choose the effects")
     left = _left(plain, chosen_fit, together)
     return plain, Search(base, tuple(tables), best.alternatives, checked, left, LEAST_EVIDENCE, found.adapted_sites)
 

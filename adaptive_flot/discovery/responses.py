@@ -154,6 +154,8 @@ class Responses:
         A change in time at such a site is a drift of that parameter: what the adaptation is there for.
         """
         count = len(self.problem.adapted)
+        if not count:
+            return ()
         answers = self.of([Course(s, np.ones(len(self.problem.record)), self._offset[s]) for s in self.sites])
         scale = np.maximum(np.abs(answers).max(axis=(0, 2)), 1e-300)[None, :, None]
         a = (answers / scale).reshape(-1, len(self.sites))

@@ -26,7 +26,7 @@ NULL_QUANTILE = 0.99
 LEAST_EVIDENCE = 10.0
 """Drop of the information criterion that an effect must bring."""
 SUBSTANCE = 0.1
-"""A further effect must remove at least this share of the excess error that the base model has on the confirm share."""
+"""A further effect must remove at least this share of the excess error of the base model."""
 FLAT = 0.02
 """A dependence must remove at least this share of the excess error beyond what the constant at its site removes."""
 SHORTLIST_FURTHER = 5
@@ -142,7 +142,7 @@ def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
 
 
 def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:
-    """Keep the largest model that stands on the confirm share; failing that, the evidence of the largest."""
+    """Keep the largest model that stands on the confirm share; failing that, the first, with what it left."""
     for r in reversed(accepted):
         verification = verify(problem, found.base, r.alternatives[0].fit)
         if verification.confirmed or r is accepted[0]:
@@ -183,7 +183,7 @@ def _round(
     progress: Callable[[str], None],
 ) -> Round:
     threshold = max(map(threshold_of, scorers))
-    scores = tuple(scorers[-1].scores())
+    scores = tuple(scorers[0].scores())
     found: list[Alternative] = []
     for k, before in enumerate(beam):
         if before is not None and k:
@@ -231,8 +231,8 @@ def better(problem: Problem, base: Fit, before: Alternative | None, found: Round
 
 
 def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
-    """Mean squared error on the confirm share in units of the better fit's noise, less that of the better fit."""
-    rows = problem.rows("confirm")
+    """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit."""
+    rows = problem.rows("estimate")
     size = problem.weights * better.noise.stationary_std()
     old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2) for f in (fit, better))
     return float(old - new)

@@ -17,6 +17,7 @@ Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 LARGEST_CLASS = 3
+MOST_RIVALS = 5
 SLOW_S = 120.0
 """A change of an adapted parameter over at least this long is a drift, which adaptation is there to follow."""
 
@@ -142,20 +143,18 @@ def judge(found: Search) -> Judgement:
     best = found.alternatives[0]
     if found.verification and not found.verification.confirmed:
         sure = found.verification.reduction95[0] > 0  # smaller, but not everywhere: something else is the matter
-        return Judgement(
-            "abstain" if sure else "none", best if sure else None, (), found.alternatives[1:6], LEAST_MARGIN
-        )
+        return Judgement("abstain" if sure else "none", best if sure else None, (), _others(found, best), LEAST_MARGIN)
     shortcoming = found.left - found.left_threshold
     margin = max(LEAST_MARGIN, shortcoming)
     close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < margin]
     close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
-    rivals = tuple(found.alternatives[1:6])
+    rivals = _others(found, best)
     if _only_drift(best, found.adapted_sites):
         return Judgement("none", best, (), rivals, margin)
     if not named:
         return Judgement("unnamed" if len(close) == 1 else "abstain", best, (), rivals, margin)
-    best = named[0]
+    best, rivals = named[0], _others(found, named[0])
     names = tuple(dict.fromkeys(tuple(sorted(a.names)) for a in named))
     if len(names) == 1:
         return Judgement("named", best, (), rivals, margin)
@@ -165,6 +164,11 @@ def judge(found: Search) -> Judgement:
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
+
+
+def _others(found: Search, best: Alternative) -> tuple[Alternative, ...]:
+    """The first few alternatives beside the best, whether they have a name or not."""
+    return tuple(a for a in found.alternatives if a is not best)[:MOST_RIVALS]
 
 
 def _only_adds_to(a: Alternative, b: Alternative) -> bool:

@@ -1,4 +1,4 @@
-"""Verify, once, on rows that chose nothing: the error must be smaller by more than chance, and nowhere larger."""
+"""Verify on rows to which nothing was fitted: the error must be smaller by more than chance, and nowhere larger."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class OutputChange:
 
 @dataclass(frozen=True)
 class Verification:
-    """Whether an alternative stands on the confirm share.
+    """Whether an alternative stands on rows to which it was not fitted.
 
     Attributes
     ----------
@@ -54,17 +54,20 @@ class Verification:
         Outputs whose error grew.
     confirmed
         Interval above zero and no output worse.
+    where
+        The rows it was measured on, in words.
     """
 
     reduction: float
     reduction95: tuple[float, float]
     worse: tuple[str, ...]
     confirmed: bool
+    where: str = "on the confirm share"
 
     def __str__(self) -> str:
         low, high = (100 * r for r in self.reduction95)
         word = "confirmed" if self.confirmed else "not confirmed"
-        return f"{word}: error {100 * self.reduction:.0f} % smaller ({low:.0f} to {high:.0f} %) on the confirm share"
+        return f"{word}: error {100 * self.reduction:.0f} % smaller ({low:.0f} to {high:.0f} %) {self.where}"
 
 
 def verify(problem: Problem, before: Fit, after: Fit) -> Verification:

@@ -15,9 +15,18 @@ def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
     said = []
     for effect in after.model.fitted_effects()[-len(judgement.best.names) :]:
         values = [v for k, v in effect.coefficients.items() if k.startswith(("amplitude", "value"))]
-        change = max(values, key=abs) if len(values) == 1 else max(values) - min(values)
-        said.append(f"{effect.site} changes by about {100 * (np.exp(change) - 1):+.0f} % ({effect.form} in time)")
+        change = values[0] if len(values) == 1 else _largest_move(values)
+        site = next(s for s in after.model.sites if s.name == effect.site)
+        offset = (effect.mode or site.mode) == "offset"
+        size = f"{change:+.3g} {site.unit or ''}".rstrip() if offset else f"{100 * (np.exp(change) - 1):+.0f} %"
+        said.append(f"{effect.site} changes by about {size} ({effect.form} in time)")
     return tuple(said)
+
+
+def _largest_move(values: list[float]) -> float:
+    """Difference of the extremes of a course, negative where the larger comes first."""
+    high, low = int(np.argmax(values)), int(np.argmin(values))
+    return (values[high] - values[low]) * (1 if high > low else -1)
 
 
 def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:

@@ -56,7 +56,8 @@ def discovery_report(found: Discovery, name: str, command: str = "") -> str:
     }
     content |= {"curve": None, "errors": None, "experiment": None, "absorbed": None, "data": _data(found)}
     contents = [("verdict", "Verdict")]
-    if found.problem is not None and found.before is not None and found.after is not None:
+    searched = found.search is not None  # nothing is searched in a record whose inputs explain nothing
+    if searched and found.problem is not None and found.before is not None and found.after is not None:
         content |= _evidence(found, found.problem, found.before, found.after, album)
         contents += [("errors", "Error before and after"), ("residual", "Residual"), ("evidence", "Evidence")]
         contents += [("experiment", "Which input moves would tell")] if content["experiment"] else []

@@ -145,7 +145,10 @@ class Supervisor:
             name: (one_step_error(done.before, j, found.record_s[1]), one_step_error(done.after, j, found.record_s[1]))
             for name, j in columns.items()
         }
-        worse = [name for name, (old, new) in errors.items() if new > (1 + WORSE) * old]
+        seen = {name: pair for name, pair in errors.items() if np.isfinite(pair).all()}
+        if not seen:
+            return replace(found, errors=errors, why="nothing was measured since the search")
+        worse = [name for name, (old, new) in seen.items() if new > (1 + WORSE) * old]
         why = f"the one-step error of {', '.join(worse)} grows on rows that chose nothing" if worse else ""
         return replace(found, errors=errors, extended=not worse, why=why)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -110,3 +112,11 @@ def test_a_model_without_sites_or_with_an_unknown_parameter_is_refused(clock: ob
         discover(clock, tank_record())  # type: ignore[arg-type]
     with pytest.raises(ModelError, match="efficiency"):
         discover(heated_tank(), tank_record(), adapted=["eficiency"])
+
+
+def test_a_model_without_adapted_parameters_can_be_judged() -> None:
+    """A user's first model: no parameter is of role "estimated"."""
+    tank = heated_tank()
+    fixed = replace(tank, parameters=tuple(replace(p, role="fixed") for p in tank.parameters))
+    found = discover(fixed, tank_record(Truth(exponent=0.0)))
+    assert found.verdict.word in ("none", "named", "class", "unnamed", "abstain") and found.verdict.parameters == {}

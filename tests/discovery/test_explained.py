@@ -47,7 +47,7 @@ def test_an_output_that_hears_of_no_input_is_insufficient() -> None:
     y = 310 + np.convolve(rng.standard_normal(660), np.ones(5), "same")[30:630]
     found = discover(heated_tank(), changed(tank_record(), y))
     assert found.verdict.word == "insufficient" and "explain too little" in found.verdict.reason
-    assert found.verdict.effects == () and found.before is None
+    assert found.verdict.effects == () and found.before is found.after is not None  # fitted, and not searched
 
 
 def test_the_zinc_cell_is_insufficient_and_says_why(shared_file: Callable[[str], Path]) -> None:

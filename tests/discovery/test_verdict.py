@@ -15,6 +15,9 @@ from adaptive_flot.discovery.experiment import leading
 from adaptive_flot.discovery.search import Search
 from adaptive_flot.discovery.verdict import judge
 from adaptive_flot.discovery.verify import Verification, changes, verify, whiteness
+from adaptive_flot.discovery.wording import drift_words
+from adaptive_flot.greybox.effects import Effect
+from tests.discovery.heated import heated_tank
 
 BY_FAN, BY_HEATER, BY_TIME = ("heat_loss", "fan_speed"), ("heating", "fan_speed"), ("heat_loss", "time")
 CONFIRMED = Verification(0.5, (0.4, 0.6), (), True)
@@ -57,6 +60,7 @@ def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, f
     if word in ("named", "class"):
         assert judged.best is not None and all(judged.best.known)
     assert (len(judged.members) > 1) == (word == "class")
+    assert all(rival is not judged.best for rival in judged.rivals)
 
 
 def test_nothing_is_named_that_does_not_stand_on_fresh_rows(draught: Discovery) -> None:
@@ -125,3 +129,13 @@ def test_the_curve_shows_the_shape_where_a_constant_is_an_adapted_parameter(drau
     truth = (curve.driver / curve.anchor) ** 0.6
     assert np.all(curve.low <= curve.high) and np.max(curve.high - curve.low) < 0.1
     assert np.mean((curve.low - 1e-9 <= truth) & (truth <= curve.high + 1e-9)) > 0.9
+
+
+@pytest.mark.parametrize(("course", "said"), [([0.0, 0.1, 0.2], "+22 %"), ([0.2, 0.1, 0.0], "-18 %")])
+def test_a_drift_is_told_with_its_direction(draught: Discovery, course: list[float], said: str) -> None:
+    """A fall is no rise: the sign is that of the larger extreme coming last."""
+    assert draught.judgement is not None and draught.judgement.best is not None and draught.after is not None
+    knots = {"knots": (0.0, 1.0, 2.0)}
+    effect = Effect("heat_loss", "time", "curve", {f"value_{k + 1}": v for k, v in enumerate(course)}, knots)
+    after = replace(draught.after, model=heated_tank().with_effects([effect]))
+    assert said in drift_words(draught.judgement, after)[0]
