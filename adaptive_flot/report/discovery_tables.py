@@ -97,10 +97,8 @@ def test_table(found: Discovery) -> Table:
     """Ljung-Box p value of each output, before and after."""
     tests = found.verdict.tests
     names = [q.name for q in found.model.outputs if f"ljung_box_before_{q.name}" in tests]
-    rows = [
-        (words(n), p_text(tests[f"ljung_box_before_{n}"]), p_text(tests.get(f"ljung_box_after_{n}", np.nan)))
-        for n in names
-    ]
+    shown = [[p_text(tests.get(f"ljung_box_{when}_{n}", np.nan)) for when in ("before", "after")] for n in names]
+    rows = [(words(n), *(p.removeprefix("= ") for p in pair)) for n, pair in zip(names, shown, strict=True)]
     caption = "p value of the Ljung–Box test (20 lags) of the free-run residual; small: something is left."
     return Table(caption, ("Output", "p before", "p after"), tuple(rows))
 
