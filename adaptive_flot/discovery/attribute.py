@@ -5,6 +5,7 @@ A name is (site, driver); its forms compete inside it, so that no name wins or l
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,13 +14,17 @@ from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer
-from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, Effect
+from adaptive_flot.greybox.model import FloatArray, Model
 
-SHORTLIST = 10
+SHORTLIST = 12
 """Candidates that are refitted in full."""
+SHORTLIST_EACH = 3
+"""Of which so many at one site: a first-order gain says more about the site than about the driver."""
 LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
+SAME_DRIVER = 1e-6
+"""Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,8 @@ class Alternative:
         Drop of minus two log-likelihood against the base model.
     delta_bic
         Its criterion less that of the base model; negative is better.
+    doubt
+        How well the record tells it from the best one: standard deviation of what it is worse by.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -45,6 +52,7 @@ class Alternative:
     fit: Fit
     gain: float
     delta_bic: float
+    doubt: float = 0.0
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -68,23 +76,30 @@ def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
             continue
         if c.driver != "constant" and score.penalised <= constant.get(c.site.name, -np.inf) + 5.0:
             continue
-        twin = next((k for k in kept if _twins(k, score)), None)
+        twin = next((k for k in kept if _twins(k, score, scorer.drivers)), None)
         if twin is not None:
             if c.known and not twin.candidate.known:
                 kept[kept.index(twin)] = score
             continue
-        kept.append(score)
+        if sum(k.candidate.site.name == c.site.name for k in kept) < SHORTLIST_EACH:
+            kept.append(score)
     return kept[:count]
 
 
-def _twins(a: Score, b: Score) -> bool:
+def _twins(a: Score, b: Score, drivers: Mapping[str, FloatArray]) -> bool:
     """Whether two candidates at one site explain exactly the same: their drivers are functions of one another."""
-    same = a.candidate.site.name == b.candidate.site.name and a.variant.effect.form == b.variant.effect.form
-    return same and a.variant.effect.form == "curve" and abs(a.gain - b.gain) < 1e-3 * max(a.gain, 1.0)
+    one, other = a.candidate, b.candidate
+    if one.site.name != other.site.name or one.driver not in drivers or other.driver not in drivers:
+        return False
+    return abs(float(np.corrcoef(drivers[one.driver], drivers[other.driver])[0, 1])) > 1 - SAME_DRIVER
 
 
-def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int) -> Fit | None:
-    """Full fit of one variant, from its first-order solution and, should that not simulate, from next to nothing."""
+def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit | None = None) -> Fit | None:
+    """Full fit of one variant on top of `start`, from the score's values and, should that not simulate, from near zero.
+
+    `warm` is a fit with another form of the same effect: its adapted parameters and initial state are a better start.
+    """
+    start = _warmed(start, warm) if warm else start
     effect = score.variant.effect
     held = fixed_coefficients(effect)
     model = start.model.with_effects([replace(effect, coefficients=held)])
@@ -101,9 +116,16 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int) -> Fit | N
     return found
 
 
+def _warmed(start: Fit, warm: Fit) -> Fit:
+    """The fit with the free parameters and the initial state that it has in common with another."""
+    values = dict(zip(warm.names, map(float, warm.values), strict=True))
+    common = start.model.with_parameters({n: values[n] for n in start.names})
+    return replace(start, model=common, initial_state=warm.initial_state[: len(start.initial_state)])
+
+
 def fixed_coefficients(effect: Effect) -> dict[str, float]:
-    """Coefficients that a search holds: the share of a lag or dead time."""
-    return {"amplitude": 1.0} if effect.driver in ("lag", "delay") else {}
+    """Coefficients that a search holds: the share of a lag, a dead time or a limit."""
+    return {"amplitude": 1.0} if effect.driver in DYNAMIC_DRIVERS else {}
 
 
 def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:
@@ -128,5 +150,6 @@ def shape_bounds(problem: Problem) -> dict[str, tuple[float, float]]:
         "onset": (float(t[0]) + margin, float(t[-1]) - margin),
         "duration": (1.0, span),
         "time_constant": (0.2 * problem.record.dt, span),
+        "time_constant_2": (0.2 * problem.record.dt, span),
         "dead_time": (2.0 * problem.record.dt, 0.2 * span),
     }

@@ -8,11 +8,12 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy.signal import lfilter
 
 from adaptive_flot.discovery.gate import LEAST_RANGE
+from adaptive_flot.discovery.lateness import late, limited
 from adaptive_flot.discovery.responses import Course, Responses
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.discovery.variant import Variant
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.forms import spline_basis
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -24,32 +25,8 @@ DRIVER_KNOTS = 4
 FINE_KNOTS = 8
 FINE_TIME_KNOTS = 14
 """Knots of the curve of a finalist: a hard limit or a threshold must not be told apart from its site by its shape."""
-LAGS_S = (5.0, 15.0, 45.0, 120.0)
-DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
 SPILL_QUANTILES = (0.5, 0.7, 0.85, 0.95)
 """A spill is scored with its edge at these quantiles of the level."""
-
-
-@dataclass(frozen=True)
-class Variant:
-    """One way to score and fit a candidate.
-
-    Attributes
-    ----------
-    effect
-        The effect at amplitude zero, with its settings.
-    courses
-        Courses at the site (r of them) whose linear combination it is near amplitude zero.
-    coefficients
-        Coefficient that each course is the derivative of; "" where there is none (see `start`).
-    start
-        Further values to start a fit from (onset, time constant).
-    """
-
-    effect: Effect
-    courses: tuple[Course, ...]
-    coefficients: tuple[str, ...]
-    start: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,7 +55,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     time = responses.problem.record.time
     found = []
     for site in model.sites:
-        for driver in ("constant", "time", *responses.drivers, "lag", "delay"):
+        for driver in ("constant", "time", *responses.drivers, "lag", "delay", "saturation"):
             if (site.name, driver) in taken or not _makes_sense(site, driver):
                 continue
             variants = tuple(_variants(site, driver, time, responses))
@@ -91,6 +68,8 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
 def _makes_sense(site: Site, driver: str) -> bool:
     if driver in ("lag", "delay"):
         return site.role in ("sensor", "actuator") and site.passed == 1
+    if driver == "saturation":  # a sensor at its limit shows in the data gate
+        return site.role == "actuator" and site.passed == 1
     return True
 
 
@@ -101,7 +80,7 @@ def _nameable(site: Site, driver: str, table: bool) -> bool:
     the state of the cell; such a dependence is reported as a curve without a name. So is that of a flow, whose law is
     a matter of its own store, where the model has a table.
     """
-    if driver in ("constant", "time", "lag", "delay"):
+    if driver in STATELESS_DRIVERS:
         return True
     return site.role == "process" or (site.role == "flow" and not table)
 
@@ -121,7 +100,9 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
     elif driver == "time":
         yield from _in_time(site, time, offset)
     elif driver in ("lag", "delay"):
-        yield from _late(site, driver, responses)
+        yield from late(site, driver, responses)
+    elif driver == "saturation":
+        yield from limited(site, responses)
     else:
         yield from _on_signal(site, driver, responses.drivers[driver], offset, responses.fit.model.names("states"))
 
@@ -226,26 +207,3 @@ def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
 def _spline_function(knots: tuple[float, ...]) -> ca.Function:
     x = ca.SX.sym("x")
     return ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])
-
-
-def _late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
-    v = responses.site_values[site.name]
-    dt = responses.problem.record.dt
-    scale = float(np.median(np.abs(v))) or 1.0
-    for constant in LAGS_S if driver == "lag" else DELAYS_S:
-        if driver == "lag":
-            effect = Effect(site.name, driver, "lag", settings={"scale": scale})
-            keep = float(np.exp(-dt / constant))
-            late = _first_order(v, keep)
-            name = "time_constant"
-        else:
-            effect = Effect(site.name, driver, "delay", settings={"scale": scale})
-            rows = max(1, round(constant / dt))
-            late = np.concatenate([np.full(rows, v[0]), v[:-rows]])
-            name = "dead_time"
-        yield Variant(effect, (Course(site.name, late - v, True),), ("amplitude",), ((name, constant),))
-
-
-def _first_order(v: FloatArray, keep: float) -> FloatArray:
-    filtered: FloatArray = lfilter([1 - keep], [1, -keep], v, zi=[keep * v[0]])[0]
-    return filtered

@@ -32,13 +32,21 @@ KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
 constant change more."""
 
+ABRUPT = ("step", "lag", "lags", "delay", "stiction")
+"""Forms with events or fast states between the nodes of a record, which are simulated at every row."""
+
+
+def is_smooth(model: Model) -> bool:
+    """Whether a model's effects do nothing sudden between the nodes of a record."""
+    return not any(e.form in ABRUPT for e in model.effects)
+
 
 class Descent:
     """One search: the fit of one model to the rows that are true (N,), for some unknowns."""
 
     def __init__(self, problem: Problem, rows: BoolArray, model: Model, unknowns: Unknowns) -> None:
         self.problem, self.rows, self.model, self.unknowns = problem, rows, model, unknowns
-        self.simulator = RecordSimulator(model, problem.record.dt)
+        self.simulator = RecordSimulator(model, problem.record.dt, problem.nodes if is_smooth(model) else None)
 
     def _predict(self, z: FloatArray) -> FloatArray:
         p, x0 = self.unknowns.unpack(z)

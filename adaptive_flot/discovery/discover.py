@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.direction import against, listed
 from adaptive_flot.discovery.experiment import leading, plan_experiment
 from adaptive_flot.discovery.explained import nothing_explained
 from adaptive_flot.discovery.fit import Fit
@@ -16,6 +17,7 @@ from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
 from adaptive_flot.discovery.noise import proportional
+from adaptive_flot.discovery.pace import with_nodes
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
 from adaptive_flot.discovery.signals import input_range
@@ -24,6 +26,7 @@ from adaptive_flot.discovery.verify import changes, whiteness
 from adaptive_flot.discovery.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.record import RecordSimulator
 
@@ -152,11 +155,11 @@ def _prepare(
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
     problem = problem.with_weights(proportional(seen, first.predicted))
     base = Fitter(problem).fit(first.model, like=first, rounds=2)
-    return (problem, base) if base else None
+    return (with_nodes(problem, base), base) if base else None
 
 
 def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:
-    fitter = Fitter(problem, ("estimate", "confirm"))
+    fitter = Fitter(replace(problem, nodes=None), ("estimate", "confirm"))
     before = fitter.with_intervals(fitter.fit(base.model, like=base, rounds=2) or base)
     if best is None:
         return before, before
@@ -216,6 +219,7 @@ def _verdict(
         effects=effects,
         members=judgement.members,
         error=error,
+        report_times=problem.spans("report") if report is None else (),
         tests=tests,
         parameters=dict(zip(labels, map(float, final.values[:count]), strict=True)),
         drift=drift,
@@ -228,10 +232,6 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     assert judgement.best is not None  # a verdict that names has an alternative
     model, best = after.model, judgement.best
     std = dict(zip(after.names, after.std(), strict=True))
-    meanings = {(k.site, k.driver): k.meaning for k in model.known_effects}
-    unlisted = (
-        "not listed among the effects known for this model" if meanings else "named by the model's own site and driver"
-    )
     found = []
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
@@ -246,5 +246,14 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
             for c, v in effect.coefficients.items()
             if effect.parameter(c) in std
         }
-        found.append(NamedEffect(effect, meanings.get(own, unlisted), interval, others))
+        found.append(NamedEffect(effect, _meaning(model, effect), interval, others))
     return tuple(found)
+
+
+def _meaning(model: Model, effect: Effect) -> str:
+    if not model.known_effects:
+        return "named by the model's own site and driver"
+    known = listed(model, effect)
+    if known is None:
+        return "not listed among the effects known for this model"
+    return f"the other way than: {known.meaning}" if against(model, effect) else known.meaning

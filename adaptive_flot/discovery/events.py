@@ -1,7 +1,8 @@
-"""Events in time: a step, a ramp or a washout, started from what a free curve in time came to.
+"""Events in time: a ramp, a washout or a step, started from what a free curve in time came to, and freer courses.
 
 The onset of an event has many local optima; a curve has none, as it is linear in its values. So the curve is fitted
-first, and the events start from the shapes that draw it best.
+first, and the events start from the shapes that draw it best. Last, the best course gets more freedom: a curve more
+knots (a slow random drift), a ramp or washout a curve whose knots stand where things happen.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.catalogue import Variant, spline_values
+from adaptive_flot.discovery.catalogue import spline_values
 from adaptive_flot.discovery.scoring import Score
+from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 
@@ -20,10 +22,20 @@ POINTS = 300
 ONSETS = 60
 DURATIONS = (0.03, 0.08, 0.15, 0.25, 0.4, 0.6)
 """Durations of ramps and washouts that are tried, as shares of the record."""
+SLOW_S = 120.0
+"""A change over at least this long is a drift; of an adapted parameter, that is what adaptation is there to follow."""
+SUDDEN = 0.03
+"""Share of the record up to which a ramp or a washout may as well be a step."""
+MOST_KNOTS = 28
+"""Knots of the freest curve in time."""
+AROUND = (-0.5, 0.0, 0.2, 0.45, 0.75, 1.1, 1.6, 2.5, 4.0)
+"""Knots around an event, in lengths of it since its onset."""
+KNOT_GAP = 0.01
+"""Least distance of these from the ends of the record, as a share of it."""
 
 
 def event_scores(score: Score, curve: Effect) -> list[Score]:
-    """Scores with a step, a ramp and a washout that start from a fitted curve in time of the same name.
+    """Scores with a ramp and a washout that start from a fitted curve in time of the same name.
 
     Parameters
     ----------
@@ -37,14 +49,75 @@ def event_scores(score: Score, curve: Effect) -> list[Score]:
     values = spline_values(t, knots) @ [curve.coefficients[f"value_{k + 1}"] for k in range(len(knots))]
     span = float(t[-1] - t[0])
     found = []
-    for form, second in (("step", None), ("ramp", "duration"), ("washout", "time_constant")):
+    for form, second in (("ramp", "duration"), ("washout", "time_constant")):
         amplitude, onset, length = _best(form, t, values, span)
-        settings = {"width": max(2.0, span / 1000)} if form == "step" else {}
-        effect = Effect(curve.site, "time", form, settings=settings, mode=curve.mode)
-        shape = (("onset", onset), *(((second, length),) if second else ()))
-        start = {"amplitude": amplitude, **dict(shape)}
-        found.append(replace(score, variant=Variant(effect, (), ("amplitude",), shape), start=start))
+        found.append(_event(score, form, amplitude, (("onset", onset), (second, length)), curve, {}))
     return found
+
+
+def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
+    """The score with a step, where a fitted ramp or washout of the same name is over at once; None elsewhere.
+
+    `span` is the length of the record [s].
+    """
+    c = fitted.coefficients
+    length = {"ramp": c.get("duration"), "washout": c.get("time_constant")}.get(fitted.form)
+    if length is None or length > SUDDEN * span:
+        return None
+    shape = (("onset", c["onset"] + length / 2),)
+    return _event(score, "step", c["amplitude"], shape, fitted, {"width": max(2.0, span / 1000)})
+
+
+def _event(
+    score: Score,
+    form: str,
+    amplitude: float,
+    shape: tuple[tuple[str, float], ...],
+    like: Effect,
+    settings: dict[str, float],
+) -> Score:
+    effect = Effect(like.site, "time", form, settings=settings, mode=like.mode)
+    start = {"amplitude": amplitude, **dict(shape)}
+    return replace(score, variant=Variant(effect, (), ("amplitude",), shape), start=start)
+
+
+def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, float]] | None:
+    """A curve with more knots than a fitted curve, or around a fitted ramp or washout, and values to start from.
+
+    The record lasts from `low` to `high` [s]. None for a step, which has no shape, for a curve that has the knots, and
+    for a slow ramp, of which a curve with even knots is the freer form.
+    """
+    c = effect.coefficients
+    if effect.form == "step" or (effect.form == "ramp" and slow(effect)):
+        return None
+    if effect.form == "curve":
+        old = [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
+        if len(old) >= MOST_KNOTS:
+            return None
+        at = np.linspace(low, high, MOST_KNOTS)
+        values = spline_values(at, old) @ [c[f"value_{k + 1}"] for k in range(len(old))]
+    else:
+        length = c["duration"] if effect.form == "ramp" else 2 * c["time_constant"]
+        around = c["onset"] + length * np.array(AROUND)
+        inside = around[(around > low + KNOT_GAP * (high - low)) & (around < high - KNOT_GAP * (high - low))]
+        at = np.concatenate([[low], inside, [high]])
+        since = np.maximum(at - c["onset"], 0)
+        ramp = effect.form == "ramp"
+        values = c["amplitude"] * (
+            np.minimum(since / c["duration"], 1) if ramp else 1 - np.exp(-since / c["time_constant"])
+        )
+    settings = {"knots": tuple(float(k) for k in at)}
+    names = tuple(f"value_{k + 1}" for k in range(len(at)))
+    curve = Effect(effect.site, "time", "curve", settings=settings, mode=effect.mode)
+    return Variant(curve, (), names), dict(zip(names, map(float, values), strict=True))
+
+
+def slow(effect: Effect) -> bool:
+    """Whether a course in time is a drift, and not an event: a curve with even knots, or a ramp that lasts."""
+    if effect.form == "curve":
+        gaps = np.diff(np.atleast_1d(np.asarray(effect.settings["knots"], dtype=float)))
+        return bool(np.ptp(gaps) < 1e-3 * np.max(gaps))
+    return effect.form == "ramp" and effect.coefficients["duration"] >= SLOW_S
 
 
 def _best(form: str, t: FloatArray, values: FloatArray, span: float) -> tuple[float, float, float]:
@@ -52,11 +125,9 @@ def _best(form: str, t: FloatArray, values: FloatArray, span: float) -> tuple[fl
     best = (np.inf, 0.0, float(t[len(t) // 2]), 0.1 * span)
     centred = values - values.mean()
     for onset in np.linspace(t[0], t[-1], ONSETS + 2)[1:-1]:
-        for share in DURATIONS if form != "step" else (0.0,):
+        for share in DURATIONS:
             length = share * span
-            if form == "step":
-                course = (t >= onset).astype(float)
-            elif form == "ramp":
+            if form == "ramp":
                 course = np.clip((t - onset) / length, 0, 1)
             else:
                 length /= 3  # a washout of this time constant is done after about that duration

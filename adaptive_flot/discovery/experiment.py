@@ -202,7 +202,7 @@ def _words(names: Names) -> str:
 
 
 def leading(best: Alternative, others: Sequence[Alternative], margin: float) -> tuple[Alternative, ...]:
-    """Alternatives worth a test: the best, and those that come close to it."""
+    """Alternatives worth a test: the best, and the first few that come close to it."""
     limit = max(margin, CLOSE)
     seen = {frozenset(best.names)}
     close = [best]
@@ -210,4 +210,4 @@ def leading(best: Alternative, others: Sequence[Alternative], margin: float) -> 
         if abs(a.fit.bic - best.fit.bic) < limit and frozenset(a.names) not in seen:
             seen.add(frozenset(a.names))
             close.append(a)
-    return tuple(close)
+    return tuple(close[:MOST_COMPARED])

@@ -77,6 +77,15 @@ def loss_of(
     return float(np.sum(squares) + 2 * np.sum(np.log(noise.std) * present.sum(axis=0))), noise
 
 
+def row_losses(problem: Problem, fit: Fit, rows: BoolArray) -> FloatArray:
+    """What each of some rows adds to minus two log-likelihood (rows,), with the noise of the fit."""
+    e = fit.noise.whiten((problem.measured - fit.predicted) / problem.weights)[rows]
+    present = np.isfinite(e)
+    squares = np.minimum(np.abs(np.where(present, e, 0)), problem.clip) ** 2
+    found: FloatArray = np.sum(squares + 2 * np.log(fit.noise.std) * present, axis=1)
+    return found
+
+
 def parameters_of(fit: Fit) -> FloatArray:
     """Full parameter vector (np,) of a fit."""
     return full_parameters(fit.model, fit.names, fit.values)

@@ -19,7 +19,7 @@ class Fitter:
     """Fits of alternatives to one problem. Immutable; every call is independent."""
 
     def __init__(self, problem: Problem, share: tuple[str, ...] = ("estimate",)) -> None:
-        self.problem = problem
+        self.problem, self.share = problem, share
         self.rows = problem.rows(*share)
 
     def fit(

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from statsmodels.tsa.stattools import acf
 
 from adaptive_flot.discovery.attribute import Alternative, fixed_coefficients, limited, shape_bounds
+from adaptive_flot.discovery.direction import nameable
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
+from adaptive_flot.discovery.noise import correlation_times
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer
@@ -143,7 +144,7 @@ class JointFits:
         held = {e.parameter(n): x for e in effects for n, x in fixed_coefficients(e).items()}
         values = dict(zip(bare.names, map(float, bare.values), strict=True))
         fit = replace(bare, model=model.with_parameters({**held, **values}))
-        known = tuple(True for _ in effects)
+        known = tuple(nameable(fit.model, e, True) for e in fit.model.fitted_effects()[-len(effects) :])
         return Alternative(combination.names, known, fit, self.base.loss - fit.loss, fit.bic - self.base.bic)
 
 
@@ -163,18 +164,9 @@ def _joint_form(scorer: Scorer, score: Score) -> tuple[str, str | None]:
 
 
 def correlation_time(problem: Problem, fit: Fit) -> float:
-    """Rows that tell one story: 1 + 2 x the sum of the residual's autocorrelations up to the first negative one.
-
-    Worst output counts. Sokal, *Monte Carlo methods in statistical mechanics* (1997), eq. (2.16), cut at the first
-    zero as by Geyer (1992).
-    """
-    found = [1.0]
+    """Rows of the residual that tell one story, in the worst output."""
     residual: FloatArray = fit.residual(problem)[problem.rows("estimate", "confirm")]
-    for r in residual.T:
-        rho = acf(r, nlags=len(r) // 4, fft=True, missing="conservative")[1:]
-        below = np.flatnonzero(~(rho > 0))
-        found.append(1 + 2 * float(np.sum(rho[: below[0] if below.size else len(rho)])))
-    return max(found)
+    return float(np.max(correlation_times(residual)))
 
 
 def discount(problem: Problem, fit: Fit, rows: float) -> Fit:

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.signal import lfilter
+from statsmodels.tsa.stattools import acf
 
 from adaptive_flot.greybox.model import FloatArray
 
@@ -22,6 +24,8 @@ MOST_LAGS = 3
 MEMORY = 2.0
 """Noise is at most this many times as large as its innovations: what is slower and smoother is no measurement noise but
 physics that is missing, and a noise model that may be as slow as it likes would explain it away."""
+SPIKE, SPIKE_WINDOW = 6.0, 5
+"""A spike is further from the median of so many neighbours than so many standard deviations of such distances."""
 FEWEST_PAIRS = 200
 """Consecutive measured pairs that an autoregressive noise model asks for; a sparse assay has white noise."""
 
@@ -145,6 +149,40 @@ def _memory(a: FloatArray) -> float:
         return float("inf")
     response = lfilter([1.0], np.concatenate([[1.0], -a]), np.concatenate([[1.0], np.zeros(500)]))
     return float(np.sqrt(np.sum(response**2)))
+
+
+def correlation_times(series: FloatArray) -> FloatArray:
+    """Rows that tell one story in each column (m,) of a series (N, m): 1 + 2 x the sum of autocorrelations.
+
+    Up to the first that is not positive: Sokal, *Monte Carlo methods in statistical mechanics* (1997), eq. (2.16), cut
+    at the first zero as by Geyer (1992).
+    """
+    found = []
+    for r in series.T:
+        rho = acf(r, nlags=len(r) // 4, fft=True, missing="conservative")[1:]
+        below = np.flatnonzero(~(rho > 0))
+        found.append(max(1.0, 1 + 2 * float(np.sum(rho[: below[0] if below.size else len(rho)]))))
+    return np.array(found)
+
+
+def without_spikes(residual: FloatArray) -> FloatArray:
+    """A residual (N, m) in which single values far from their neighbours are put in their midst (Hampel's filter).
+
+    What a model lacks changes from row to row by less than the noise; a spike in its place would be explained by
+    whatever happens to fit it.
+    """
+    found = residual.copy()
+    for j in range(residual.shape[1]):
+        r = residual[:, j]
+        present = np.flatnonzero(np.isfinite(r))
+        if len(present) < SPIKE_WINDOW:
+            continue
+        v = r[present]
+        middle = median_filter(v, SPIKE_WINDOW, mode="nearest")
+        away = np.abs(v - middle)
+        limit = SPIKE * 1.4826 * float(np.median(away))
+        found[present, j] = np.where(away > limit, middle, v) if limit > 0 else v
+    return found
 
 
 def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from adaptive_flot.discovery.noise import CLIP, Noise, fit_noise, white_noise
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.nodes import Nodes
 
 BoolArray = NDArray[np.bool_]
 
@@ -44,6 +45,8 @@ class Problem:
     whiten
         Whether residuals are whitened and clipped. Not where model error outweighs the noise by far: there a noise
         model would explain the error away, and its largest values are the physics that is looked for.
+    nodes
+        Rows that a search simulates, where that makes no difference to speak of; None for all.
     """
 
     record: Dataset
@@ -53,6 +56,7 @@ class Problem:
     weights: FloatArray
     floor: FloatArray
     whiten: bool = True
+    nodes: Nodes | None = None
 
     @property
     def clip(self) -> float:
@@ -77,6 +81,13 @@ class Problem:
         """Mask (N,) of the rows in the named shares; all that are not left out when none is named."""
         mask: BoolArray = np.isin(self.blocks, shares) if shares else self.blocks != ""
         return mask
+
+    def spans(self, share: str) -> tuple[tuple[float, float], ...]:
+        """First and last time [s] of each contiguous part of a share."""
+        inside = np.concatenate([[False], self.rows(share), [False]]).astype(int)
+        starts, stops = (np.flatnonzero(np.diff(inside) == sign) for sign in (1, -1))
+        time = self.record.time
+        return tuple((float(time[a]), float(time[b - 1])) for a, b in zip(starts, stops, strict=True))
 
     def with_weights(self, weights: FloatArray) -> Problem:
         """Return the same problem with the noise weights (N, m)."""

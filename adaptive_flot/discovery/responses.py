@@ -16,6 +16,7 @@ from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.nodes import NodeStepper
 from adaptive_flot.greybox.rows import over_rows
 from adaptive_flot.greybox.stepper import Stepper
 
@@ -57,10 +58,12 @@ class Responses:
         probes = [Effect(s, "constant", "shift") for s in self.sites]
         extended = model.with_effects([e for e in probes if e.label not in has])
         p0 = np.array([q.value for q in extended.parameters])
-        stepper = Stepper(extended, problem.record.dt)
-        record = problem.record
-        run = stepper.simulate(fit.initial_state, record.inputs[1:], p0, float(record.time[0]))
-        self.states = np.vstack([fit.initial_state, run.states])
+        record, self._nodes = problem.record, problem.nodes
+        stepper = Stepper(extended, record.dt) if self._nodes is None else NodeStepper(extended)
+        self._steps = record.inputs[1:] if self._nodes is None else self._nodes.inputs
+        run = stepper.simulate(fit.initial_state, self._steps, p0, float(record.time[0]))
+        self._at = np.vstack([fit.initial_state, run.states])
+        self.states = self._spread(self._at)
         names = (*fit.names, *(e.parameter("amplitude") for e in probes))
         self._jacobians(stepper, names, p0)
         self._q = len(fit.names)
@@ -69,8 +72,9 @@ class Responses:
 
     def _jacobians(self, stepper: Stepper, names: tuple[str, ...], p: FloatArray) -> None:
         function = stepper.one_step_jacobians(names)
-        record, nx, q, ny = self.problem.record, len(self.fit.initial_state), len(names), len(stepper.model.outputs)
-        n = len(record) - 1
+        nx, q, ny = len(self.fit.initial_state), len(names), len(stepper.model.outputs)
+        time = self.problem.record.time if self._nodes is None else self.problem.record.time[self._nodes.rows]
+        n = len(self._steps)
         self._A, self._G = np.empty((n, nx, nx)), np.empty((n, nx, q))
         self._C, self._H = np.empty((n, ny, nx)), np.empty((n, ny, q))
         mapped: dict[int, ca.Function] = {}
@@ -78,7 +82,7 @@ class Responses:
             rows = slice(start, min(start + ROWS_AT_ONCE, n))
             count = rows.stop - rows.start
             call = mapped.setdefault(count, over_rows(function, count))
-            found = call(self.states[rows].T, record.time[rows], record.inputs[1:][rows].T, p)
+            found = call(self._at[rows].T, time[rows], self._steps[rows].T, p)
             for target, value, height, width in (
                 (self._A, found[2], nx, nx),
                 (self._G, found[3], nx, q),
@@ -88,6 +92,13 @@ class Responses:
                 target[rows] = np.array(value).reshape(height, count, width).transpose(1, 0, 2)
         columns = list(self.problem.columns)
         self._C, self._H = self._C[:, columns], self._H[:, columns]
+        # what moves no state acts at once: such answers are worked out at all rows, between the nodes too
+        self._at_once = np.logical_not(np.any(self._G != 0, axis=(0, 1)))
+        self._direct = self._spread(np.concatenate([self._H[:1], self._H]))
+
+    def _spread(self, values: FloatArray) -> FloatArray:
+        """Values at all rows from those that were simulated."""
+        return values if self._nodes is None else self._nodes.spread(values)
 
     def _describe(self, model: Model, p: FloatArray) -> None:
         """Series of drivers and of the values at the sites."""
@@ -101,7 +112,8 @@ class Responses:
         table |= {q.name: self.states[:, j] for j, q in enumerate(model.states)}
         table |= {q.name: signals[j] for j, q in enumerate(model.signals)}
         names = self.fit.model.drivers or (*self.fit.model.names("inputs"), *self.fit.model.names("states"))
-        self.drivers = {name: table[name] for name in names}
+        own = tuple(f"{e.label}." for e in self.fit.model.effects)  # states of an effect drive nothing else
+        self.drivers = {name: table[name] for name in names if not name.startswith(own)}
         self.site_values = {s.name: values[j] for j, s in enumerate(model.sites)}
 
     def _nuisance(self) -> FloatArray:
@@ -114,18 +126,23 @@ class Responses:
 
     def _propagate(self, S: FloatArray, source: list[int], courses: FloatArray) -> FloatArray:
         """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N - 1, r)."""
-        n, m = len(self.problem.record), len(self.problem.columns)
-        r = S.shape[1]
-        k = len(source)
-        out = np.zeros((n, m, r))
-        for i in range(n - 1):
-            drive = courses[i, :k]
-            out[i + 1] = self._C[i] @ S
-            out[i + 1][:, :k] += self._H[i][:, source] * drive
+        m = len(self.problem.columns)
+        where = np.array(source, dtype=np.intp)
+        slow = np.flatnonzero(~self._at_once[where])
+        drive = np.concatenate([courses[:1], courses])
+        by_step = courses if self._nodes is None else self._nodes.means(drive)
+        G, H = (table[:, :, where[slow]] for table in (self._G, self._H))
+        out = np.empty((len(self._steps) + 1, m, S.shape[1]))
+        for i in range(len(self._steps)):
+            out[i + 1] = self._C[i] @ S  # outputs at the end of the interval, by the state at its start
+            out[i + 1][:, slow] += H[i] * by_step[i, slow]
             S = self._A[i] @ S
-            S[:, :k] += self._G[i][:, source] * drive
+            S[:, slow] += G[i] * by_step[i, slow]
         out[0] = out[1]
-        return out
+        found = self._spread(out)
+        at_once = np.flatnonzero(self._at_once[where])
+        found[:, :, at_once] += self._direct[:, :, where[at_once]] * drive[:, None, at_once]
+        return found
 
     def of(self, courses: list[Course]) -> FloatArray:
         """Answers (N, m, r) of the measured outputs to r courses."""

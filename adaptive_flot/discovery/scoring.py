@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.catalogue import ONSETS, Candidate, Variant, event
+from adaptive_flot.discovery.catalogue import ONSETS, Candidate, event
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.noise import CLIP, Noise
+from adaptive_flot.discovery.noise import CLIP, Noise, without_spikes
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
+from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.model import FloatArray
 
 REFINED = 33
@@ -65,7 +66,7 @@ class Scorer:
         courses = [course for v in variants for course in v.courses]
         answers = responses.of(courses) / problem.weights[:, :, None]
         nuisance = responses.nuisance / problem.weights[:, :, None]
-        residual = fit.residual(problem) / problem.weights
+        residual = without_spikes(fit.residual(problem) / problem.weights)
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in courses])
         self.noise = self._clean_noise(residual, answers, nuisance, variants)
         e = self.noise.whiten(residual)

@@ -12,10 +12,12 @@ from adaptive_flot.discovery.catalogue import catalogue
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.heats import Lane, refit
+from adaptive_flot.discovery.noise import correlation_times
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.discovery.scoring import Score, Scorer
-from adaptive_flot.discovery.verify import Verification, verify
+from adaptive_flot.discovery.verify import Verification, doubts, verify
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 from adaptive_flot.greybox.model import Model
 
 MOST_EFFECTS = 3
@@ -29,7 +31,8 @@ SUBSTANCE = 0.1
 """A further effect must remove at least this share of the excess error of the base model."""
 FLAT = 0.02
 """A dependence must remove at least this share of the excess error beyond what the constant at its site removes."""
-SHORTLIST_FURTHER = 5
+SHORTLIST_NEAR, SHORTLIST_FURTHER = 9, 5
+"""Candidates that are refitted where two linearisations propose them, and as further effects."""
 BEAM = 2
 """Alternatives of one round that the next extends."""
 
@@ -73,6 +76,8 @@ class Search:
         The same quantity that noise alone would show once in a hundred records.
     adapted_sites
         Sites whose constant change is that of an adapted parameter.
+    together
+        Innovations of the best alternative that tell one story: evidence counts once for so many.
     """
 
     base: Fit
@@ -82,6 +87,7 @@ class Search:
     left: float
     left_threshold: float
     adapted_sites: tuple[str, ...]
+    together: float = 1.0
 
 
 def search(
@@ -148,8 +154,27 @@ def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search
         if verification.confirmed or r is accepted[0]:
             last = r is accepted[-1]
             left = found.left if last else max(found.left, r.alternatives[0].fit.bic - _best_bic(accepted))
-            return replace(found, alternatives=r.alternatives, verification=verification, left=left)
+            best = r.alternatives[0].fit
+            together = _together(problem, found.base, best)
+            doubt = doubts(problem, best, [a.fit for a in r.alternatives])
+            told = tuple(replace(a, doubt=d) for a, d in zip(r.alternatives, doubt, strict=True))
+            return replace(found, alternatives=told, verification=verification, left=left, together=together)
     return found
+
+
+def _together(problem: Problem, base: Fit, best: Fit) -> float:
+    """Innovations that tell one story, averaged over the outputs by what the best alternative gained in each.
+
+    A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
+    """
+    rows = problem.rows("estimate")
+    size = problem.weights * best.noise.stationary_std()
+    old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2, axis=0) for f in (base, best))
+    gained = np.maximum(old - new, 0.0)
+    if not gained.sum() > 0:
+        return 1.0
+    innovations = np.clip(np.where(rows[:, None], best.innovations, np.nan), -problem.clip, problem.clip)
+    return float(gained @ correlation_times(innovations) / gained.sum())
 
 
 def _best_bic(rounds: list[Round]) -> float:
@@ -189,8 +214,9 @@ def _round(
         if before is not None and k:
             scorers = [scorer_of(problem, before.fit)[0]]
         lanes = []
+        most = SHORTLIST_FURTHER if before else SHORTLIST if len(scorers) == 1 else SHORTLIST_NEAR
         for scorer in scorers:
-            wanted = shortlist(scorer, SHORTLIST_FURTHER if before else SHORTLIST)
+            wanted = shortlist(scorer, most)
             # a further effect must have a name: a pair of curves without one would explain anything
             wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
             lanes.append(Lane(scorer, wanted))
@@ -208,7 +234,7 @@ def _without_flat(problem: Problem, base: Fit, found: list[Alternative]) -> tupl
 
     def flat(a: Alternative) -> bool:
         constant = constants.get((a.names[:-1], a.names[-1][0]))
-        if constant is None or constant is a or a.names[-1][1] in ("lag", "delay"):
+        if constant is None or constant is a or a.names[-1][1] in DYNAMIC_DRIVERS:
             return False
         return _excess(problem, constant.fit, a.fit) < FLAT * _excess(problem, base, a.fit)
 

@@ -7,19 +7,20 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.events import slow
 from adaptive_flot.discovery.experiment import Experiment
 from adaptive_flot.discovery.search import Search
 from adaptive_flot.discovery.verify import OutputChange
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 
 Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
 
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
+SURE = 2.0
+"""Standard deviations by which an alternative must be worse to be told apart."""
 LARGEST_CLASS = 3
 MOST_RIVALS = 5
-SLOW_S = 120.0
-"""A change of an adapted parameter over at least this long is a drift, which adaptation is there to follow."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ class Verdict:
         (site, driver) of each member of a class.
     error
         Free-run error of each output on the share that chose nothing.
+    report_times
+        First and last time [s] of each part of the record in that share; empty when another record reported.
     tests
         Ljung-Box p values of the grade (the first output) before and after, and other tests.
     parameters
@@ -81,6 +84,7 @@ class Verdict:
     members: tuple[tuple[str, str], ...] = ()
     error: tuple[OutputChange, ...] = ()
     block: str = "report"
+    report_times: tuple[tuple[float, float], ...] = ()
     tests: Mapping[str, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     drift: tuple[str, ...] = ()
@@ -107,6 +111,7 @@ class Verdict:
                 }
                 for c in self.error
             },
+            "report_times_s": [list(part) for part in self.report_times],
             "tests": dict(self.tests),
             "parameters": dict(self.parameters),
             "drift": list(self.drift),
@@ -135,8 +140,9 @@ class Judgement:
 def judge(found: Search) -> Judgement:
     """Turn the ranked alternatives into a word.
 
-    The margin of a name is what noise can give (10) or, if larger, what the best alternative itself still leaves
-    unexplained: an alternative that is worse by less than the best one's own shortcoming is not told apart from it.
+    The margin of a name is what noise can give (10 for each independent story that the innovations tell) or, if larger,
+    what the best alternative itself still leaves unexplained: an alternative that is worse by less than the best one's
+    own shortcoming is not told apart from it.
     """
     if not found.alternatives:
         return Judgement("none", None, (), (), LEAST_MARGIN)
@@ -145,8 +151,8 @@ def judge(found: Search) -> Judgement:
         sure = found.verification.reduction95[0] > 0  # smaller, but not everywhere: something else is the matter
         return Judgement("abstain" if sure else "none", best if sure else None, (), _others(found, best), LEAST_MARGIN)
     shortcoming = found.left - found.left_threshold
-    margin = max(LEAST_MARGIN, shortcoming)
-    close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < margin]
+    margin = max(LEAST_MARGIN * found.together, shortcoming)
+    close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < max(margin, SURE * a.doubt)]
     close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
     rivals = _others(found, best)
@@ -182,15 +188,11 @@ def _only_adds_to(a: Alternative, b: Alternative) -> bool:
     if len(other) != 1:
         return False
     (site, driver), (where, constant) = other[0]
-    signal = driver not in ("constant", "time", "lag", "delay", "saturation")
+    signal = driver not in STATELESS_DRIVERS
     return site == where and constant == "constant" and signal and b.fit.loss - a.fit.loss < LEAST_MARGIN
 
 
 def _only_drift(a: Alternative, adapted: tuple[str, ...]) -> bool:
     """Whether adapted parameters that change slowly are all there is; a change at an onset is an event with a cause."""
-    slow = all(site in adapted and driver == "time" for site, driver in a.names)
-    return slow and all(_slow(e) for e in a.effects)
-
-
-def _slow(effect: Effect) -> bool:
-    return effect.form == "curve" or (effect.form == "ramp" and effect.coefficients["duration"] >= SLOW_S)
+    in_time = all(site in adapted and driver == "time" for site, driver in a.names)
+    return in_time and all(slow(e) for e in a.effects)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import bootstrap
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
-from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fit import Fit, row_losses
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.greybox.model import FloatArray
 
 BLOCK_ROWS = 20
 """Rows of a block of the paired block bootstrap: longer than the noise remembers."""
+DOUBT_ROWS = 60
+"""Rows of a block in which two fits are compared: what both lack is slower than the noise."""
 SHORTEST_BLOCK = 4
 MANY_BLOCKS = 8
 """A share too short for so many blocks gets shorter ones."""
@@ -82,6 +85,25 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
         if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j])[1][1] < 0:
             worse.append(after.model.outputs[c].name)
     return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)
+
+
+def doubts(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
+    """Standard deviation of the difference between each fit's minus two log-likelihood and that of the best.
+
+    By resampling blocks of rows with the fits as they are: Kishino & Hasegawa, J. Mol. Evol. 29 (1989) 170. A fit that
+    is worse by less than two of these would be the better one in some records like this.
+    """
+    rows = problem.rows("estimate")
+    length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, DOUBT_ROWS))
+    count = int(rows.sum()) // length
+    if count < MANY_BLOCKS:
+        return tuple(0.0 for _ in others)
+    own = row_losses(problem, best, rows)
+    found = []
+    for fit in others:
+        blocks = (row_losses(problem, fit, rows) - own)[: count * length].reshape(count, length).sum(axis=1)
+        found.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
+    return tuple(found)
 
 
 def changes(problem: Problem, before: Fit, after: Fit, share: str) -> tuple[OutputChange, ...]:

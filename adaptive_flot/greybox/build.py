@@ -92,25 +92,28 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
 
 
 def tangent(dae: ca.Function, decay: ca.Function, directions: int) -> ca.Function:
-    """Derivatives of the right-hand side along several directions at once: what they share is worked out once."""
+    """The right-hand side and its derivatives along several directions: Jacobians, worked out once, times each."""
     t, x, u, p, z = dae.sx_in()
     dx, dp = ca.SX.sym("dx", x.numel(), directions), ca.SX.sym("dp", p.numel(), directions)
     rates, residual, y, _ = dae(t, x, u, p, z)
-    known, direction = ca.vertcat(x, p), ca.vertcat(dx, dp)
+    decays = decay(t, x, u, p, z)
+    both = ca.vertcat(rates, y, decays)
+
+    def along(value: ca.SX) -> ca.SX:
+        return ca.mtimes(ca.jacobian(value, x), dx) + ca.mtimes(ca.jacobian(value, p), dp)
+
+    change = along(both)
     if z.numel():
-        slope = ca.jacobian(residual, z)
-        moved = ca.jtimes(residual, known, direction)
+        slope, moved = ca.jacobian(residual, z), along(residual)
         dz = -moved / slope if z.numel() == 1 else -ca.solve(slope, moved)
-    else:
-        dz = ca.SX(0, directions)
-    both = ca.vertcat(rates, y, decay(t, x, u, p, z))
-    change = ca.jtimes(both, ca.vertcat(known, z), ca.vertcat(direction, dz))
+        change += ca.mtimes(ca.jacobian(both, z), dz)
+    change = ca.densify(change)
     nx = x.numel()
     return ca.Function(
         "tangent",
         [t, x, u, p, z, dx, dp],
-        [change[:nx, :], change[nx:-nx, :], change[-nx:, :]],
+        [rates, y, decays, change[:nx, :], change[nx:-nx, :], change[-nx:, :]],
         ["t", "x", "u", "p", "z", "dx", "dp"],
-        ["dxdot", "dy", "ddecay"],
+        ["xdot", "y", "decay", "dxdot", "dy", "ddecay"],
         {"cse": True},
     )

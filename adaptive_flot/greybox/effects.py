@@ -18,7 +18,9 @@ from adaptive_flot.greybox.forms import FORMS, Coefficient, Form, Settings, wron
 from adaptive_flot.greybox.quantities import Parameter, Quantity
 
 Mode = Literal["factor", "offset"]
-STATELESS_DRIVERS = ("constant", "time", "lag", "delay", "saturation")
+DYNAMIC_DRIVERS = ("lag", "delay", "saturation")
+"""What acts on the value at a site itself: it answers late, or only up to a limit."""
+STATELESS_DRIVERS = ("constant", "time", *DYNAMIC_DRIVERS)
 
 
 @dataclass(frozen=True)

@@ -46,18 +46,23 @@ class Moving:
         return Moving(factor * self.value, factor * self.along)
 
 
-def fast_step(model: Model, dt: float, substeps: int) -> ca.Function:
-    """Map over one interval of dt seconds, `(x, t, u, p) -> (x_next, y, s)`; y and s at its end."""
+def fast_step(model: Model, dt: float | None, substeps: int) -> ca.Function:
+    """Map over one interval, `(x, t, u, p) -> (x_next, y, s)`; y and s at its end.
+
+    The interval lasts dt seconds; for None it is a further input, the last of u.
+    """
     t, x, u, p = model.ode.sx_in()
+    h = ca.SX.sym("dt") if dt is None else dt
     nothing = ca.SX(x.numel(), 0), ca.DM(p.numel(), 0)
-    end, y = fast_step_along(model, dt, substeps, (x, t, u, p), *nothing)
-    s = model.ode(t + dt, end.value, u, p)[2]
+    end, y = fast_step_along(model, h, substeps, (x, t, u, p), *nothing)
+    s = model.ode(t + h, end.value, u, p)[2]
     names = ["x", "t", "u", "p"], ["x_next", "y", "s"]
-    return ca.Function("step", [x, t, u, p], [end.value, y.value, s], *names, {"cse": True})
+    given = ca.vertcat(u, h) if dt is None else u
+    return ca.Function("step", [x, t, given, p], [end.value, y.value, s], *names, {"cse": True})
 
 
 def fast_step_along(
-    model: Model, dt: float, substeps: int, symbols: Symbols, moved: ca.SX, seeds: ca.DM
+    model: Model, dt: float | ca.SX, substeps: int, symbols: Symbols, moved: ca.SX, seeds: ca.DM
 ) -> tuple[Moving, Moving]:
     """State and outputs after one interval, with their exact derivatives along q directions.
 
@@ -70,7 +75,7 @@ def fast_step_along(
     model
         The model.
     dt
-        Length of the interval [s].
+        Length of the interval [s], a number or a symbol.
     substeps
         Steps an interval.
     symbols
@@ -87,10 +92,11 @@ def fast_step_along(
     def rates(time: ca.SX, state: Moving) -> tuple[Moving, Moving, Moving]:
         """Slope, outputs and decay rates."""
         xdot, y, _, z = model.ode(time, state.value, u, p)
-        decay = model.decay(time, state.value, u, p, z)
         if not q:
+            decay = model.decay(time, state.value, u, p, z)
             return Moving(xdot, ca.SX(xdot.numel(), 0)), Moving(y, ca.SX(y.numel(), 0)), Moving(decay, state.along)
-        slopes = model.tangent(q)(time, state.value, u, p, z, state.along, seeds)
+        # values and derivatives from one function, which has much in common
+        xdot, y, decay, *slopes = model.tangent(q)(time, state.value, u, p, z, state.along, seeds)
         return Moving(xdot, slopes[0]), Moving(y, slopes[1]), Moving(decay, slopes[2])
 
     def remainder(time: ca.SX, state: Moving, decay: Moving) -> Moving:
@@ -103,9 +109,10 @@ def fast_step_along(
         slope, _, decay = rates(start, end)
         w = _weights(decay, h)
         n1 = slope - decay * end
-        a = w.half * end + w.half_slope * n1
+        halfway = w.half * end
+        a = halfway + w.half_slope * n1
         n2 = remainder(start + h / 2, a, decay)
-        b = w.half * end + w.half_slope * n2
+        b = halfway + w.half_slope * n2
         n3 = remainder(start + h / 2, b, decay)
         c = w.half * a + w.half_slope * (2.0 * n3 - n1)
         n4 = remainder(start + h, c, decay)
@@ -125,36 +132,53 @@ class _Weights:
     last: Moving
 
 
-def _weights(decay: Moving, h: float) -> _Weights:
+def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
     """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
     n, q = decay.along.shape
-    z, dz = ca.SX.sym("z", n), ca.SX.sym("dz", n, q)
-    phi3 = _series(z, 3)
-    phi2 = z * phi3 + 0.5
-    phi1 = z * phi2 + 1
-    phi1_half = _series(z / 2, 1)
+    z, step = ca.SX.sym("z", n), ca.SX.sym("h")
+    phi1, phi2, phi3, phi1_half = (_series if isinstance(h, float) else _closed)(z)
     weights = [
         z / 2 * phi1_half + 1,
-        h / 2 * phi1_half,
+        step / 2 * phi1_half,
         z * phi1 + 1,
-        h * (phi1 - 3 * phi2 + 4 * phi3),
-        2 * h * (phi2 - 2 * phi3),
-        h * (4 * phi3 - phi2),
+        step * (phi1 - 3 * phi2 + 4 * phi3),
+        2 * step * (phi2 - 2 * phi3),
+        step * (4 * phi3 - phi2),
     ]
-    values = ca.Function("weights", [z], weights)(h * decay.value)
+    values = ca.Function("weights", [z, step], weights)(h * decay.value, h)
     if not q:
         return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
-    slopes = ca.Function("weight_slopes", [z, dz], [ca.jtimes(w, z, dz) for w in weights])
-    moved = slopes(h * decay.value, h * decay.along)
+    # each weight depends on its own decay rate only: one derivative serves all directions
+    slopes = ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in weights])
+    moved = [_columns([d * h * decay.along[:, j] for j in range(q)], n) for d in slopes(h * decay.value, h)]
     return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
 
 
-def _series(z: ca.SX, k: int) -> ca.SX:
-    """phi_k(z) = sum over j of z^j / (j + k)!, by Horner's rule: no cancellation near 0."""
-    value = ca.SX(1.0 / factorial(SERIES_TERMS - 1 + k))
-    for j in reversed(range(SERIES_TERMS - 1)):
-        value = value * z + 1.0 / factorial(j + k)
-    return value
+def _series(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """phi_1 to phi_3 of z and phi_1 of z / 2, from phi_k(z) = sum over j of z^j / (j + k)!: no cancellation near 0."""
+
+    def phi(k: int, at: ca.SX) -> ca.SX:
+        value = ca.SX(1.0 / factorial(SERIES_TERMS - 1 + k))
+        for j in reversed(range(SERIES_TERMS - 1)):  # Horner's rule
+            value = value * at + 1.0 / factorial(j + k)
+        return value
+
+    phi3 = phi(3, z)
+    phi2 = z * phi3 + 0.5
+    return z * phi2 + 1, phi2, phi3, phi(1, z / 2)
+
+
+def _closed(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """The same for any z <= 0: the series near 0, else phi_1 = (exp(z) - 1) / z, phi_k+1 = (phi_k - 1 / k!) / z."""
+    near = z > -1
+    far = ca.if_else(near, -1.0, z)
+    phi1 = (ca.exp(far) - 1) / far
+    phi2 = (phi1 - 1) / far
+    phi3 = (phi2 - 0.5) / far
+    half = (ca.exp(far / 2) - 1) / (far / 2)
+    pairs = zip(_series(ca.if_else(near, z, 0.0)), (phi1, phi2, phi3, half), strict=True)
+    first, second, third, halved = (ca.if_else(near, small, large) for small, large in pairs)
+    return first, second, third, halved
 
 
 def _columns(columns: Sequence[ca.SX], n: int) -> ca.SX:

@@ -225,6 +225,17 @@ def _lag(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca
     return value + c["amplitude"] * (x * scale - value)
 
 
+def _lags(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del driver
+    scale = number(s, "scale")
+    x = value / scale
+    for name, tau in (("lagged_1", c["time_constant"]), ("lagged_2", c["time_constant_2"])):
+        state = m.own_state(name)
+        m.own_derivative(name, (x - state) / tau, decay=-1 / tau)
+        x = state
+    return value + c["amplitude"] * (x * scale - value)
+
+
 def _delay(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     del driver
     scale, stages = number(s, "scale"), int(number(s, "stages"))
@@ -375,6 +386,20 @@ FORMS: Mapping[str, Form] = {
             {"scale": "value"},
             direct=_lag,
             states=lambda settings: ("lagged",),
+        ),
+        Form(
+            "lags",
+            "two first-order lags in a row",
+            _fixed(
+                _SHARE,
+                Coefficient("time_constant", 20.0, 1.0, scale=10.0, unit="s", shape=True),
+                Coefficient("time_constant_2", 10.0, 1.0, scale=10.0, unit="s", shape=True),
+            ),
+            ("lag",),
+            {"scale": None},
+            {"scale": "value"},
+            direct=_lags,
+            states=lambda settings: ("lagged_1", "lagged_2"),
         ),
         Form(
             "delay",

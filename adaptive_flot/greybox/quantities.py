@@ -64,8 +64,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """A physical effect that a model may lack: where it acts, what drives it, and what it is in words."""
+    """A physical effect that a model may lack: where it acts, what drives it, and what it is in words.
+
+    Attributes
+    ----------
+    direction
+        How the value at the site must change as the driver grows; "" where both ways are physical.
+    """
 
     site: str
     driver: str
     meaning: str
+    direction: Literal["", "rises", "falls"] = ""

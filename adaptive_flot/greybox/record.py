@@ -10,26 +10,37 @@ import numpy as np
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.nodes import Nodes, NodeStepper
 from adaptive_flot.greybox.stepper import Stepper
 
 
 class RecordSimulator:
-    """Free run of a model over records: outputs at every row, row 0 being the initial state itself."""
+    """Free run of a model over records: outputs at every row, row 0 being the initial state itself.
 
-    def __init__(self, model: Model, dt: float) -> None:
-        self.model = model
-        self.stepper = Stepper(model, dt)
+    Parameters
+    ----------
+    model
+        The model.
+    dt
+        Sampling interval of the records [s].
+    nodes
+        Rows of the one record to simulate; those between are interpolated. Default all.
+    """
+
+    def __init__(self, model: Model, dt: float, nodes: Nodes | None = None) -> None:
+        self.model, self.nodes = model, nodes
+        self.stepper = Stepper(model, dt) if nodes is None else NodeStepper(model)
         self._first = FastCall(_first_row(model))
 
     def outputs(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
         """Outputs (N, ny) of the free run from x0 (nx,) with parameters p (np,)."""
-        run = self.stepper.simulate(x0, record.inputs[1:], p, record.time[0])
-        y0 = self.stepper.outputs_at(x0, record.time[0], record.inputs[0], p)[: len(self.model.outputs)]
-        return np.vstack([y0, run.outputs])
+        run = self.stepper.simulate(x0, self._inputs(record), p, record.time[0])
+        y0 = self._first(x0, record.time[0], record.inputs[0], p)[0]
+        return self._spread(np.vstack([y0, run.outputs]))
 
     def last_state(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
         """State (nx,) at the last row of the free run."""
-        run = self.stepper.simulate(x0, record.inputs[1:], p, float(record.time[0]))
+        run = self.stepper.simulate(x0, self._inputs(record), p, float(record.time[0]))
         return np.array(run.states[-1])
 
     def sensitivities(
@@ -39,11 +50,18 @@ class RecordSimulator:
 
         See `Stepper.simulate_sensitivities` for q.
         """
-        tail = self.stepper.simulate_sensitivities(x0, record.inputs[1:], p, wrt, x0_gradient, record.time[0])
+        tail = self.stepper.simulate_sensitivities(x0, self._inputs(record), p, wrt, x0_gradient, record.time[0])
         y0, by_x, by_p = self._first(x0, record.time[0], record.inputs[0], p)
         first = by_x.reshape(y0.size, -1) @ x0_gradient
         first[:, : len(wrt)] += by_p.reshape(y0.size, -1)[:, self.model.indices("parameters", wrt)]
-        return np.vstack([y0, tail.outputs]), np.concatenate([first[None], tail.gradient]), tail.last_state_gradient
+        outputs, gradient = np.vstack([y0, tail.outputs]), np.concatenate([first[None], tail.gradient])
+        return self._spread(outputs), self._spread(gradient), tail.last_state_gradient
+
+    def _inputs(self, record: Dataset) -> FloatArray:
+        return record.inputs[1:] if self.nodes is None else self.nodes.inputs
+
+    def _spread(self, values: FloatArray) -> FloatArray:
+        return values if self.nodes is None else self.nodes.spread(values)
 
 
 def _first_row(model: Model) -> ca.Function:

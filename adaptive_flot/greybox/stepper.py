@@ -71,7 +71,8 @@ class Stepper:
         self.dt = float(dt)
         self.substeps = substeps or max(1, math.ceil(dt / model.max_step_s - 1e-9))
         self.accurate = accurate
-        self._key = ("stepper", self.dt, self.substeps, accurate)
+        self._key: tuple[Hashable, ...] = ("stepper", self.dt, self.substeps, accurate)
+        self._options = {"cse": True}
         self._compiled = model.compiled and not accurate  # IDAS is machine code already
         self._records: dict[tuple[str, tuple[str, ...], int], FastCall] = {}
 
@@ -211,7 +212,7 @@ class Stepper:
             end, y = self._along(sensitivity, seeds)
             results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
             names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
-            return ca.Function(f"sensitivity_step_{q}", [x, sensitivity, t, u, p], results, *names, {"cse": True})
+            return ca.Function(f"sensitivity_step_{q}", [x, sensitivity, t, u, p], results, *names, self._options)
 
         return self._kept(("sensitivity", wrt, q), make)
 
@@ -267,8 +268,9 @@ class Stepper:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         u = np.atleast_2d(np.asarray(inputs, dtype=float))
         p = self.model.parameter_values if parameters is None else np.asarray(parameters, dtype=float)
-        if u.shape[1] != len(self.model.inputs):
-            raise ModelError(f"inputs have {u.shape[1]} columns, model '{self.model.name}' {len(self.model.inputs)}")
+        wanted = int(self.step.size1_in("u"))
+        if u.shape[1] != wanted:
+            raise ModelError(f"inputs have {u.shape[1]} columns, model '{self.model.name}' {wanted}")
         if p.shape not in ((len(self.model.parameters),), (len(u), len(self.model.parameters))):
             raise ModelError(
                 f"parameters have shape {p.shape}; give (np,) or (N, np), np = {len(self.model.parameters)}"

@@ -68,6 +68,7 @@ class Answer:
     absorbed: dict[str, float] = field(default_factory=dict)  # what n and C would move by
     base_error: dict[str, dict[str, float]] = field(default_factory=dict)  # output -> fit, report; rms in its unit
     oracle_error: dict[str, dict[str, float]] = field(default_factory=dict)
+    squares: dict[str, dict[str, list[float]]] = field(default_factory=dict)  # output -> base, oracle, rows; see record
 
     def as_dict(self) -> dict[str, Any]:
         """As written to JSON."""

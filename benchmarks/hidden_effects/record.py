@@ -17,6 +17,7 @@ from benchmarks.hidden_effects.sites import INPUTS
 
 ATTEMPTS = 8
 FIT_SHARE, REPORT_SHARE = 0.6, 0.8  # of the record: fitted before the first, reported on after the second
+BIN = 10  # rows; row k is the time k + 1 s
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,9 @@ def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
     for fault in case.faults:
         if fault.output in measured:
             measured[fault.output] = fault.apply(measured[fault.output])
-    base, fitted = _base_error(experiment, done, measured)
-    oracle = _errors(measured, calm.clean) if experiment.loop == "open" else _errors(measured, done.clean)
+    predicted, fitted = _base(experiment, done, measured)
+    known = calm.clean if experiment.loop == "open" else done.clean
+    base, oracle = _errors(measured, predicted), _errors(measured, known)
     answer = Answer(
         record=name, category=case.category, verdict=case.verdict, right_verdicts=list(case.right_verdicts),
         effects=list(case.hidden), tolerated=list(case.tolerated), ordinary=case.ordinary, loop=experiment.loop,
@@ -66,6 +68,7 @@ def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
                "feed_wander": experiment.noise.feed_wander, "std": _std(done, measured)},
         seed=[seed, k], rows=experiment.rows, n=experiment.n, C=experiment.C, start=done.start,
         drift=list(case.drift), note=case.note, size=case.size, absorbed=fitted, base_error=base, oracle_error=oracle,
+        squares=_squares(measured, predicted, known),
     )  # fmt: skip
     columns: dict[str, Any] = {"time_s": np.arange(1.0, experiment.rows + 1.0)}
     columns |= dict(zip(INPUTS, done.inputs.T, strict=True)) | measured
@@ -91,13 +94,30 @@ def _errors(measured: dict[str, Array], predicted: dict[str, Array]) -> dict[str
     return found
 
 
-def _base_error(
-    experiment: Experiment, done: Run, measured: dict[str, Array]
-) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
-    """Error of the nominal cell fitted to the first 60 %, and how far n and C went to get there."""
+def _squares(
+    measured: dict[str, Array], base: dict[str, Array], oracle: dict[str, Array]
+) -> dict[str, dict[str, list[float]]]:
+    """Sums of squared errors of base and oracle and rows that were measured, in bins of BIN rows.
+
+    So the error on any part of the record can be told, whatever a command kept for its report.
+    """
+    found = {}
+    for name, y in measured.items():
+        bins = len(y) // BIN
+        present = np.isfinite(y[: bins * BIN]).reshape(bins, BIN)
+        sums = {"rows": [float(n) for n in present.sum(axis=1)]}
+        for key, columns in (("base", base), ("oracle", oracle)):
+            error = (y - columns[name])[: bins * BIN].reshape(bins, BIN)
+            sums[key] = [float(f"{e:.6g}") for e in np.sum(np.where(present, error, 0.0) ** 2, axis=1)]
+        found[name] = sums
+    return found
+
+
+def _base(experiment: Experiment, done: Run, measured: dict[str, Array]) -> tuple[dict[str, Array], dict[str, float]]:
+    """What the nominal cell fitted to the first 60 % predicts, and how far n and C went to get there."""
     noise = {name: max(s, 1e-12) for name, s in _std(done, measured).items()}
     rows = slice(base_fit.BURN_IN, int(FIT_SHARE * experiment.rows))
     guess = (experiment.n, experiment.C)
     fit = base_fit.fit_nominal(done.inputs, measured, noise, done.start, rows, guess)
     moved = {"n": fit.n / experiment.n - 1.0, "C": fit.C / experiment.C - 1.0}
-    return _errors(measured, fit.predicted), moved
+    return fit.predicted, moved

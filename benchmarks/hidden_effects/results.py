@@ -12,6 +12,7 @@ import pandas as pd
 from adaptive_flot.files import replace_file
 from benchmarks.hidden_effects.generate import load_answers
 from benchmarks.hidden_effects.outcome import Answer, classify
+from benchmarks.hidden_effects.record import BIN
 from benchmarks.hidden_effects.verdict import Verdict, read_verdict
 
 REMOVABLE = 1.5  # base error over oracle error on the report block, from which there is something to remove
@@ -34,19 +35,37 @@ def main_output(answer: Answer) -> str | None:
 
 
 def removed_share(answer: Answer, verdict: Verdict | None) -> float:
-    """Error removed on the report block (last 20 %) as a share of an oracle's, in the output with most to remove.
+    """Error removed on held-out rows as a share of an oracle's, in the output with most to remove.
 
-    The base and the oracle are the benchmark's own; of the verdict only `error.<output>.after` is used. No verdict or
-    none of its error: nothing was removed (0). NaN where there is nothing to remove. Not above 1, not below -1.
+    The rows are those the verdict says it kept for its report, else the last 20 %. The base and the oracle are the
+    benchmark's own, on these rows; of the verdict only `error.<output>.after` is used. No verdict or none of its error:
+    nothing was removed (0). NaN where there is nothing to remove. Not above 1, not below -1.
     """
     name = main_output(answer)
     if name is None:
         return math.nan
     block = verdict.error.get(name) if verdict else None
-    if block is None or block.after is None or not math.isfinite(block.after):
+    if verdict is None or block is None or block.after is None or not math.isfinite(block.after):
         return 0.0
-    base, oracle = answer["base_error"][name]["report"], answer["oracle_error"][name]["report"]
+    base, oracle = _held_out(answer, verdict, name)
+    if not base > oracle:
+        return math.nan
     return max(-1.0, min(1.0, float((base - block.after) / (base - oracle))))
+
+
+def _held_out(answer: Answer, verdict: Verdict, output: str) -> tuple[float, float]:
+    """Root mean square error of base and oracle on the rows that a verdict kept for its report."""
+    squares = answer.get("squares", {}).get(output)
+    if not (verdict.report_times_s and squares):
+        return answer["base_error"][output]["report"], answer["oracle_error"][output]["report"]
+    inside = [
+        any(first <= k * BIN + 1 and (k + 1) * BIN <= last for first, last in verdict.report_times_s)
+        for k in range(len(squares["rows"]))
+    ]
+    rows, base, oracle = (
+        sum(v for v, i in zip(squares[key], inside, strict=True) if i) for key in ("rows", "base", "oracle")
+    )
+    return (math.sqrt(base / rows), math.sqrt(oracle / rows)) if rows else (math.nan, math.nan)
 
 
 def result_row(answer: Answer, verdict: Verdict | str, meta: dict[str, Any]) -> dict[str, Any]:

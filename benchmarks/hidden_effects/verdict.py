@@ -37,6 +37,7 @@ class Verdict(BaseModel):
     effects: list[Name] = Field(default_factory=list)
     members: list[Name] = Field(default_factory=list, alias="class")
     error: dict[str, ErrorBlock] = Field(default_factory=dict)
+    report_times_s: list[tuple[float, float]] = Field(default_factory=list)  # first and last time of each held-out part
     seconds: float | None = None
 
 

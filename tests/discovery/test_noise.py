@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.noise import MEMORY, Noise, clipped_std, fit_noise, proportional
+from adaptive_flot.discovery.noise import (
+    MEMORY,
+    Noise,
+    clipped_std,
+    correlation_times,
+    fit_noise,
+    proportional,
+    without_spikes,
+)
 
 ROWS = np.ones(3000, dtype=bool)
 
@@ -67,3 +75,32 @@ def test_noise_that_grows_with_the_value_is_weighted_and_other_noise_is_not() ->
     weights = proportional(grows, y)
     assert np.allclose(weights / y, weights[0] / y[0], rtol=1e-9) and np.mean(weights) == pytest.approx(1, rel=0.02)
     assert np.all(proportional(0.05 * rng.standard_normal(y.shape), y) == 1.0)
+
+
+@given(st.integers(0, 1000), st.sampled_from([0.0, 0.5, 0.9]))
+def test_spikes_go_and_the_rest_stays(seed: int, a: float) -> None:
+    """Twenty spikes of 30 standard deviations on an autoregression: they go to where their neighbours are."""
+    r = _ar(a, seed)
+    where = np.random.default_rng(seed).choice(np.arange(5, 2995, 5), 20, replace=False)
+    spiked = r.copy()
+    spiked[where] += 30.0
+    found = without_spikes(spiked[:, None])[:, 0]
+    assert np.max(np.abs(found[where] - r[where])) < 8.0
+    others = np.setdiff1d(np.arange(3000), where)
+    assert np.mean(found[others] != spiked[others]) < 0.01
+
+
+def test_a_step_is_no_spike_and_missing_values_stay_missing() -> None:
+    r = _ar(0.3, 1)
+    r[1500:] += 50.0
+    r[100:110] = np.nan
+    found = without_spikes(r[:, None])[:, 0]
+    assert np.isnan(found[100:110]).all() and np.isfinite(np.delete(found, range(100, 110))).all()
+    assert np.nanmean(found[1600:]) - np.nanmean(found[:1400]) == pytest.approx(50.0, abs=0.5)
+
+
+@pytest.mark.parametrize(("a", "expected"), [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)])
+def test_correlation_time_of_an_autoregression_is_the_closed_form(a: float, expected: float) -> None:
+    """1 + 2 sum a^k = (1 + a) / (1 - a)."""
+    found = np.mean([correlation_times(_ar(a, s, 20_000)[:, None])[0] for s in range(5)])
+    assert found == pytest.approx(expected, rel=0.15)

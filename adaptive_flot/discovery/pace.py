@@ -1,0 +1,57 @@
+"""How far apart a search may simulate a densely sampled record without anyone noticing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.descent import is_smooth
+from adaptive_flot.discovery.fit import Fit, loss_of
+from adaptive_flot.discovery.fitter import Fitter
+from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.greybox.nodes import place_nodes
+from adaptive_flot.greybox.record import RecordSimulator
+
+LONGEST = (6, 4, 3, 2)
+"""Rows from node to node that are tried."""
+UNNOTICED = 2.0
+"""Sum of the squared errors of the coarser run, in standard deviations of the noise, that makes no difference: it
+changes minus two log-likelihood by about as much, a fifth of what a name asks for."""
+NOTICED = 3.0
+"""Difference of minus two log-likelihood from which a run at every row is worth its price."""
+WORTHWHILE = 0.8
+"""Nodes as a share of the rows above which there is nothing to save."""
+
+
+def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, float]]) -> Fit:
+    """The fit itself where a run at every row says the same of it; else one made at every row, from there.
+
+    The nodes were placed for the model as it is: an effect may have made it faster.
+    """
+    problem = fitter.problem
+    if problem.nodes is None or not is_smooth(fit.model):
+        return fit
+    every = replace(problem, nodes=None)
+    run = RecordSimulator(fit.model, problem.record.dt)
+    free = run.outputs(problem.record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
+    if np.isfinite(free).all() and abs(loss_of(problem, free, fitter.rows)[0] - fit.loss) < NOTICED:
+        return fit
+    return Fitter(every, fitter.share).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
+
+
+def with_nodes(problem: Problem, fit: Fit) -> Problem:
+    """The problem with the fewest nodes at which a fit's free run (at all rows) stays what it is, if there are any."""
+    record = problem.record
+    noise = 1.4826 * np.nanmedian(np.abs(np.diff(fit.residual(problem) / problem.weights, axis=0)), axis=0) / np.sqrt(2)
+    size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
+    for longest in LONGEST:
+        nodes = place_nodes(record, longest)
+        if len(nodes.rows) > WORTHWHILE * len(record):
+            continue
+        run = RecordSimulator(fit.model, record.dt, nodes)
+        free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
+        if np.sum(((free - fit.predicted) / size) ** 2) < UNNOTICED:
+            return replace(problem, nodes=nodes)
+    return problem

@@ -1,0 +1,123 @@
+"""Fewer instants to simulate a densely sampled record at: close together after a move of an input, far apart else.
+
+Between two moves of the inputs everything is smooth, and a record sampled every second says most things several times.
+The free run steps from node to node; the rows between are interpolated by cubics that never reach across a move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, lil_array
+
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.fast_step import Moving, fast_step, fast_step_along
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepper import Stepper
+
+MOVE = 0.001
+"""An input that changes from one row to the next by more than this share of its range has moved."""
+SETTLING = (1, 2, 3)
+"""Rows from node to node after a move, before they are `longest` apart."""
+STENCIL = 4
+"""Nodes that a row between them is interpolated from."""
+
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Rows of a record that are simulated, and how the other rows follow from them.
+
+    Attributes
+    ----------
+    rows
+        Rows (M,), the first and the last of the record among them.
+    inputs
+        Mean inputs (M - 1, nu) of each interval and, as the last column, its length [s].
+    weights
+        Weights (N, M) of the nodes in each row, sparse.
+    """
+
+    rows: IntArray
+    inputs: FloatArray
+    weights: csr_array
+
+    def spread(self, values: FloatArray) -> FloatArray:
+        """Values at all rows (N, ...) from those at the nodes (M, ...)."""
+        found: FloatArray = self.weights @ values.reshape(len(values), -1)
+        return found.reshape(-1, *values.shape[1:])
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """Means (M - 1, ...) over the rows of each interval, the row at its end among them; values (N, ...)."""
+        sums: FloatArray = np.add.reduceat(values[1:], self.rows[:-1], axis=0)
+        return sums / np.diff(self.rows).reshape(-1, *(1,) * (values.ndim - 1))
+
+
+def place_nodes(record: Dataset, longest: int) -> Nodes:
+    """Nodes of a record that are at most `longest` rows apart."""
+    u = record.inputs
+    moved = np.zeros(len(u), dtype=bool)
+    moved[1:] = (np.abs(np.diff(u, axis=0)) > MOVE * np.ptp(u, axis=0)).any(axis=1)
+    moved[0] = True
+    starts = np.flatnonzero(moved)
+    parts = [_segment(int(a), int(b), longest) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
+    rows = np.concatenate(parts)
+    weights = lil_array((len(u), len(rows)))
+    offset = 0
+    for part in parts:
+        _interpolate(part, offset, weights)
+        offset += len(part)
+    nodes = Nodes(rows, np.empty(0), csr_array(weights))
+    return replace(nodes, inputs=np.column_stack([nodes.means(u), np.diff(rows) * record.dt]))
+
+
+def _segment(start: int, stop: int, longest: int) -> IntArray:
+    """Nodes of the rows start to stop - 1, between which no input moves; both ends are nodes."""
+    rows = [start]
+    while rows[-1] < stop - 1:
+        gap = SETTLING[len(rows) - 1] if len(rows) <= len(SETTLING) else longest
+        rows.append(min(rows[-1] + min(gap, longest), stop - 1))
+    return np.array(rows if len(rows) >= STENCIL else range(start, stop), dtype=np.intp)
+
+
+def _interpolate(nodes: IntArray, offset: int, weights: lil_array) -> None:
+    """Fill the weights of the rows from the first to the last node of a segment: Lagrange's polynomials."""
+    count = min(STENCIL, len(nodes))
+    for row in range(nodes[0], nodes[-1] + 1):
+        after = int(np.searchsorted(nodes, row))
+        if nodes[after] == row:
+            weights[row, after + offset] = 1.0
+            continue
+        first = int(np.clip(after - count // 2, 0, len(nodes) - count))
+        at = nodes[first : first + count].astype(float)
+        for k in range(count):
+            others = np.delete(at, k)
+            weights[row, first + k + offset] = float(np.prod((row - others) / (at[k] - others)))
+
+
+class NodeStepper(Stepper):
+    """The step of a model with its length as a last input; one Runge-Kutta step an interval."""
+
+    def __init__(self, model: Model) -> None:
+        super().__init__(model, 1.0, substeps=1)
+        self._key = ("node stepper", *self._key)
+        self._options = {}  # a search runs a step some thousand times: looking for common terms takes longer
+
+    @property
+    def step(self) -> ca.Function:
+        """`(x, t, u, p) -> (x_next, y, s)`: u is the inputs and the length of the step."""
+        return self._kept(("step",), lambda: fast_step(self.model, None, 1))
+
+    def _along(self, moved: ca.SX, seeds: ca.DM) -> tuple[Moving, Moving]:
+        x, t, u, p = self._symbols()
+        return fast_step_along(self.model, u[-1], 1, (x, t, u[:-1], p), moved, seeds)
+
+    def _tables(
+        self, inputs: FloatArray, parameters: FloatArray | None, t0: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        u, p, _ = super()._tables(inputs, parameters, t0)
+        return u, p, t0 + np.concatenate([[0.0], np.cumsum(u[:-1, -1])])

@@ -1,0 +1,56 @@
+"""Actuators that stick or reach a limit are found as such: on the heated tank, whose heater is made to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.lateness import dragged
+from adaptive_flot.greybox.dataset import Dataset
+from tests.discovery.heated import Truth, heated_tank, moves, tank_record
+
+
+def _told(asked: np.ndarray, given_: np.ndarray) -> Dataset:
+    """A record whose tank got other power than the record tells."""
+    fan = moves(len(asked), 5, 20, 25, 3)
+    done = tank_record(Truth(exponent=0.0), len(asked), 0, np.column_stack([given_, fan]))
+    return replace(done, inputs=np.column_stack([asked, fan]))
+
+
+@given(st.lists(st.floats(-5, 5), min_size=2, max_size=30), st.floats(0.1, 3.0))
+def test_what_is_dragged_is_never_further_behind_than_its_band_and_moves_no_more_than_it_must(
+    demand: list[float], band: float
+) -> None:
+    v = np.array(demand)
+    position = dragged(v, band)
+    assert np.all(np.abs(position - v) <= band + 1e-12)
+    still = np.abs(v[1:] - position[:-1]) <= band
+    np.testing.assert_array_equal(position[1:][still], position[:-1][still])
+
+
+def test_a_heater_at_its_limit_is_named() -> None:
+    asked = moves(600, 500, 3000, 30, 1)
+    found = discover(heated_tank(), _told(asked, np.minimum(asked, 2000.0))).verdict
+    assert found.word in ("named", "class")
+    assert (found.effects[0].effect.site, found.effects[0].effect.driver) in (
+        ("heating", "saturation"),
+        ("heating", "power"),  # a curve of the power is the same statement
+    )
+    if found.effects[0].effect.driver == "saturation":
+        assert found.effects[0].effect.coefficients["limit"] == pytest.approx(0.9 * 2000.0, rel=0.03)
+
+
+def test_a_heater_that_sticks_is_late() -> None:
+    """A random walk of the demand, followed by a heater in a wide dead band."""
+    rng = np.random.default_rng(2)
+    asked = 1700.0 + np.repeat(np.clip(np.cumsum(rng.normal(0, 250, 150)), -1200, 1300), 4)
+    found = discover(heated_tank(), _told(asked, dragged(asked, 400.0))).verdict
+    assert found.word in ("named", "class")
+    told = [(e.effect.site, e.effect.driver, e.effect.form) for e in found.effects]
+    assert told == [("heating", "lag", "stiction")]
+    assert found.effects[0].effect.coefficients["band"] == pytest.approx(0.9 * 400.0, rel=0.1)

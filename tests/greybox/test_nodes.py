@@ -1,0 +1,69 @@
+"""Fewer instants: the run from node to node is that of every row, and its derivatives are too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.nodes import Nodes, place_nodes
+from adaptive_flot.greybox.record import RecordSimulator
+from tests.discovery.heated import heated_tank, tank_record
+
+ROWS = 200
+
+
+def _record(seed: int, rows: int = ROWS) -> Dataset:
+    """Inputs that move now and then, never at an even pace."""
+    rng = np.random.default_rng(seed)
+    levels = np.cumsum(rng.random((rows, 2)) < 0.05, axis=0)
+    inputs: FloatArray = np.column_stack([1000.0 + 37.0 * levels[:, 0], 10.0 + levels[:, 1]]).astype(np.float64)
+    return Dataset("moves", np.arange(2.0, 2.0 * rows + 1, 2.0), 2.0, inputs, np.zeros((rows, 1)))
+
+
+@given(st.integers(0, 1000), st.integers(2, 6))
+def test_nodes_stand_at_every_move_and_at_both_ends(seed: int, longest: int) -> None:
+    record = _record(seed)
+    nodes = place_nodes(record, longest)
+    moved = 1 + np.flatnonzero((np.diff(record.inputs, axis=0) != 0).any(axis=1))
+    assert {0, ROWS - 1, *moved, *(moved - 1)} <= set(nodes.rows.tolist())
+    assert 1 <= np.diff(nodes.rows).min() and np.diff(nodes.rows).max() <= longest
+    assert np.sum(nodes.inputs[:, -1]) == pytest.approx(record.time[-1] - record.time[0])
+
+
+@given(st.integers(0, 1000))
+def test_rows_between_nodes_are_cubics_that_do_not_reach_across_a_move(seed: int) -> None:
+    """A cubic comes back exactly between two moves, whatever happens beyond them."""
+    record = _record(seed)
+    nodes = place_nodes(record, 6)
+    t = np.arange(ROWS) / ROWS
+    part = np.cumsum(np.concatenate([[0], (np.diff(record.inputs, axis=0) != 0).any(axis=1)]))
+    values = 1 + t - 2 * t**2 + 3 * t**3 + 100.0 * part  # a jump at every move
+    np.testing.assert_allclose(nodes.spread(values[nodes.rows]), values, rtol=1e-9)
+
+
+@given(st.integers(0, 1000))
+def test_means_over_intervals_keep_the_sum(seed: int) -> None:
+    record = _record(seed)
+    nodes: Nodes = place_nodes(record, 6)
+    values = np.random.default_rng(seed).standard_normal((ROWS, 3))
+    sums = nodes.means(values) * np.diff(nodes.rows)[:, None]
+    np.testing.assert_allclose(sums.sum(axis=0), values[1:].sum(axis=0), atol=1e-9)
+
+
+def test_a_run_over_nodes_and_its_derivatives_are_those_of_every_row() -> None:
+    """The inputs stand still between nodes, so nothing but the interpolation differs."""
+    record, model = tank_record(), heated_tank()
+    x0, p, wrt = np.array([305.0]), model.parameter_values, ("efficiency", "loss")
+    nodes = place_nodes(record, 4)
+    assert len(nodes.rows) < 0.6 * len(record)
+    every, some = RecordSimulator(model, record.dt), RecordSimulator(model, record.dt, nodes)
+    np.testing.assert_allclose(some.outputs(record, x0, p), every.outputs(record, x0, p), atol=1e-3)
+    gradient = np.hstack([np.zeros((1, 2)), np.ones((1, 1))])
+    a, b = (s.sensitivities(record, x0, p, wrt, gradient) for s in (some, every))
+    np.testing.assert_allclose(a[0], b[0], atol=1e-3)
+    np.testing.assert_allclose(a[1], b[1], atol=1e-3 * np.abs(b[1]).max())
+    np.testing.assert_allclose(a[2], b[2], rtol=1e-4)
