@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
-from statsmodels.stats.diagnostic import acorr_ljungbox, breaks_cusumolsresid
+from scipy.ndimage import uniform_filter1d
+from scipy.stats import chi2, norm
+from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.stats.multitest import multipletests
 
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.noise import without_spikes
+from adaptive_flot.discovery.noise import correlation_times, without_spikes
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.greybox.model import FloatArray
 
@@ -25,6 +26,8 @@ LAGS = 20
 """Lags of the test of whiteness."""
 INPUT_LAGS = (1, 2, 4, 8, 16, 32, 64)
 """Rows by which an input may be ahead of the residual it explains."""
+WINDOWS = 12
+"""Windows of the record between which a jump is looked for."""
 FEWEST = 200
 """Rows that a test asks for."""
 
@@ -44,7 +47,7 @@ class Symptom:
     inputs
         p value of independence of the past of each input, by name; of the whitened residual.
     onset_s
-        Time since when the mean of the residual is another one; None when it is not (CUSUM, of the whitened residual).
+        Time at which the mean of the residual changes most; None when it does not (moving sums of the residual itself).
     shows
         Whether any of the tests rejects, by Holm's procedure over all outputs.
     """
@@ -62,7 +65,7 @@ class Symptom:
         said = f"{self.output}: residual {self.size:.1f} x the noise"
         after = [name for name, p in self.inputs.items() if p < LEVEL]
         said += f", follows {', '.join(after)}" if after else ""
-        return said + (f", another mean since about {self.onset_s:.0f} s" if self.onset_s is not None else "")
+        return said + (f", which changes most at about {self.onset_s:.0f} s" if self.onset_s is not None else "")
 
 
 @dataclass(frozen=True)
@@ -103,8 +106,8 @@ def detect(problem: Problem, base: Fit) -> Detection:
     for j, c in enumerate(problem.columns):
         r = residual[:, j]
         white = base.noise.whiten(residual)[:, j]
-        independent = {n: _independence(white, problem.record.inputs[:, i]) for i, n in enumerate(names)}
-        found.append((base.model.outputs[c].name, _size(r), _white(r), independent, _change(white, problem)))
+        independent = {n: independence(white, problem.record.inputs[:, i]) for i, n in enumerate(names)}
+        found.append((base.model.outputs[c].name, _size(r), _white(r), independent, _change(r, problem.record.time)))
     ps = [p for _, _, white, inputs, (change, _) in found for p in (white, *inputs.values(), change)]
     rejected = iter(_holm(ps))
     symptoms = []
@@ -135,7 +138,7 @@ def _white(r: FloatArray) -> float:
     return float(acorr_ljungbox(e, lags=[LAGS])["lb_pvalue"].iloc[0]) if len(e) >= FEWEST else float("nan")
 
 
-def _independence(e: FloatArray, u: FloatArray) -> float:
+def independence(e: FloatArray, u: FloatArray) -> float:
     """Lagrange multiplier test of a regression on the past of an input: rows x R^2 is chi-squared."""
     most = max(INPUT_LAGS)
     past = np.column_stack([u[most - lag : len(u) - lag] for lag in INPUT_LAGS])
@@ -152,11 +155,23 @@ def _independence(e: FloatArray, u: FloatArray) -> float:
     return float(chi2.sf(count * (1 - np.sum((y - X @ beta) ** 2) / (y @ y)), rank))
 
 
-def _change(e: FloatArray, problem: Problem) -> tuple[float, float | None]:
-    """P value of a constant mean, and the time at which its cumulative sum is furthest from that of one."""
-    present = np.flatnonzero(np.isfinite(e))
-    if len(present) < FEWEST or not np.std(e[present]) > 0:
+def _change(r: FloatArray, time: FloatArray) -> tuple[float, float | None]:
+    """P value of no jump, and the time at which the mean after differs most from the mean before (moving sums).
+
+    Windows of a twelfth of the record: a fit bends its parameters until a jump is a saw tooth, whose cumulative sum
+    goes nowhere. The spread is the long-run one of what is faster than a window; Bonferroni over the windows.
+    """
+    present = np.flatnonzero(np.isfinite(r))
+    if len(present) < FEWEST:
         return float("nan"), None
-    centred = e[present] - e[present].mean()
-    p = float(breaks_cusumolsresid(centred)[1])
-    return p, float(problem.record.time[present[int(np.argmax(np.abs(np.cumsum(centred))))]])
+    e = r[present]
+    window = len(e) // WINDOWS
+    sums = np.concatenate([[0.0], np.cumsum(e)])
+    means = (sums[window:] - sums[:-window]) / window  # of rows k to k + window - 1
+    jump = np.abs(means[window:] - means[:-window])
+    fast = e - uniform_filter1d(e, window, mode="nearest")
+    spread = float(np.std(fast) * np.sqrt(2 * correlation_times(fast[:, None])[0] / window))
+    if not spread > 0:
+        return float("nan"), None
+    at = int(np.argmax(jump))
+    return min(1.0, 2 * WINDOWS * float(norm.sf(jump[at] / spread))), float(time[present[at + window]])

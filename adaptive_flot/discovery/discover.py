@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.detect import detect
 from adaptive_flot.discovery.direction import against, listed
 from adaptive_flot.discovery.experiment import leading, plan_experiment
 from adaptive_flot.discovery.explained import nothing_explained
@@ -16,6 +17,7 @@ from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
+from adaptive_flot.discovery.locate import locate
 from adaptive_flot.discovery.noise import proportional
 from adaptive_flot.discovery.pace import with_nodes
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
@@ -122,6 +124,8 @@ def discover(
     if unexplained:
         checked = replace(checked, reasons=(unexplained,))
         return Discovery(_insufficient(checked, began), base.model, checked, problem, before=base, after=base)
+    progress("test the residual")
+    detection = detect(problem, base)
     found = search(problem, base, model, processes=processes, progress=progress)
     if wants_joint(problem, found):
         problem, found = search_jointly(problem, found, processes=processes, progress=progress)
@@ -130,6 +134,7 @@ def discover(
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)
     verdict = _verdict(problem, checked, found, judgement, before, after, report_record)
+    verdict = replace(verdict, detection=detection, location=locate(detection, found.rounds[0].scores))
     if judgement.best is not None and judgement.word != "none":
         progress("plan a test")
         compared = [
@@ -236,7 +241,7 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
         others = tuple(
-            (*instead[0], a.fit.bic - best.fit.bic)
+            (*instead[0], a.fit.bic - best.fit.bic, a.doubt)
             for a in judgement.rivals
             if len(instead := [n for n in a.names if n not in best.names]) == 1
             and set(best.names) - set(a.names) == {own}

@@ -203,11 +203,10 @@ def _words(names: Names) -> str:
 
 def leading(best: Alternative, others: Sequence[Alternative], margin: float) -> tuple[Alternative, ...]:
     """Alternatives worth a test: the best, and the first few that come close to it."""
-    limit = max(margin, CLOSE)
     seen = {frozenset(best.names)}
     close = [best]
     for a in others:
-        if abs(a.fit.bic - best.fit.bic) < limit and frozenset(a.names) not in seen:
+        if abs(a.fit.bic - best.fit.bic) < max(margin, CLOSE, 2 * a.doubt) and frozenset(a.names) not in seen:
             seen.add(frozenset(a.names))
             close.append(a)
     return tuple(close[:MOST_COMPARED])

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.detect import Detection
 from adaptive_flot.discovery.events import slow
 from adaptive_flot.discovery.experiment import Experiment
+from adaptive_flot.discovery.locate import Location
 from adaptive_flot.discovery.search import Search
 from adaptive_flot.discovery.verify import OutputChange
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
@@ -30,8 +32,8 @@ class NamedEffect:
     effect: Effect
     meaning: str
     interval95: Mapping[str, tuple[float, float]]
-    alternatives: tuple[tuple[str, str, float], ...]
-    """(site, driver, how much worse its criterion is)."""
+    alternatives: tuple[tuple[str, str, float, float], ...]
+    """(site, driver, how much worse its criterion is, standard deviation of that)."""
 
     def as_dict(self) -> dict[str, Any]:
         """Entry of the machine-readable verdict."""
@@ -40,7 +42,10 @@ class NamedEffect:
             "parameters": {k: float(v) for k, v in self.effect.coefficients.items()},
             "meaning": self.meaning,
             "interval95": {k: list(v) for k, v in self.interval95.items()},
-            "alternatives": [{"site": s, "driver": d, "delta_bic": round(v, 1)} for s, d, v in self.alternatives],
+            "alternatives": [
+                {"site": s, "driver": d, "delta_bic": round(v, 1), "sd": round(sd, 1)}
+                for s, d, v, sd in self.alternatives
+            ],
         }
 
 
@@ -64,6 +69,8 @@ class Verdict:
         First and last time [s] of each part of the record in that share; empty when another record reported.
     tests
         Ljung-Box p values of the grade (the first output) before and after, and other tests.
+    detection, location
+        What the residual of the model as it is shows, and where it points; None when nothing was fitted or scored.
     parameters
         Adapted parameters in the final fit, by label.
     drift
@@ -90,6 +97,8 @@ class Verdict:
     drift: tuple[str, ...] = ()
     absorbed: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    detection: Detection | None = None
+    location: Location | None = None
     experiment: Experiment | None = None
     seconds: float = 0.0
 
@@ -113,6 +122,8 @@ class Verdict:
             },
             "report_times_s": [list(part) for part in self.report_times],
             "tests": dict(self.tests),
+            "detection": self.detection.as_dict() if self.detection else [],
+            "location": self.location.as_dict() if self.location else None,
             "parameters": dict(self.parameters),
             "drift": list(self.drift),
             "absorbed": dict(self.absorbed),
@@ -136,6 +147,10 @@ class Judgement:
     rivals: tuple[Alternative, ...]
     margin: float
 
+    def near(self, a: Alternative) -> bool:
+        """Whether the record does not tell an alternative from the best."""
+        return self.best is not None and _near(a, self.best, self.margin)
+
 
 def judge(found: Search) -> Judgement:
     """Turn the ranked alternatives into a word.
@@ -152,7 +167,7 @@ def judge(found: Search) -> Judgement:
         return Judgement("abstain" if sure else "none", best if sure else None, (), _others(found, best), LEAST_MARGIN)
     shortcoming = found.left - found.left_threshold
     margin = max(LEAST_MARGIN * found.together, shortcoming)
-    close = [a for a in found.alternatives if a.fit.bic - best.fit.bic < max(margin, SURE * a.doubt)]
+    close = [a for a in found.alternatives if _near(a, best, margin)]
     close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
     rivals = _others(found, best)
@@ -170,6 +185,10 @@ def judge(found: Search) -> Judgement:
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
+
+
+def _near(a: Alternative, best: Alternative, margin: float) -> bool:
+    return a.fit.bic - best.fit.bic < max(margin, SURE * a.doubt)
 
 
 def _others(found: Search, best: Alternative) -> tuple[Alternative, ...]:

@@ -58,7 +58,7 @@ def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect
 
 def _class_words(judgement: Judgement) -> str:
     assert judgement.best is not None  # a class has a best member
-    sets = [a for a in (judgement.best, *judgement.rivals) if a.fit.bic - judgement.best.fit.bic < judgement.margin]
+    sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
     if all(len(a.names) == 1 for a in sets):
         members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
         return f"The model lacks one of these, which this record can not tell apart: {members}."

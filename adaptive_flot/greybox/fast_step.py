@@ -136,7 +136,7 @@ def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
     """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
     n, q = decay.along.shape
     z, step = ca.SX.sym("z", n), ca.SX.sym("h")
-    phi1, phi2, phi3, phi1_half = (_series if isinstance(h, float) else _closed)(z)
+    phi1, phi2, phi3, phi1_half = (_series if isinstance(h, float) else closed_phi)(z)
     weights = [
         z / 2 * phi1_half + 1,
         step / 2 * phi1_half,
@@ -168,7 +168,7 @@ def _series(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     return z * phi2 + 1, phi2, phi3, phi(1, z / 2)
 
 
-def _closed(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def closed_phi(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """The same for any z <= 0: the series near 0, else phi_1 = (exp(z) - 1) / z, phi_k+1 = (phi_k - 1 / k!) / z."""
     near = z > -1
     far = ca.if_else(near, -1.0, z)

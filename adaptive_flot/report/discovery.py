@@ -81,6 +81,8 @@ def _evidence(found: Discovery, problem: Problem, before: Fit, after: Fit, album
         "errors": tables.error_table(found),
         "before_after": [_before_after(found, problem, before, after, album)],
         "tests": tables.test_table(found),
+        "symptoms": tables.symptom_table(found),
+        "places": tables.place_table(found),
         "residuals": [_residuals(found, problem, j, album) for j in columns],
         "map": _map(found, album),
         "alternatives": tables.alternative_table(found) if tables.ranked_alternatives(found) else None,

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.detect import LEVEL
 from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.verdict import SURE
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.figures import p_text
 from adaptive_flot.report.page import Table, number
@@ -71,12 +73,14 @@ def alternative_table(found: Discovery) -> Table:
     rows = []
     for k, a in enumerate(ranked):
         forms = ", and ".join(_form(e) for e in a.effects)
-        values = (number(a.fit.bic - best, ".1f"), number(a.delta_bic, ".1f"))
+        worse = number(a.fit.bic - best, ".1f") + (f" ± {number(a.doubt, '.0f')}" if a.doubt else "")
+        values = (worse, number(a.delta_bic, ".1f"))
         rows.append((str(k + 1), effect_text(a.names), forms, "yes" if all(a.known) else "no", *values))
     caption = (
         "Alternatives, each refitted with the adapted parameters, the initial state and a noise model of its own. "
-        "Δ BIC: how much worse its information criterion is than that of the best one, and its difference to the model "
-        "without an effect (negative is better). Known: whether the model's catalogue has a name for it."
+        "Δ BIC: how much worse its information criterion is than that of the best one (± its standard deviation, from "
+        "resampled blocks of rows), and its difference to the model without an effect (negative is better). Known: "
+        "whether the model's catalogue has a name for it."
     )
     header = ("Rank", "Effect", "Form", "Known", "Δ BIC to best", "Δ BIC to no effect")
     return Table(caption, header, tuple(rows), words=4)
@@ -103,6 +107,41 @@ def test_table(found: Discovery) -> Table:
     return Table(caption, ("Output", "p before", "p after"), tuple(rows))
 
 
+def symptom_table(found: Discovery) -> Table | None:
+    """What the residual of the model as it is shows, output by output."""
+    if found.verdict.detection is None:
+        return None
+    rows = []
+    for s in found.verdict.detection.symptoms:
+        follows = ", ".join(words(n) for n, p in s.inputs.items() if p < LEVEL) or "none"
+        onset = "-" if s.onset_s is None else number(s.onset_s, ".0f")
+        rows.append((words(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
+    caption = (
+        "Residual of the model as it is. Size: root mean square over the noise seen from row to row. Follows: inputs "
+        f"whose past the whitened residual depends on (p < {LEVEL:g}). Change: when its mean changes most (moving "
+        "sums). Missing: whether any test rejects, by Holm's procedure at 5 % over all outputs. These tests say that "
+        "something is missing; they choose nothing."
+    )
+    header = ("Output", "Size", "Follows", "Change [s]", "Missing")
+    return Table(caption, header, tuple(rows), words=3)
+
+
+def place_table(found: Discovery) -> Table | None:
+    """Kinds of places and causes by what the best candidate of each would explain."""
+    if found.verdict.location is None:
+        return None
+    rows = [
+        (group, p.kind, effect_text([(p.site, p.driver)]), number(100 * p.share, ".0f"))
+        for group, places in (("where", found.verdict.location.places), ("when", found.verdict.location.causes))
+        for p in places
+    ]
+    caption = (
+        "Where and when the missing effect acts: the best candidate of each kind, and what it would explain to first "
+        "order as a share of the best of all."
+    )
+    return Table(caption, ("Question", "Kind", "Best candidate", "Share [%]"), tuple(rows), words=3)
+
+
 def absorbed_table(found: Discovery) -> Table:
     """Adapted parameters with and without the effect: what they had absorbed."""
     rows = []
@@ -127,11 +166,12 @@ def not_told_apart(found: Discovery) -> list[str]:
     best = judged.best
     said = []
     for a in judged.rivals:
-        worse = a.fit.bic - best.fit.bic
-        if worse < judged.margin:
+        if judged.near(a):
+            least = max(judged.margin, SURE * a.doubt)
             said.append(
-                f"{effect_text(a.names)} explains the record as well as {effect_text(best.names)}: its criterion "
-                f"differs by {number(worse, '.1f')}, and {judged.margin:.0f} is the least that tells two apart."
+                f"{effect_text(a.names)} explains the record about as well as {effect_text(best.names)}: its criterion "
+                f"differs by {number(a.fit.bic - best.fit.bic, '.1f')}, and {least:.0f} is the least that tells them "
+                "apart."
             )
     if not said and found.verdict.experiment is not None:
         said = ["Nothing comes as near as that to the best alternative; the test below is for those next to it."]

@@ -57,6 +57,7 @@ def rates(table: pd.DataFrame) -> list[Rate]:
         rate("wrong name, of records with an effect", wrong[hidden], "<= 5 %"),
         rate("false alarm, of controls (none, drift)", alarm[controls], "<= 5 %"),
         rate("truth named or in a class of 3, single ordinary", outcome.isin(FOUND)[ordinary], ">= 85 %"),
+        rate("wrong name or false alarm, of all records", wrong | alarm),
         rate("wrong, of all names given", (wrong | alarm)[named]),
         rate("wrong name or wrong class, of records with an effect", (wrong | (outcome == "wrong_class"))[hidden]),
         rate("truth named, single ordinary", (outcome == "right")[ordinary]),

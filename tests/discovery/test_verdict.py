@@ -12,9 +12,10 @@ from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.curve import effect_curves
 from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.experiment import leading
+from adaptive_flot.discovery.fit import row_losses
 from adaptive_flot.discovery.search import Search
 from adaptive_flot.discovery.verdict import judge
-from adaptive_flot.discovery.verify import Verification, changes, verify, whiteness
+from adaptive_flot.discovery.verify import Verification, changes, doubts, verify, whiteness
 from adaptive_flot.discovery.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import heated_tank
@@ -61,6 +62,32 @@ def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, f
         assert judged.best is not None and all(judged.best.known)
     assert (len(judged.members) > 1) == (word == "class")
     assert all(rival is not judged.best for rival in judged.rivals)
+
+
+def test_a_rival_that_could_as_well_have_been_better_is_not_told_apart(draught: Discovery) -> None:
+    """Worse by 50, but a difference of 30 would be nothing unusual."""
+    found = _search(draught, (BY_FAN, True, 0.0), (BY_HEATER, True, 50.0))
+    best, rival = found.alternatives
+    assert judge(found).word == "named"
+    unsure = judge(replace(found, alternatives=(best, replace(rival, doubt=30.0))))
+    assert unsure.word == "class" and unsure.near(rival) is False and unsure.near(unsure.rivals[0])
+
+
+def test_evidence_of_correlated_innovations_counts_once(draught: Discovery) -> None:
+    found = _search(draught, (BY_FAN, True, 0.0), (BY_HEATER, True, 50.0))
+    assert judge(replace(found, together=4.0)).word == "named"
+    assert judge(replace(found, together=6.0)).word == "class"
+
+
+def test_doubt_is_the_spread_of_the_difference_over_blocks(draught: Discovery) -> None:
+    """Against itself none; against the model without the effect far less than what that one is worse by."""
+    problem, before, after = draught.problem, draught.before, draught.after
+    assert problem is not None and before is not None and after is not None
+    same, other = doubts(problem, after, [after, before])
+    assert same == 0.0
+    rows = problem.rows("estimate")
+    difference = float(np.sum(row_losses(problem, before, rows) - row_losses(problem, after, rows)))
+    assert 0 < other < difference / 4
 
 
 def test_nothing_is_named_that_does_not_stand_on_fresh_rows(draught: Discovery) -> None:
@@ -115,6 +142,10 @@ def test_the_machine_readable_verdict_is_that_of_the_design(draught: Discovery) 
     low, high = effect["interval95"]["exponent"]
     assert low < 0.6 < high and low < effect["parameters"]["exponent"] < high
     assert all(a["delta_bic"] > 0 for a in effect["alternatives"])
+    assert all(a["sd"] >= 0 for a in effect["alternatives"])
+    assert [d["output"] for d in told["detection"]] == ["temperature"] == told["location"]["outputs"]
+    report = np.array(told["report_times_s"])
+    assert np.all(report[:, 0] < report[:, 1]) and np.all(report[1:, 0] > report[:-1, 1])
     error = told["error"]["temperature"]
     assert set(error) == {"unit", "before", "after", "noise", "reduction95", "block"} and error["unit"] == "K"
     assert told["tests"]["ljung_box_before"] < 1e-6 < told["tests"]["ljung_box_after"]

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from math import factorial
+
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 
 from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.fast_step import closed_phi
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.nodes import Nodes, place_nodes
 from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.processes import flotation
 from tests.discovery.heated import heated_tank, tank_record
 
 ROWS = 200
@@ -67,3 +75,34 @@ def test_a_run_over_nodes_and_its_derivatives_are_those_of_every_row() -> None:
     np.testing.assert_allclose(a[0], b[0], atol=1e-3)
     np.testing.assert_allclose(a[1], b[1], atol=1e-3 * np.abs(b[1]).max())
     np.testing.assert_allclose(a[2], b[2], rtol=1e-4)
+
+
+@given(st.floats(-60.0, 0.0))
+def test_weights_of_a_long_step_are_those_of_the_definition(z: float) -> None:
+    """phi_k(z) = integral of exp((1 - s) z) s^(k - 1) / (k - 1)! over s from 0 to 1 (Cox & Matthews 2002)."""
+    x = ca.SX.sym("x")
+    found = [float(v) for v in ca.Function("phi", [x], [*closed_phi(x)])(z)]
+
+    def phi(k: int, at: float) -> float:
+        return float(quad(lambda s: np.exp((1 - s) * at) * s ** (k - 1) / factorial(k - 1), 0, 1, epsabs=1e-13)[0])
+
+    np.testing.assert_allclose(found, [phi(1, z), phi(2, z), phi(3, z), phi(1, z / 2)], rtol=1e-9, atol=1e-13)
+
+
+def test_a_cell_with_fast_bubbles_runs_alike_over_nodes_and_rows() -> None:
+    """Bubbles twice as large leave the pulp in half a second: a step of six seconds is a dozen time constants."""
+    cell = flotation.make_model()
+    large = cell.with_effects([Effect("bubble_size", "constant", "shift", {"amplitude": float(np.log(2.0))})])
+    held = np.array([[2.0e-3, 1.7e-4, 0.36], [1.4e-3, 1.7e-4, 0.36], [1.8e-3, 2.0e-4, 0.38]])
+    inputs = np.repeat(held, 100, axis=0)
+    record = Dataset("cell", np.arange(1.0, 301.0), 1.0, inputs, np.zeros((300, len(cell.outputs))))
+    x0 = steady_state(cell, inputs[0], cell.parameter_values).state
+    every, some = (RecordSimulator(large, 1.0, n) for n in (None, place_nodes(record, 6)))
+    p = large.parameter_values
+    a, b = every.outputs(record, x0, p), some.outputs(record, x0, p)
+    settled = np.ones(300, dtype=bool)
+    for start in (0, 100, 200):
+        settled[start : start + 10] = False  # right after a move bubbles and level loop are quicker than the cubics
+    scale = np.ptp(a, axis=0)
+    assert np.max(np.abs(a - b)[settled] / scale) < 5e-3
+    assert np.max(np.abs(a - b)[-1] / scale) < 1e-4

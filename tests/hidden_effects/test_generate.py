@@ -13,7 +13,7 @@ from benchmarks.hidden_effects import schedule
 from benchmarks.hidden_effects.answer import VERDICTS
 from benchmarks.hidden_effects.catalogue import CATALOGUE
 from benchmarks.hidden_effects.generate import answer_file, generate, record_file
-from benchmarks.hidden_effects.record import make_record
+from benchmarks.hidden_effects.record import BIN, make_record
 from benchmarks.hidden_effects.sites import INPUTS, OUTPUTS
 
 
@@ -53,6 +53,17 @@ def test_answers_say_what_is_hidden_and_what_there_is_to_gain(made: Path) -> Non
     assert max(single["size"].values()) > 4.0
     errors = [single["base_error"][o]["report"] / single["oracle_error"][o]["report"] for o in single["base_error"]]
     assert max(errors) > 2.0
+
+
+def test_squares_by_part_add_up_to_the_error_of_the_whole(made: Path) -> None:
+    """The last fifth by its bins is the error on the last fifth, of base and oracle in each output."""
+    answer = json.loads(answer_file(made, "record_0000").read_text())
+    first = int(0.8 * answer["rows"]) // BIN
+    for output, squares in answer["squares"].items():
+        rows = sum(squares["rows"][first:])
+        for key in ("base", "oracle"):
+            found = np.sqrt(sum(squares[key][first:]) / rows)
+            assert found == pytest.approx(answer[f"{key}_error"][output]["report"], rel=1e-4)
 
 
 def test_a_folder_holds_one_seed(made: Path) -> None:

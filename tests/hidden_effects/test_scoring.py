@@ -99,6 +99,22 @@ def test_removed_error_is_measured_against_the_benchmarks_own_base() -> None:
     assert math.isnan(removed_share(nothing_to_gain, half))
 
 
+def test_removed_error_is_that_of_the_rows_a_verdict_kept() -> None:
+    """Three bins of ten rows, of which the verdict kept the second: base 3 and oracle 1 there."""
+    squares = {"rows": [10.0, 10.0, 0.0], "base": [1000.0, 90.0, 0.0], "oracle": [10.0, 10.0, 0.0]}
+    answer = SINGLE | {"squares": {GRADE: squares}}
+    told = {"verdict": "named", "error": {GRADE: {"after": 2.0}}}
+    kept = Verdict.model_validate({**told, "report_times_s": [[9.0, 20.0]]})
+    assert removed_share(answer, kept) == pytest.approx(0.5)
+    whole = Verdict.model_validate({**told, "report_times_s": [[1.0, 10.0], [11.0, 30.0]]})
+    base = math.sqrt(1090 / 20)
+    assert removed_share(answer, whole) == pytest.approx((base - 2) / (base - 1))
+    nothing = Verdict.model_validate({**told, "report_times_s": [[21.0, 30.0]]})
+    assert math.isnan(removed_share(answer, nothing))
+    unsaid = Verdict.model_validate({"verdict": "named", "error": {GRADE: {"after": 0.006}}})
+    assert removed_share(answer, unsaid) == pytest.approx(0.5)
+
+
 def test_rates_are_binomial_with_exact_intervals() -> None:
     """Clopper-Pearson: none of 60 is up to 1 - 0.025^(1/60) = 5.96 %."""
     r = rate("x", pd.Series([False] * 60))
