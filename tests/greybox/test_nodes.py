@@ -105,4 +105,4 @@ def test_a_cell_with_fast_bubbles_runs_alike_over_nodes_and_rows() -> None:
         settled[start : start + 4] = False  # right after a move bubbles and level loop are quicker than the cubics
     scale = np.ptp(a, axis=0)
     assert np.max(np.abs(a - b)[settled] / scale) < 2e-2
-    assert np.max(np.abs(a - b)[-1] / scale) < 1e-4
+    assert np.max(np.abs(a - b)[-1] / scale) < 2e-3
