@@ -83,7 +83,23 @@ def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
             continue
         if sum(k.candidate.site.name == c.site.name for k in kept) < SHORTLIST_EACH:
             kept.append(score)
-    return kept[:count]
+    return _spread(kept, count)
+
+
+def _spread(ranked: list[Score], count: int) -> list[Score]:
+    """So many of the ranked candidates: two thirds by rank, the rest of sites that are not among those, best first."""
+    chosen = ranked[: count - count // 3]
+    sites = {s.candidate.site.name for s in chosen}
+    further = ranked[len(chosen) :]
+    firsts: list[Score] = []
+    for s in further:
+        if s.candidate.site.name not in sites:
+            sites.add(s.candidate.site.name)
+            firsts.append(s)
+    names = {s.candidate.name for s in (*chosen, *firsts)}
+    others = [s for s in further if s.candidate.name not in names]
+    picked = {s.candidate.name for s in (*chosen, *firsts, *others)[:count]}
+    return [s for s in ranked if s.candidate.name in picked]
 
 
 def _twins(a: Score, b: Score, drivers: Mapping[str, FloatArray]) -> bool:

@@ -16,6 +16,7 @@ from adaptive_flot.discovery.noise import correlation_times
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.discovery.scoring import Score, Scorer
+from adaptive_flot.discovery.simplify import simpler
 from adaptive_flot.discovery.verify import Verification, doubts, verify
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 from adaptive_flot.greybox.model import Model
@@ -222,6 +223,8 @@ def _round(
             lanes.append(Lane(scorer, wanted))
         progress("fit")
         found += refit(fitter, base, lanes, before, processes, lambda: progress("fit"))
+    if found and beam[0] is not None:
+        found += simpler(fitter, base, min(found, key=lambda a: a.fit.bic))
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
     for a in sorted(found, key=lambda a: a.fit.bic):
         unique.setdefault(frozenset(a.names), a)
@@ -230,13 +233,16 @@ def _round(
 
 def _without_flat(problem: Problem, base: Fit, found: list[Alternative]) -> tuple[Alternative, ...]:
     """Leave out dependences that turned out flat: those that add next to nothing to a constant at the same site."""
-    constants = {(a.names[:-1], a.names[-1][0]): a for a in found if a.names[-1][1] == "constant"}
+    by_names = {frozenset(a.names): a for a in found}
 
     def flat(a: Alternative) -> bool:
-        constant = constants.get((a.names[:-1], a.names[-1][0]))
-        if constant is None or constant is a or a.names[-1][1] in DYNAMIC_DRIVERS:
-            return False
-        return _excess(problem, constant.fit, a.fit) < FLAT * _excess(problem, base, a.fit)
+        for k, (site, driver) in enumerate(a.names):
+            constant = by_names.get(frozenset((*a.names[:k], (site, "constant"), *a.names[k + 1 :])))
+            if driver in DYNAMIC_DRIVERS or driver == "constant" or constant is None:
+                continue
+            if _excess(problem, constant.fit, a.fit) < FLAT * _excess(problem, base, a.fit):
+                return True
+        return False
 
     return tuple(a for a in found if not flat(a))
 

@@ -6,6 +6,7 @@ The records are of a seed that no figure is published of.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -42,3 +43,16 @@ def test_a_record_is_judged_as_its_answer_says(k: int, category: str, outcomes: 
     if found.effects:
         grade = told["error"]["concentrate_grade"]
         assert grade["after"] < 1.02 * grade["before"]
+
+
+def test_a_record_may_start_anywhere_and_lose_a_sensor(tmp_path: Path) -> None:
+    """Cut in the middle of a move, one meter frozen for half of the rest: the gate says so, and no name is wrong."""
+    record = make_record(SEED, 2)
+    table = record.table.iloc[517:].reset_index(drop=True)
+    table.loc[1000:, "air_recovery"] = table.loc[1000, "air_recovery"]
+    write_record(tmp_path, replace(record, table=table))
+    model = flotation.make_model()
+    found = discover(model, read_dataset(record_file(tmp_path, record.name), model)).verdict
+    assert any("air_recovery" in note and "frozen" in note for note in found.notes)
+    told = Verdict.model_validate(json.loads(json.dumps(found.as_dict())))
+    assert classify(record.answer.as_dict(), told) in ("right", "right_class", "abstained")
