@@ -31,9 +31,7 @@ def _scorer(gains: dict[tuple[Site, str], float], drivers: dict[str, Any] | None
 @given(st.integers(0, 1000), st.integers(3, 12))
 def test_best_first_few_a_site_and_some_of_other_sites(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
-    gains = {
-        (s, d): float(g) for (s, d), g in zip([(s, d) for s in SITES for d in DRIVERS], 100 - 60 * rng.random(200))
-    }
+    gains = {(s, d): float(100 - 60 * rng.random()) for s in SITES for d in DRIVERS}
     found = shortlist(_scorer(gains), count)
     names = [s.candidate.name for s in found]
     assert len(names) == count == len(set(names))
