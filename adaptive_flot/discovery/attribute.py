@@ -23,6 +23,8 @@ SHORTLIST_EACH = 3
 """Of which so many at one site: a first-order gain says more about the site than about the driver."""
 LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
+MOST_CHANGE = float(np.log(10))
+"""A physical effect changes a quantity by a factor of ten at most; beyond it is another model, or none with a grip."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
@@ -121,7 +123,7 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     model = start.model.with_effects([replace(effect, coefficients=held)])
     names = tuple(effect.parameter(c.name) for c in effect.terms if c.name not in held)
     free = (*start.names, *names)
-    bounds = {effect.parameter(k): b for k, b in shape_bounds(fitter.problem).items()}
+    bounds = effect_bounds(fitter.problem, model, effect)
     first = {effect.parameter(k): v for k, v in {**score.start, **held}.items()}
     rounds = 1 if steps < MOST_STEPS else 2
     found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps)
@@ -152,9 +154,23 @@ def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, 
         if name in start:
             parameter = model.parameters[model.index("parameters", name)]
             value = float(np.clip(start[name], parameter.lower, parameter.upper))
-            log_factor = c.name.startswith(("amplitude", "value")) and effect.shape.static is not None
+            log_factor = _is_change(c.name) and effect.shape.static is not None
             found[name] = float(np.clip(value, -0.9, 0.9)) if log_factor else value
     return found
+
+
+def effect_bounds(problem: Problem, model: Model, effect: Effect) -> dict[str, tuple[float, float]]:
+    """Ranges of an effect's coefficients by full name: those of its shape, and of the change of a quantity."""
+    bounds = {effect.parameter(k): b for k, b in shape_bounds(problem).items()}
+    site = next(s for s in model.sites if s.name == effect.site)
+    if (effect.mode or site.mode) == "factor":
+        bounds |= {effect.parameter(c.name): (-MOST_CHANGE, MOST_CHANGE) for c in effect.terms if _is_change(c.name)}
+    return bounds
+
+
+def _is_change(coefficient: str) -> bool:
+    """Whether a coefficient is a change at the site itself."""
+    return coefficient.startswith(("amplitude", "value"))
 
 
 def shape_bounds(problem: Problem) -> dict[str, tuple[float, float]]:

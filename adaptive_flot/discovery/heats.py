@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.attribute import Alternative, fit_variant, fixed_coefficients, shape_bounds
+from adaptive_flot.discovery.attribute import Alternative, effect_bounds, fit_variant, fixed_coefficients
 from adaptive_flot.discovery.catalogue import finer
 from adaptive_flot.discovery.direction import nameable
 from adaptive_flot.discovery.events import event_scores, freer, step_score
@@ -20,6 +20,7 @@ from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.pace import at_every_row
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.scoring import Score, Scorer
+from adaptive_flot.discovery.verify import worth_its_freedom
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 
 FORMS_EACH = 3
@@ -117,7 +118,12 @@ def refit(
         _Job(run.lane, s) for run in events if (s := step_score(run.score, run.alternative.effects[-1], high - low))
     ]
     found = _best_of_each([*heat(steps, MOST_STEPS), *events, *last, *first])
-    freed = heat([job for run in found[:FREED] for job in _freer(run, low, high)], MOST_STEPS)
+    bound = {run.alternative.names: run.alternative.fit for run in found}
+    freed = [
+        run
+        for run in heat([job for run in found[:FREED] for job in _freer(run, low, high)], MOST_STEPS)
+        if worth_its_freedom(fitter.problem, bound[run.alternative.names], run.alternative.fit)
+    ]
     ended = [run.alternative for run in _best_of_each([*freed, *found])]
     exact = [_exact(fitter, base, a) for a in ended[:LEADERS]]
     return sorted([*exact, *ended[LEADERS:]], key=lambda a: a.fit.bic)
@@ -131,7 +137,7 @@ def _close(found: list[Alternative]) -> list[Alternative]:
 
 def _exact(fitter: Fitter, base: Fit, a: Alternative) -> Alternative:
     """The alternative as a run at every row has it."""
-    bounds = {e.parameter(k): b for e in a.effects for k, b in shape_bounds(fitter.problem).items()}
+    bounds = {k: b for e in a.effects for k, b in effect_bounds(fitter.problem, a.fit.model, e).items()}
     fit = at_every_row(fitter, a.fit, bounds)
     return replace(a, fit=fit, gain=base.loss - fit.loss, delta_bic=fit.bic - base.bic)
 

@@ -12,12 +12,11 @@ from adaptive_flot.discovery.catalogue import catalogue
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.heats import Lane, refit
-from adaptive_flot.discovery.noise import correlation_times
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.discovery.scoring import Score, Scorer
 from adaptive_flot.discovery.simplify import simpler
-from adaptive_flot.discovery.verify import Verification, doubts, verify
+from adaptive_flot.discovery.verify import Verification, doubts, together, verify
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 from adaptive_flot.greybox.model import Model
 
@@ -156,26 +155,11 @@ def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search
             last = r is accepted[-1]
             left = found.left if last else max(found.left, r.alternatives[0].fit.bic - _best_bic(accepted))
             best = r.alternatives[0].fit
-            together = _together(problem, found.base, best)
+            alike = together(problem, found.base, best)
             doubt = doubts(problem, best, [a.fit for a in r.alternatives])
             told = tuple(replace(a, doubt=d) for a, d in zip(r.alternatives, doubt, strict=True))
-            return replace(found, alternatives=told, verification=verification, left=left, together=together)
+            return replace(found, alternatives=told, verification=verification, left=left, together=alike)
     return found
-
-
-def _together(problem: Problem, base: Fit, best: Fit) -> float:
-    """Innovations that tell one story, averaged over the outputs by what the best alternative gained in each.
-
-    A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
-    """
-    rows = problem.rows("estimate")
-    size = problem.weights * best.noise.stationary_std()
-    old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2, axis=0) for f in (base, best))
-    gained = np.maximum(old - new, 0.0)
-    if not gained.sum() > 0:
-        return 1.0
-    innovations = np.clip(np.where(rows[:, None], best.innovations, np.nan), -problem.clip, problem.clip)
-    return float(gained @ correlation_times(innovations) / gained.sum())
 
 
 def _best_bic(rounds: list[Round]) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.attribute import Alternative, fixed_coefficients, limited, shape_bounds
+from adaptive_flot.discovery.attribute import Alternative, effect_bounds, fixed_coefficients, limited
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
@@ -49,7 +49,7 @@ def _refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], 
     bounds: dict[str, tuple[float, float]] = {}
     for effect, fixed in zip(effects, held, strict=True):
         free += [effect.parameter(c.name) for c in effect.terms if c.name not in fixed]
-        bounds |= {effect.parameter(k): b for k, b in shape_bounds(fitter.problem).items()}
+        bounds |= effect_bounds(fitter.problem, model, effect)
         if effect.driver == "constant" and effect.parameter("amplitude") not in a.fit.names:
             start |= limited(model, effect, {effect.parameter("amplitude"): middle})
     return fitter.fit(model, tuple(free), start, a.fit, bounds, rounds=2)

@@ -21,6 +21,8 @@ LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 SURE = 2.0
 """Standard deviations by which an alternative must be worse to be told apart."""
+MUCH = 0.1
+"""Share of the error removed on fresh rows from which something is missing, though it may not be what was found."""
 LARGEST_CLASS = 3
 MOST_RIVALS = 5
 
@@ -163,7 +165,9 @@ def judge(found: Search) -> Judgement:
         return Judgement("none", None, (), (), LEAST_MARGIN)
     best = found.alternatives[0]
     if found.verification and not found.verification.confirmed:
-        sure = found.verification.reduction95[0] > 0  # smaller, but not everywhere: something else is the matter
+        # smaller, but not surely or not everywhere: something else is the matter
+        checked = found.verification
+        sure = checked.reduction95[0] > 0 or checked.reduction > MUCH
         return Judgement("abstain" if sure else "none", best if sure else None, (), _others(found, best), LEAST_MARGIN)
     shortcoming = found.left - found.left_threshold
     margin = max(LEAST_MARGIN * found.together, shortcoming)

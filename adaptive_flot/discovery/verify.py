@@ -10,6 +10,7 @@ from scipy.stats import bootstrap
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from adaptive_flot.discovery.fit import Fit, row_losses
+from adaptive_flot.discovery.noise import correlation_times
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.greybox.model import FloatArray
 
@@ -104,6 +105,33 @@ def doubts(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, .
         blocks = (row_losses(problem, fit, rows) - own)[: count * length].reshape(count, length).sum(axis=1)
         found.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
     return tuple(found)
+
+
+def together(problem: Problem, before: Fit, after: Fit) -> float:
+    """Innovations of a fit that tell one story, averaged over the outputs by what it gained in each on another fit.
+
+    A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
+    """
+    rows = problem.rows("estimate")
+    size = problem.weights * after.noise.stationary_std()
+    old, new = (np.nanmean(_squares(problem, fit, size, rows), axis=0) for fit in (before, after))
+    gained = np.maximum(np.nan_to_num(old - new), 0.0)
+    if not gained.sum() > 0:
+        return 1.0
+    innovations = np.clip(np.where(rows[:, None], after.innovations, np.nan), -problem.clip, problem.clip)
+    return float(gained @ correlation_times(innovations) / gained.sum())
+
+
+def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether what a freer form gains pays for its further coefficients, evidence counted once a story.
+
+    Where something else is still missing, neighbouring rows err alike, and a criterion that counts them all would take
+    any freedom it can get.
+    """
+    alike = together(problem, before, after)
+    further = len(after.names) - len(before.names)
+    stories = max(problem.count(problem.rows("estimate")) / alike, 2.0)
+    return (before.loss - after.loss) / alike > further * float(np.log(stories))
 
 
 def changes(problem: Problem, before: Fit, after: Fit, share: str) -> tuple[OutputChange, ...]:
