@@ -49,7 +49,9 @@ def test_a_record_may_start_anywhere_and_lose_a_sensor(tmp_path: Path) -> None:
     """Cut in the middle of a move, one meter frozen for half of the rest: the gate says so, and no name is wrong."""
     record = make_record(SEED, 2)
     table = record.table.iloc[517:].reset_index(drop=True)
-    table.loc[1000:, "air_recovery"] = table.loc[1000, "air_recovery"]
+    meter = table["air_recovery"].to_numpy(dtype=float, copy=True)
+    meter[1000:] = meter[1000]
+    table["air_recovery"] = meter
     write_record(tmp_path, replace(record, table=table))
     model = flotation.make_model()
     found = discover(model, read_dataset(record_file(tmp_path, record.name), model)).verdict
