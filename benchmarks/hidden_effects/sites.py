@@ -37,13 +37,3 @@ SENSOR_OF = dict(
         strict=True,
     )
 )
-
-# Sites whose whole action is on the masses of the minerals and the grade: gas, froth and level do not feel them.
-GRADE_ONLY_SITES = (
-    "feed_grade",
-    "froth_recovery",
-    "entrainment",
-    "settling",
-    "floatability_valuable",
-    "floatability_gangue",
-)
