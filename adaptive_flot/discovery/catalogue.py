@@ -14,9 +14,9 @@ from adaptive_flot.discovery.lateness import late, limited
 from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
-from adaptive_flot.greybox.forms import spline_basis
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
+from adaptive_flot.greybox.static_forms import spline_basis
 
 ONSETS = 18
 """Steps at this many onsets score an event in time."""
