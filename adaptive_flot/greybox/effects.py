@@ -99,6 +99,11 @@ class Effect:
         """Name in messages and of the parameters: `bubble_size_by_air_flow`."""
         return f"{self.site}_by_{self.driver}"
 
+    @property
+    def follower(self) -> str:
+        """Name of the state that follows a driver which is known only after the site."""
+        return f"{self.label}.driver"
+
     def parameter(self, coefficient: str) -> str:
         """Full parameter name of a coefficient."""
         return f"{self.label}.{coefficient}"

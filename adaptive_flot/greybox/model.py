@@ -69,6 +69,8 @@ class Model:
     """A record without further knowledge is taken to start near a steady state; else near `initial_guess`."""
     drivers: tuple[str, ...] = ()
     """Quantities that effects may depend on, in the order of a search; default all inputs and states."""
+    late_drivers: tuple[str, ...] = ()
+    """Drivers that are known only after the sites: signals which an effect follows through a state of its own."""
     known_effects: tuple[KnownEffect, ...] = ()
     edges: tuple[str, ...] = ()
     """What a search may call by name; when empty, every site with every driver."""
@@ -153,16 +155,24 @@ class Model:
         check_distinct((*self.effects, *added))
         return replace(
             self,
-            states=self.states + tuple(s for e in added for s in e.states()),
+            states=self.states + tuple(s for e in added for s in self._effect_states(e)),
             parameters=self.parameters + tuple(p for e in added for p in e.parameters(self.effect_units(e))),
             effects=self.effects + added,
         )
 
     def without_effects(self) -> Model:
         """Return this model without its effects; its own parameters keep their present values."""
-        states = len(self.states) - sum(len(e.states()) for e in self.effects)
+        states = len(self.states) - sum(len(self._effect_states(e)) for e in self.effects)
         parameters = len(self.parameters) - sum(len(e.terms) for e in self.effects)
         return replace(self, states=self.states[:states], parameters=self.parameters[:parameters], effects=())
+
+    def _effect_states(self, effect: Effect) -> tuple[Quantity, ...]:
+        """States of an effect: those of its form, and one that follows a late driver."""
+        if effect.driver not in self.late_drivers:
+            return effect.states()
+        driver = self.signals[self.index("signals", effect.driver)]
+        follower = f"{driver.name} as it reaches {effect.site}"
+        return (*effect.states(), replace(driver, name=effect.follower, description=follower))
 
     def effect_units(self, effect: Effect) -> dict[str, str | None]:
         """Unit of each coefficient and setting of an effect on this model; None where its site does not tell its unit.

@@ -98,6 +98,8 @@ class Scope:
         if effect.driver in STATELESS_DRIVERS:
             return ca.SX(0)
         known = {**self._symbols["inputs"], **self._symbols["states"], **self.signals}
+        if effect.driver not in known and effect.follower in known:
+            return known[effect.follower]
         if effect.driver not in known:
             raise ModelError(
                 f"effect at site {effect.site!r}: driver {effect.driver!r} is not known where the site is passed; "
@@ -108,6 +110,14 @@ class Scope:
     def signal(self, name: str, value: ca.SX) -> ca.SX:
         """Name an internal quantity that tables, plots and effects may use."""
         return self._define(self.signals, "signal", name, value)
+
+    def late_signal(self, name: str, value: ca.SX, rate: ca.SX) -> ca.SX:
+        """Name a quantity that is known only after the sites; what depends on it follows it at a rate [1/s]."""
+        for effect in self._effects:
+            if effect.driver == name:
+                follower = self.state(effect.follower)
+                self.derivative(effect.follower, rate * (value - follower), decay=-rate)
+        return self.signal(name, value)
 
     def derivative(self, name: str, value: ca.SX, decay: ca.SX | None = None) -> None:
         """Give d(state)/dt in the state's unit per second.

@@ -71,10 +71,12 @@ def make_model(cell: Cell | None = None) -> Model:
             Quantity("froth_depth", "m", "froth depth", 0.0, height, 0.1),
             Quantity("solids", "kg/m3", "minerals in the pulp", 0.0, scale=100.0),
             Quantity("valuable_solids", "kg/m3", "valuable mineral in the pulp", 0.0, scale=10.0),
-            Quantity("grade", "-", "valuable mineral in the solids of the pulp by mass", 0.0, 1.0, 0.01),
+            Quantity("pulp_grade", "-", "valuable mineral in the solids of the pulp by mass", 0.0, 1.0, 0.01),
+            Quantity("grade", "-", "valuable mineral in the solids of the concentrate by mass", 0.0, 1.0, 0.01),
         ),
         algebraic=(Quantity("interfacial_gas_velocity", "m/s", "gas velocity at the interface", 0.0, scale=0.01),),
         drivers=("air_flow", "feed_flow", "level", "froth_depth", "grade", "solids", "valuable_solids"),
+        late_drivers=("grade",),
         known_effects=KNOWN_EFFECTS,
         max_step_s=_max_step(cell),
         equations=lambda m: _equations(m, masses, ratios),
@@ -88,10 +90,13 @@ def make_model(cell: Cell | None = None) -> Model:
 
 
 TRACE = 1e-12
-"""Mass [kg] that keeps the grade of an empty pulp finite."""
-TRACE = 1e-12
-"""Share of the feed's minerals that the grade counts as present: without any mineral it is then that of the first to
-arrive, and not 0/0; otherwise it changes in the twelfth digit."""
+"""Mass [kg] that keeps the grade of an empty pulp finite, and share of the feed's minerals that the grade counts as
+present: without any mineral it is then that of the first to arrive, not 0/0; else it changes in the twelfth digit."""
+FELT = 1 / 3
+"""Share of the froth's residence time after which the grade is felt where it acts back: that of its top, where bubbles
+burst. An effect that follows at once would close an algebraic loop through the whole froth."""
+SHALLOWEST = 1e-3
+"""Froth depth [m] below which the residence time of the froth is that of this depth."""
 FASTEST_DECAY = 2.0
 """Largest decay rate times step at which the fast step keeps its accuracy (see `SERIES_TERMS` there)."""
 
@@ -113,6 +118,16 @@ def mass_names(minerals: tuple[str, ...]) -> list[str]:
     return ["m_valuable", "m_gangue"] if len(minerals) == 2 else [f"m_{name}" for name in minerals]
 
 
+def _level_loop(m: Scope, level: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Level as the loop measures it [m], and the tails flow that it asks for [m3/s].
+
+    The state `tails_flow` follows the true level; what the sensor adds to it the proportional part passes on as it
+    comes. As a rate it would be lost where it jumps with an input, which has no rate.
+    """
+    measured = m.site("level_sensor", level, "sensor", "offset", unit="m")
+    return measured, m.state("tails_flow") + m.parameter("proportional_gain") * (measured - level)
+
+
 def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     area, height = m.parameter("cross_section_area"), m.parameter("height")
     phi, gravity = m.parameter("solids_fraction"), m.parameter("gravity")
@@ -126,11 +141,12 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
     h_f = m.signal("froth_depth", height - h_p)
     m.signal("solids", total_mass / v_pulp)
     m.signal("valuable_solids", mass[0] / v_pulp)
-    m.signal("grade", mass[0] / (total_mass + TRACE))
+    m.signal("pulp_grade", mass[0] / (total_mass + TRACE))
 
     q_air = m.site("air_flow", m.input("air_flow"), "actuator", unit="m3/s")
     q_feed = m.site("feed_flow", m.input("feed_flow"), "feed", unit="m3/s")
-    q_tails = m.site("tails_valve", m.state("tails_flow"), "actuator", unit="m3/s")
+    level, demand = _level_loop(m, h_p)
+    q_tails = m.site("tails_valve", demand, "actuator", unit="m3/s")
     jg = q_air / area
 
     # Pulp
@@ -193,13 +209,13 @@ def _equations(m: Scope, masses: list[str], ratios: list[str]) -> None:
         balance = q_air * number / total_number - area * vk * rk / (1 + gas) - (q_feed - q_tails - q_conc) * rk
         m.derivative(name, (1 + gas) / v_pulp * balance, decay=-vk / h_p)
 
-    # Level loop on the measured level (paper, Qtails, with the stable sign)
-    level = m.site("level_sensor", h_p, "sensor", "offset", unit="m")
+    # Level loop (paper, Qtails, with the stable sign); the part of the sensor is in `_level_loop`
     gain = m.parameter("proportional_gain")
     error = level - m.input("level_setpoint")
-    m.derivative("tails_flow", gain * m.time_derivative(level) + gain / m.parameter("integral_time") * error)
+    m.derivative("tails_flow", gain * m.time_derivative(h_p) + gain / m.parameter("integral_time") * error)
 
     grade = graded[0] / sum(graded[1:], graded[0])  # paper, grade
+    m.late_signal("grade", grade, vg / ca.fmax(h_f, SHALLOWEST) / FELT)
     m.output("concentrate_grade", m.site("grade_sensor", grade, "sensor", "offset", unit="-"))
     m.output("recovery", to_concentrate[0] / (feed[0] * q_feed))
     m.output("tails_flow", m.site("tails_sensor", q_tails, "sensor", unit="m3/s"))
