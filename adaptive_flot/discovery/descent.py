@@ -20,7 +20,7 @@ from adaptive_flot.greybox.record import RecordSimulator
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e4
 SHAPE_DAMPING = 0.1
 """First damping where an onset or a time constant is free: an undamped step throws it out of the record."""
-MOST_DIRECTIONS = 4
+MOST_DIRECTIONS = 6
 """Combinations of the initial state that are free: those that the record tells most about."""
 TELLING = 3.0
 """A combination counts when a change by one scale moves the outputs by this many standard deviations in all."""
