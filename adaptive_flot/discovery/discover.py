@@ -159,7 +159,7 @@ def _prepare(
         return None
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
     problem = problem.with_weights(proportional(seen, first.predicted))
-    base = Fitter(problem).fit(first.model, like=first, rounds=2)
+    base = Fitter(problem).settled(first.model, first)
     return (with_nodes(problem, base), base) if base else None
 
 

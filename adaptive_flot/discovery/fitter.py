@@ -13,6 +13,9 @@ from adaptive_flot.greybox.model import Model
 MOST_STEPS = 16
 """Steps for one noise model."""
 NOISE_ROUNDS = 3
+MOST_RESTARTS = 4
+SETTLED = 1.0
+"""Gain in minus two log-likelihood of a restart below which a fit is where it stays."""
 
 
 class Fitter:
@@ -58,6 +61,21 @@ class Fitter:
         """
         unknowns = Unknowns(self.problem, model, free, start or {}, like, bounds or {})
         return Descent(self.problem, self.rows, model, unknowns).run(rounds, steps, like is None)
+
+    def settled(self, model: Model, like: Fit, bounds: Mapping[str, tuple[float, float]] | None = None) -> Fit | None:
+        """A fit from `like`, started again from where it ended until that gains nothing; None as `fit`.
+
+        Coloured noise explains a slow misfit away, and a search may rest there; each start is with white noise again.
+        """
+        found = self.fit(model, like.names, like=like, bounds=bounds, rounds=2)
+        for _ in range(MOST_RESTARTS):
+            if found is None:
+                break
+            again = self.fit(found.model, found.names, like=found, bounds=bounds, rounds=2)
+            if again is None or again.loss > found.loss - SETTLED:
+                break
+            found = again
+        return found
 
     def with_intervals(self, fit: Fit) -> Fit:
         """The fit with the covariance of exact derivatives: those that a search ends with may be a few steps old."""
