@@ -47,6 +47,8 @@ class Alternative:
         Its criterion less that of the base model; negative is better.
     doubt
         How well the record tells it from the best one: standard deviation of what it is worse by.
+    told
+        Its criterion with what all lack granted to it, where that was worked out (see `contest`).
     """
 
     names: tuple[tuple[str, str], ...]
@@ -55,6 +57,13 @@ class Alternative:
     gain: float
     delta_bic: float
     doubt: float = 0.0
+    told: float | None = None
+
+    def worse_than(self, best: Alternative) -> float:
+        """By how much its criterion is worse than that of another, with what both lack granted to both if it was."""
+        if self.told is not None and best.told is not None:
+            return self.told - best.told
+        return self.fit.bic - best.fit.bic
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -113,7 +122,7 @@ def _twins(a: Score, b: Score, drivers: Mapping[str, FloatArray]) -> bool:
 
 
 def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit | None = None) -> Fit | None:
-    """Full fit of one variant on top of `start`, from the score's values and, should that not simulate, from near zero.
+    """Full fit of one variant on top of `start`, from the score's values or, where these are too large, smaller ones.
 
     `warm` is a fit with another form of the same effect: its adapted parameters and initial state are a better start.
     """
@@ -126,12 +135,9 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     bounds = effect_bounds(fitter.problem, model, effect)
     first = {effect.parameter(k): v for k, v in {**score.start, **held}.items()}
     rounds = 1 if steps < MOST_STEPS else 2
-    found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps)
-    if found is None:
-        shape = {effect.parameter(k) for k, _ in score.variant.start} | {effect.parameter(k) for k in held}
-        small = {k: v if k in shape else 0.1 * v for k, v in first.items()}
-        found = fitter.fit(model, free, limited(model, effect, small), start, bounds, rounds, steps)
-    return found
+    shape = {effect.parameter(k) for k, _ in score.variant.start}
+    shrink = [] if warm else [n for n in names if n in first and n not in shape]
+    return fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps, shrink)
 
 
 def _warmed(start: Fit, warm: Fit) -> Fit:

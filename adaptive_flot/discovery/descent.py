@@ -5,7 +5,7 @@ Gauss-Newton with Marquardt damping on sensitivities of the whole record, for th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import cast
 
 import numpy as np
@@ -32,6 +32,8 @@ KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
 constant change more."""
 
+SHARES = (1.0, 0.3, 0.1)
+"""Shares of the values of a first-order answer that are tried as the start."""
 ABRUPT = ("step", "lag", "lags", "delay", "stiction")
 """Forms with events or fast states between the nodes of a record, which are simulated at every row."""
 
@@ -68,6 +70,17 @@ class Descent:
         return value + float(np.sum(((z - self.unknowns.prior_centre) / self.unknowns.prior) ** 2))
 
     # -- search --------------------------------------------------------------------------------------------------------
+
+    def shrink(self, names: Sequence[str]) -> None:
+        """Start from smaller values of these unknowns where these are nearer: a first-order answer may be far off."""
+        where = [self.unknowns.names.index(n) for n in names]
+        noise, starts = self._first_noise(), []
+        for share in SHARES:
+            z = self.unknowns.centre.copy()
+            z[where] *= share
+            z = np.clip(z, self.unknowns.lower, self.unknowns.upper)
+            starts.append((self._objective(z, self._predict(z), noise), z))
+        self.unknowns.centre = min(starts, key=lambda start: start[0])[1]
 
     def run(self, rounds: int, steps: int, first: bool) -> Fit | None:
         """Steps for as many noise models as `rounds`; `first` chooses the directions of the initial state itself."""

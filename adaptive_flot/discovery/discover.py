@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
+from adaptive_flot.discovery.contest import contest
 from adaptive_flot.discovery.detect import detect
 from adaptive_flot.discovery.direction import against, listed
 from adaptive_flot.discovery.experiment import leading, plan_experiment
@@ -23,7 +24,7 @@ from adaptive_flot.discovery.pace import with_nodes
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
 from adaptive_flot.discovery.signals import input_range
-from adaptive_flot.discovery.verdict import LEAST_MARGIN, Judgement, NamedEffect, Verdict, judge
+from adaptive_flot.discovery.verdict import LEAST_MARGIN, Judgement, NamedEffect, Verdict, disputed, judge
 from adaptive_flot.discovery.verify import changes, whiteness
 from adaptive_flot.discovery.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
@@ -130,6 +131,9 @@ def discover(
     if wants_joint(problem, found):
         problem, found = search_jointly(problem, found, processes=processes, progress=progress)
         base = found.base
+    if rivals := disputed(found):
+        progress("grant each what is left")
+        found = contest(problem, found, rivals, processes)
     judgement = judge(found)
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)

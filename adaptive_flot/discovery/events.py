@@ -24,6 +24,8 @@ DURATIONS = (0.03, 0.08, 0.15, 0.25, 0.4, 0.6)
 """Durations of ramps and washouts that are tried, as shares of the record."""
 SLOW_S = 120.0
 """A change over at least this long is a drift; of an adapted parameter, that is what adaptation is there to follow."""
+LARGE = 0.4
+"""Change of a logarithm (a factor of 1.5) beyond any drift that adaptation is known to follow: a quarter."""
 SUDDEN = 0.03
 """Share of the record up to which a ramp or a washout may as well be a step."""
 MOST_KNOTS = 28
@@ -113,11 +115,26 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
 
 
 def slow(effect: Effect) -> bool:
-    """Whether a course in time is a drift, and not an event: a curve with even knots, or a ramp that lasts."""
+    """Whether a course in time is a drift, and not an event: a ramp that lasts, or a curve with even knots.
+
+    Such a curve is an event after all where it changes much, and half of that at once.
+    """
     if effect.form == "curve":
-        gaps = np.diff(np.atleast_1d(np.asarray(effect.settings["knots"], dtype=float)))
-        return bool(np.ptp(gaps) < 1e-3 * np.max(gaps))
+        knots = np.atleast_1d(np.asarray(effect.settings["knots"], dtype=float))
+        gaps = np.diff(knots)
+        return bool(np.ptp(gaps) < 1e-3 * np.max(gaps)) and not _jumps(effect, knots)
     return effect.form == "ramp" and effect.coefficients["duration"] >= SLOW_S
+
+
+def _jumps(effect: Effect, knots: FloatArray) -> bool:
+    """Whether a curve changes by a large factor, half of all it ever changes in a short time."""
+    t = np.linspace(knots[0], knots[-1], POINTS)
+    values = spline_values(t, [float(k) for k in knots]) @ [
+        effect.coefficients[f"value_{k + 1}"] for k in range(len(knots))
+    ]
+    ahead = max(1, round(SLOW_S / float(t[1] - t[0])))
+    whole = float(np.ptp(values))
+    return whole > LARGE and bool(np.max(np.abs(values[ahead:] - values[:-ahead]), initial=0.0) > whole / 2)
 
 
 def _best(form: str, t: FloatArray, values: FloatArray, span: float) -> tuple[float, float, float]:

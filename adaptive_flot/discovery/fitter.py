@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from adaptive_flot.discovery.descent import Descent
 from adaptive_flot.discovery.fit import Fit
@@ -34,6 +34,7 @@ class Fitter:
         bounds: Mapping[str, tuple[float, float]] | None = None,
         rounds: int = NOISE_ROUNDS,
         steps: int = MOST_STEPS,
+        shrink: Sequence[str] = (),
     ) -> Fit | None:
         """Fit the adapted parameters, the initial state and the parameters `free`.
 
@@ -53,6 +54,8 @@ class Fitter:
             How often the noise model is fitted again.
         steps
             Most steps for one noise model.
+        shrink
+            Free parameters that start from smaller values than given where these are nearer to the record.
 
         Returns
         -------
@@ -60,7 +63,10 @@ class Fitter:
             None when the model can not simulate the record from the start values.
         """
         unknowns = Unknowns(self.problem, model, free, start or {}, like, bounds or {})
-        return Descent(self.problem, self.rows, model, unknowns).run(rounds, steps, like is None)
+        descent = Descent(self.problem, self.rows, model, unknowns)
+        if shrink:
+            descent.shrink(shrink)
+        return descent.run(rounds, steps, like is None)
 
     def settled(self, model: Model, like: Fit, bounds: Mapping[str, tuple[float, float]] | None = None) -> Fit | None:
         """A fit from `like`, started again from where it ended until that gains nothing; None as `fit`.

@@ -36,8 +36,8 @@ LEADERS = 4
 """Alternatives that are run at every row in the end."""
 CLOSE_GAIN = 0.7
 """Share of the best gain from which a curve in time is tried as an event as well."""
-FREED = 2
-"""Names whose course in time gets more freedom in the end."""
+FREED, MOST_FREED = 2, 8
+"""Names whose course in time gets more freedom in the end; further ones where that was worth its price to the first."""
 BENT = 0.3
 """A dependence is surely not flat when to flatten it costs this share of all it gained."""
 
@@ -119,14 +119,18 @@ def refit(
     ]
     found = _best_of_each([*heat(steps, MOST_STEPS), *events, *last, *first])
     bound = {run.alternative.names: run.alternative.fit for run in found}
-    freed = [
-        run
-        for run in heat([job for run in found[:FREED] for job in _freer(run, low, high)], MOST_STEPS)
-        if worth_its_freedom(fitter.problem, bound[run.alternative.names], run.alternative.fit)
-    ]
-    ended = [run.alternative for run in _best_of_each([*freed, *found])]
-    exact = [_exact(fitter, base, a) for a in ended[:LEADERS]]
-    return sorted([*exact, *ended[LEADERS:]], key=lambda a: a.fit.bic)
+
+    def worth(runs: list[_Run]) -> list[_Run]:
+        free = heat([job for run in runs for job in _freer(run, low, high)], MOST_STEPS)
+        return [r for r in free if worth_its_freedom(fitter.problem, bound[r.alternative.names], r.alternative.fit)]
+
+    freed = worth(found[:FREED])
+    if freed:  # the course is a rough one: who is told apart by it must all be able to follow it
+        ended = {run.alternative.names for run in last}
+        freed += worth([run for run in found[FREED:MOST_FREED] if run.alternative.names in ended])
+    ranked = [run.alternative for run in _best_of_each([*freed, *found])]
+    exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
+    return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
 
 
 def _close(found: list[Alternative]) -> list[Alternative]:

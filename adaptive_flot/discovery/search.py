@@ -78,6 +78,8 @@ class Search:
         Sites whose constant change is that of an adapted parameter.
     together
         Innovations of the best alternative that tell one story: evidence counts once for so many.
+    granted
+        Site and driver of what the leading alternatives were granted when they were compared, if anything.
     """
 
     base: Fit
@@ -88,6 +90,7 @@ class Search:
     left_threshold: float
     adapted_sites: tuple[str, ...]
     together: float = 1.0
+    granted: tuple[str, str] | None = None
 
 
 def search(

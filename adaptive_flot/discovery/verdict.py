@@ -169,8 +169,7 @@ def judge(found: Search) -> Judgement:
         checked = found.verification
         sure = checked.reduction95[0] > 0 or checked.reduction > MUCH
         return Judgement("abstain" if sure else "none", best if sure else None, (), _others(found, best), LEAST_MARGIN)
-    shortcoming = found.left - found.left_threshold
-    margin = max(LEAST_MARGIN * found.together, shortcoming)
+    margin = _margin(found)
     close = [a for a in found.alternatives if _near(a, best, margin)]
     close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
@@ -191,8 +190,21 @@ def judge(found: Search) -> Judgement:
     return Judgement("abstain", best, (), rivals, margin)
 
 
+def disputed(found: Search) -> tuple[Alternative, ...]:
+    """Rivals that are near the best, where some are so only for what the best leaves unexplained; else none."""
+    if not found.alternatives or found.verification is None or not found.verification.confirmed:
+        return ()
+    best, margin = found.alternatives[0], _margin(found)
+    near = tuple(a for a in found.alternatives[1:] if _near(a, best, margin))
+    return near if any(not _near(a, best, LEAST_MARGIN * found.together) for a in near) else ()
+
+
+def _margin(found: Search) -> float:
+    return max(LEAST_MARGIN * found.together, found.left - found.left_threshold)
+
+
 def _near(a: Alternative, best: Alternative, margin: float) -> bool:
-    return a.fit.bic - best.fit.bic < max(margin, SURE * a.doubt)
+    return a.worse_than(best) < max(margin, SURE * a.doubt)
 
 
 def _others(found: Search, best: Alternative) -> tuple[Alternative, ...]:
