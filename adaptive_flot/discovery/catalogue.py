@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import casadi as ca
@@ -13,7 +13,7 @@ from adaptive_flot.discovery.gate import LEAST_RANGE
 from adaptive_flot.discovery.lateness import late, limited
 from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.discovery.variant import Variant
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 from adaptive_flot.greybox.static_forms import spline_basis
@@ -47,7 +47,7 @@ class Candidate:
 def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     """All candidates of a model that the record can tell anything about.
 
-    A driver that hardly moves is left out; lag and delay are those of sensors and actuators; what the model has already
+    A driver that hardly moves is left out; lag and delay are those of sensors, actuators and feeds; what the model has already
     is not offered again, and a change that only rescales an adapted parameter neither.
     """
     known = {(k.site, k.driver): k for k in model.known_effects}
@@ -59,6 +59,9 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
             if (site.name, driver) in taken or not _makes_sense(site, driver):
                 continue
             variants = tuple(_variants(site, driver, time, responses))
+            if site.role == "sensor" and driver not in DYNAMIC_DRIVERS:
+                # the other kind of error: a gain where an offset is usual, an offset where a gain is
+                variants += tuple(_otherwise(v, site) for v in variants if v.effect.form in ("shift", "curve"))
             if variants:
                 nameable = (site.name, driver) in known or _nameable(site, driver, bool(known))
                 found.append(Candidate(site, driver, nameable, variants))
@@ -67,7 +70,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
 
 def _makes_sense(site: Site, driver: str) -> bool:
     if driver in ("lag", "delay"):
-        return site.role in ("sensor", "actuator") and site.passed == 1
+        return site.role in ("sensor", "actuator", "feed") and site.passed == 1
     if driver == "saturation":  # a sensor at its limit shows in the data gate
         return site.role == "actuator" and site.passed == 1
     return True
@@ -94,9 +97,6 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
 
     if driver == "constant":
         yield Variant(Effect(site.name, driver, "shift"), (course(ones),), ("amplitude",))
-        if site.role == "sensor":  # the other kind of error: a gain where an offset is usual, an offset where a gain is
-            other = Effect(site.name, driver, "shift", mode="factor" if offset else "offset")
-            yield Variant(other, (Course(site.name, ones, not offset),), ("amplitude",))
     elif driver == "time":
         yield from _in_time(site, time, offset)
     elif driver in ("lag", "delay"):
@@ -105,6 +105,13 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
         yield from limited(site, responses)
     else:
         yield from _on_signal(site, driver, responses.drivers[driver], offset, responses.fit.model.names("states"))
+
+
+def _otherwise(variant: Variant, site: Site) -> Variant:
+    """The same course as a factor where the site's own way is an offset, and the other way round."""
+    effect = replace(variant.effect, mode="factor" if site.mode == "offset" else "offset")
+    courses = tuple(replace(c, offset=not c.offset) for c in variant.courses)
+    return replace(variant, effect=effect, courses=courses)
 
 
 def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:

@@ -104,7 +104,15 @@ def refit(
         furthest.setdefault(run.score.candidate.name, run)
     tied = {s.candidate.name for lane in lanes for s in lane.scores if s.gain > TIED * lane.scores[0].gain}
     finalists = _finalists(lanes[0].scorer.fit.loss, list(furthest.values()), tied)
-    last = heat([job for run in finalists for job in _forms(lanes[run.lane], run)], MOST_STEPS)
+    drawn = {(run.lane, run.score.candidate.name): run for run in reversed(first) if _is_curve(run)}
+    last = heat(
+        [
+            job
+            for run in finalists
+            for job in _forms(lanes[run.lane], drawn.get((run.lane, run.score.candidate.name), run))
+        ],
+        MOST_STEPS,
+    )
     followers: list[_Job] = []
     for i, lane in enumerate(lanes):
         own = [run.alternative for run in last if run.lane == i]
@@ -121,7 +129,10 @@ def refit(
     bound = {run.alternative.names: run.alternative.fit for run in found}
 
     def worth(runs: list[_Run]) -> list[_Run]:
-        free = heat([job for run in runs for job in _freer(run, low, high)], MOST_STEPS)
+        names = {run.alternative.names for run in runs}
+        curves = _best_of_each([run for run in last if run.alternative.names in names and _is_curve(run)])
+        both = [*runs, *(c for c in curves if not any(c is run for run in runs))]
+        free = heat([job for run in both for job in _freer(run, low, high)], MOST_STEPS)
         return [r for r in free if worth_its_freedom(fitter.problem, bound[r.alternative.names], r.alternative.fit)]
 
     freed = worth(found[:FREED])
@@ -166,6 +177,10 @@ def _best_of_each(found: list[_Run]) -> list[_Run]:
     for run in sorted(found, key=lambda run: run.alternative.fit.bic):
         best.setdefault(run.alternative.names, run)
     return list(best.values())
+
+
+def _is_curve(run: _Run) -> bool:
+    return run.score.variant.effect.form == "curve"
 
 
 def _freer(run: _Run, low: float, high: float) -> list[_Job]:

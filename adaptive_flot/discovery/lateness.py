@@ -29,7 +29,9 @@ BANDS = (0.3, 1.0)
 
 
 def late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
-    """Variants of a sensor or actuator that answers late: lags or dead times of several lengths, a wide dead band."""
+    """Variants of what answers late: lags or dead times of several lengths, for an actuator a wide dead band."""
+    if not _moves(responses.site_values[site.name]):
+        return
     if driver == "delay":
         yield from _delayed(site, responses)
         return
@@ -50,6 +52,10 @@ def late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
         yield from _sticking(site, responses)
 
 
+def _moves(v: FloatArray) -> bool:
+    return float(np.ptp(v)) > LEAST_RANGE * float(np.median(np.abs(v)))
+
+
 def _asked(site: Site, responses: Responses) -> tuple[FloatArray, float]:
     """What is asked of an actuator, or comes to a sensor (N,), and its typical size."""
     v = responses.site_values[site.name]
@@ -68,9 +74,9 @@ def _delayed(site: Site, responses: Responses) -> Iterator[Variant]:
 def limited(site: Site, responses: Responses) -> Iterator[Variant]:
     """What is asked of an actuator, cut at a limit."""
     v = responses.site_values[site.name]
-    spread = float(np.ptp(v))
-    if not spread > LEAST_RANGE * float(np.median(np.abs(v))):
+    if not _moves(v):
         return
+    spread = float(np.ptp(v))
     effect = Effect(site.name, "saturation", "saturation", settings={"width": LIMIT_WIDTH * spread})
     for share in LIMIT_QUANTILES:
         limit = float(np.quantile(v, share))

@@ -178,6 +178,9 @@ def judge(found: Search) -> Judgement:
         return Judgement("none", best, (), rivals, margin)
     if not named:
         return Judgement("unnamed" if len(close) == 1 else "abstain", best, (), rivals, margin)
+    if named[0] is not best and not _near(named[0], best, LEAST_MARGIN * found.together):
+        # what has no name is surely better than what has one, though neither is all there is
+        return Judgement("abstain", best, (), rivals, margin)
     best, rivals = named[0], _others(found, named[0])
     names = tuple(dict.fromkeys(tuple(sorted(a.names)) for a in named))
     if len(names) == 1:

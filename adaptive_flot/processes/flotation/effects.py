@@ -36,6 +36,8 @@ KNOWN_EFFECTS: tuple[KnownEffect, ...] = (
     KnownEffect("air_flow", "saturation", "air valve or blower at its limit"),
     KnownEffect("feed_flow", "constant", "feed flow meter error"),
     KnownEffect("feed_flow", "time", "feed flow that drifts from its meter"),
+    KnownEffect("feed_flow", "lag", "feed that follows its demand slowly: pump, sump, launder"),
+    KnownEffect("feed_flow", "delay", "dead time of the feed line"),
     KnownEffect("feed_grade", "constant", "feed richer or poorer than assumed"),
     KnownEffect("feed_grade", "time", "feed grade disturbance"),
     KnownEffect("feed_grade", "feed_flow", "feed grade that changes with the feed flow"),
