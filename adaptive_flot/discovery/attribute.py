@@ -25,6 +25,8 @@ LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
 MOST_CHANGE = float(np.log(10))
 """A physical effect changes a quantity by a factor of ten at most; beyond it is another model, or none with a grip."""
+WORTH_A_RESTART = 10.0
+"""Gain of another start of a free course in time, which has most places to rest in, that is worth yet another."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
@@ -137,7 +139,10 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     rounds = 1 if steps < MOST_STEPS else 2
     shape = {effect.parameter(k) for k, _ in score.variant.start}
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
-    return fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps, shrink)
+    found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps, shrink)
+    if found is not None and steps == MOST_STEPS and (effect.driver, effect.form) == ("time", "curve"):
+        return fitter.settled(found, bounds, WORTH_A_RESTART)
+    return found
 
 
 def _warmed(start: Fit, warm: Fit) -> Fit:

@@ -47,8 +47,8 @@ class Candidate:
 def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     """All candidates of a model that the record can tell anything about.
 
-    A driver that hardly moves is left out; lag and delay are those of sensors, actuators and feeds; what the model has already
-    is not offered again, and a change that only rescales an adapted parameter neither.
+    A driver that hardly moves is left out; lag and delay are those of sensors, actuators and feeds; what the model has
+    already is not offered again, and a change that only rescales an adapted parameter neither.
     """
     known = {(k.site, k.driver): k for k in model.known_effects}
     taken = {(e.site, e.driver) for e in model.effects}

@@ -163,8 +163,12 @@ def _prepare(
         return None
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
     problem = problem.with_weights(proportional(seen, first.predicted))
-    base = Fitter(problem).settled(first.model, first)
-    return (with_nodes(problem, base), base) if base else None
+    fitter = Fitter(problem)
+    base = fitter.fit(first.model, like=first, rounds=2)
+    if base is None:
+        return None
+    base = fitter.settled(base)
+    return with_nodes(problem, base), base
 
 
 def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:

@@ -68,20 +68,17 @@ class Fitter:
             descent.shrink(shrink)
         return descent.run(rounds, steps, like is None)
 
-    def settled(self, model: Model, like: Fit, bounds: Mapping[str, tuple[float, float]] | None = None) -> Fit | None:
-        """A fit from `like`, started again from where it ended until that gains nothing; None as `fit`.
+    def settled(self, fit: Fit, bounds: Mapping[str, tuple[float, float]] | None = None, least: float = SETTLED) -> Fit:
+        """The fit started again from where it ended until that gains less than `least`.
 
         Coloured noise explains a slow misfit away, and a search may rest there; each start is with white noise again.
         """
-        found = self.fit(model, like.names, like=like, bounds=bounds, rounds=2)
         for _ in range(MOST_RESTARTS):
-            if found is None:
-                break
-            again = self.fit(found.model, found.names, like=found, bounds=bounds, rounds=2)
-            if again is None or again.loss > found.loss - SETTLED:
-                break
-            found = again
-        return found
+            again = self.fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2)
+            if again is None or again.loss > fit.loss - least:
+                return fit
+            fit = again
+        return fit
 
     def with_intervals(self, fit: Fit) -> Fit:
         """The fit with the covariance of exact derivatives: those that a search ends with may be a few steps old."""

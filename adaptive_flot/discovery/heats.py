@@ -122,8 +122,12 @@ def refit(
     # a step is simulated at every row, which costs: only where the ramp or washout came to be as short as one
     time = fitter.problem.record.time
     low, high = float(time[0]), float(time[-1])
+    most = max((run.alternative.gain for run in (*events, *last)), default=0.0)
     steps = [
-        _Job(run.lane, s) for run in events if (s := step_score(run.score, run.alternative.effects[-1], high - low))
+        _Job(run.lane, s)
+        for run in _best_of_each(events)
+        if run.alternative.gain > CLOSE_GAIN * most
+        and (s := step_score(run.score, run.alternative.effects[-1], high - low))
     ]
     found = _best_of_each([*heat(steps, MOST_STEPS), *events, *last, *first])
     bound = {run.alternative.names: run.alternative.fit for run in found}
