@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.problem import Problem
@@ -140,7 +141,8 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     shape = {effect.parameter(k) for k, _ in score.variant.start}
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
     found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps, shrink)
-    if found is not None and steps == MOST_STEPS and (effect.driver, effect.form) == ("time", "curve"):
+    in_time = effect.driver == "time" and effect.form == "curve" and len(names) <= FINE_TIME_KNOTS
+    if found is not None and steps == MOST_STEPS and in_time:
         return fitter.settled(found, bounds, WORTH_A_RESTART)
     return found
 

@@ -78,7 +78,7 @@ def _shaped(fitter: Fitter, best: Alternative, score: Score) -> Score | None:
     if first is None:
         return None
     start = dict(first.model.fitted_effects()[-1].coefficients)
-    fine = finer(score.variant, start)
+    fine = finer(score.variant, start) if score.candidate.driver == "time" else None
     return replace(score, variant=fine[0], start=fine[1]) if fine else replace(score, start=start)
 
 

@@ -103,6 +103,8 @@ class Unknowns:
         arguments = record.time[0], x, record.inputs[0], self.base
         slope = np.array(self.model.ode.factory("slope", ["t", "x", "u", "p"], ["jac:xdot:x"])(*arguments))
         rate = np.array(self.model.ode(*arguments)[0]).ravel()
+        if not (np.isfinite(slope).all() and np.isfinite(rate).all()):
+            return x  # the run from here will not be finite either, and is told so
         x[new] -= np.linalg.lstsq(slope[new, new], rate[new], rcond=None)[0]
         return x
 
