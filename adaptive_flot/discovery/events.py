@@ -130,7 +130,7 @@ def _jumps(effect: Effect, knots: FloatArray) -> bool:
     """Whether a curve changes by a large factor, half of all it ever changes in a short time."""
     t = np.linspace(knots[0], knots[-1], POINTS)
     values = spline_values(t, [float(k) for k in knots]) @ [
-        effect.coefficients[f"value_{k + 1}"] for k in range(len(knots))
+        effect.coefficients.get(f"value_{k + 1}", 0.0) for k in range(len(knots))
     ]
     ahead = max(1, round(SLOW_S / float(t[1] - t[0])))
     whole = float(np.ptp(values))

@@ -86,3 +86,17 @@ def test_a_washout_is_found_in_its_curve() -> None:
     assert washout.start["amplitude"] == pytest.approx(0.3, rel=0.15)
     assert washout.start["onset"] == pytest.approx(1200.0, abs=240.0)
     assert washout.start["time_constant"] == pytest.approx(300.0, rel=0.5)
+
+
+def test_a_large_change_at_once_is_an_event_though_its_knots_are_even() -> None:
+    """A plateau by a factor of two, and the same course a tenth as large or spread over the record."""
+    knots = np.linspace(0.0, 3000.0, 28)
+
+    def curve(values: np.ndarray) -> Effect:
+        coefficients = {f"value_{k + 1}": float(v) for k, v in enumerate(values)}
+        return Effect("coalescence", "time", "curve", coefficients, {"knots": tuple(map(float, knots))})
+
+    plateau = 0.7 * ((knots > 1000) & (knots < 2000))
+    assert not slow(curve(plateau))
+    assert slow(curve(0.1 * plateau))
+    assert slow(curve(0.7 * knots / 3000.0))
