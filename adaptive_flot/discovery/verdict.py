@@ -174,8 +174,11 @@ def judge(found: Search) -> Judgement:
     close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
     rivals = _others(found, best)
-    if _only_drift(best, found.adapted_sites):
-        return Judgement("none", best, (), rivals, margin)
+    # a drift of what is adapted is the ordinary explanation: what is hardly better does not replace it
+    alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * found.together)
+    drifting = next((a for a in alike if _only_drift(a, found.adapted_sites)), None)
+    if drifting:
+        return Judgement("none", drifting, (), _others(found, drifting), margin)
     if not named:
         return Judgement("unnamed" if len(close) == 1 else "abstain", best, (), rivals, margin)
     if named[0] is not best and not _near(named[0], best, LEAST_MARGIN * found.together):
