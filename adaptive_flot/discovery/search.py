@@ -9,9 +9,10 @@ import numpy as np
 
 from adaptive_flot.discovery.attribute import SHORTLIST, Alternative, shortlist
 from adaptive_flot.discovery.catalogue import catalogue
+from adaptive_flot.discovery.entries import Lane
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.heats import Lane, refit
+from adaptive_flot.discovery.heats import refit
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.discovery.scoring import Score, Scorer
