@@ -237,8 +237,15 @@ def _verdict(
         parameters=dict(zip(labels, map(float, final.values[:count]), strict=True)),
         drift=drift,
         absorbed=absorbed,
-        notes=checked.notes,
+        notes=checked.notes + _granted_words(found),
     )
+
+
+def _granted_words(found: Search) -> tuple[str, ...]:
+    if found.granted is None:
+        return ()
+    site, driver = found.granted
+    return (f"close alternatives were compared with what they leave, {site} by {driver}, granted to each",)
 
 
 def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
@@ -249,7 +256,7 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
         others = tuple(
-            (*instead[0], a.fit.bic - best.fit.bic, a.doubt)
+            (*instead[0], a.worse_than(best), a.doubt)
             for a in judgement.rivals
             if len(instead := [n for n in a.names if n not in best.names]) == 1
             and set(best.names) - set(a.names) == {own}

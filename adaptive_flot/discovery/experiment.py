@@ -17,6 +17,7 @@ from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.separation import predictions, separation
 from adaptive_flot.discovery.signals import WATCHING, candidate_tests, input_range, watching
+from adaptive_flot.discovery.verify import SURE
 from adaptive_flot.greybox.model import FloatArray
 
 TEST_ROWS = 900
@@ -206,7 +207,7 @@ def leading(best: Alternative, others: Sequence[Alternative], margin: float) -> 
     seen = {frozenset(best.names)}
     close = [best]
     for a in others:
-        if abs(a.fit.bic - best.fit.bic) < max(margin, CLOSE, 2 * a.doubt) and frozenset(a.names) not in seen:
+        if abs(a.worse_than(best)) < max(margin, CLOSE, SURE * a.doubt) and frozenset(a.names) not in seen:
             seen.add(frozenset(a.names))
             close.append(a)
     return tuple(close[:MOST_COMPARED])

@@ -12,15 +12,13 @@ from adaptive_flot.discovery.events import slow
 from adaptive_flot.discovery.experiment import Experiment
 from adaptive_flot.discovery.locate import Location
 from adaptive_flot.discovery.search import Search
-from adaptive_flot.discovery.verify import OutputChange
+from adaptive_flot.discovery.verify import SURE, OutputChange
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 
 Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
 
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
-SURE = 2.0
-"""Standard deviations by which an alternative must be worse to be told apart."""
 MUCH = 0.1
 """Share of the error removed on fresh rows from which something is missing, though it may not be what was found."""
 LARGEST_CLASS = 3

@@ -18,6 +18,8 @@ BLOCK_ROWS = 20
 """Rows of a block of the paired block bootstrap: longer than the noise remembers."""
 DOUBT_ROWS = 60
 """Rows of a block in which two fits are compared: what both lack is slower than the noise."""
+SURE = 2.0
+"""Standard deviations by which an alternative must be worse to be told apart."""
 SHORTEST_BLOCK = 4
 MANY_BLOCKS = 8
 """A share too short for so many blocks gets shorter ones."""
@@ -92,7 +94,7 @@ def doubts(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, .
     """Standard deviation of the difference between each fit's minus two log-likelihood and that of the best.
 
     By resampling blocks of rows with the fits as they are: Kishino & Hasegawa, J. Mol. Evol. 29 (1989) 170. A fit that
-    is worse by less than two of these would be the better one in some records like this.
+    is worse by less than `SURE` of these would be the better one in some records like this.
     """
     rows = problem.rows("estimate")
     length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, DOUBT_ROWS))

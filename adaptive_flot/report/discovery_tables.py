@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.detect import LEVEL
 from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.discovery.verdict import SURE
+from adaptive_flot.discovery.verify import SURE
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.figures import p_text
 from adaptive_flot.report.page import Table, number
@@ -69,11 +69,10 @@ def coefficient_table(found: Discovery) -> Table:
 def alternative_table(found: Discovery) -> Table:
     """Ranked alternatives with their evidence, each refitted in full."""
     ranked = ranked_alternatives(found)[:MOST_ROWS]
-    best = ranked[0].fit.bic if ranked else 0.0
     rows = []
     for k, a in enumerate(ranked):
         forms = ", and ".join(_form(e) for e in a.effects)
-        worse = number(a.fit.bic - best, ".1f") + (f" ± {number(a.doubt, '.0f')}" if a.doubt else "")
+        worse = number(a.worse_than(ranked[0]), ".1f") + (f" ± {number(a.doubt, '.0f')}" if a.doubt else "")
         values = (worse, number(a.delta_bic, ".1f"))
         rows.append((str(k + 1), effect_text(a.names), forms, "yes" if all(a.known) else "no", *values))
     caption = (
@@ -170,7 +169,7 @@ def not_told_apart(found: Discovery) -> list[str]:
             least = max(judged.margin, SURE * a.doubt)
             said.append(
                 f"{effect_text(a.names)} explains the record about as well as {effect_text(best.names)}: its criterion "
-                f"differs by {number(a.fit.bic - best.fit.bic, '.1f')}, and {least:.0f} is the least that tells them "
+                f"differs by {number(a.worse_than(best), '.1f')}, and {least:.0f} is the least that tells them "
                 "apart."
             )
     if not said and found.verdict.experiment is not None:
