@@ -72,15 +72,21 @@ class _Kept(threading.local):
 _kept = _Kept()
 
 
+_turn = threading.Lock()
+"""Threads of a worker take turns: CasADi counts references to its symbols without a lock, and two threads that build
+functions at once crash the process. A worker has one thread unless a user's own cluster gives it more."""
+
+
 def fit_start(order: Order, controller: str, seed: int) -> BatchFit | str:
     """Initial fit that several runs of a seed share, or what went wrong."""
-    prepared = _prepare(order)
-    try:
-        return initial_fit(prepared, controller, seed)
-    except PluginError:
-        raise
-    except Exception as error:
-        return _message(error)
+    with _turn:
+        prepared = _prepare(order)
+        try:
+            return initial_fit(prepared, controller, seed)
+        except PluginError:
+            raise
+        except Exception as error:
+            return _message(error)
 
 
 def run(
@@ -110,9 +116,11 @@ def run(
     try:
         if isinstance(start, str):
             return Result({**head, "outcome": "failed", "message": start}, _timing(head, begin))
-        prepared = _prepare(order)
-        found = run_one(prepared, estimator, controller, seed, {} if start is None else {"fit": start})
-        row = run_rows(plain(run_summary(prepared.scenario, [found])))[0]
+        with _turn:
+            begin = time.perf_counter(), time.process_time()
+            prepared = _prepare(order)
+            found = run_one(prepared, estimator, controller, seed, {} if start is None else {"fit": start})
+            row = run_rows(plain(run_summary(prepared.scenario, [found])))[0]
     except (PluginError, StudyError):
         raise
     except Exception as error:

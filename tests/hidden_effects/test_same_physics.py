@@ -33,7 +33,7 @@ SETTLED = 20
 def experiment() -> Experiment:
     drawn = draw_experiment(np.random.default_rng(5), thin_allowed=False, loop="open")
     moves = np.repeat(
-        [[1.4e-3, 1.67e-4, 0.38], [1.9e-3, 1.67e-4, 0.38], [1.6e-3, 1.8e-4, 0.36], [1.2e-3, 1.7e-4, 0.39]], 150, axis=0
+        [[1.4e-3, 1.67e-4, 0.38], [1.9e-3, 1.67e-4, 0.38], [1.6e-3, 1.8e-4, 0.36], [1.2e-3, 1.7e-4, 0.39]], 90, axis=0
     )
     return replace(
         drawn, rows=len(moves), burn=0, moves=moves, noise=replace(drawn.noise, step=dict.fromkeys(OUTPUTS, 0.0))
