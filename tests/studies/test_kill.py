@@ -22,7 +22,7 @@ from adaptive_flot.studies.sweep import sweep
 from tests.studies.conftest import WriteStudy
 
 PROGRAM = str(Path(sys.executable).with_name("adaptive-flot"))
-SEEDS = 16
+SEEDS = 32
 PATIENCE_S = 120.0
 # a run takes a while on any machine, so that a kill falls into the middle of the study
 SLOW = """
@@ -68,7 +68,7 @@ class Sweep:
 
 @pytest.fixture
 def slow(write_study: WriteStudy, tmp_path: Path) -> Path:
-    """Folder of a study of 16 runs that take at least 0.2 s each."""
+    """Folder of a study of 32 runs that take at least 0.2 s each."""
     (tmp_path / "slow.py").write_text(SLOW)
     write_study({"estimators": {"slow": {"use": "slow:Slow"}}, "seeds": {"count": SEEDS}})
     return tmp_path
