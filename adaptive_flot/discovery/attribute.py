@@ -132,7 +132,7 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     start = _warmed(start, warm) if warm else start
     effect = score.variant.effect
     held = fixed_coefficients(effect)
-    model = start.model.with_effects([replace(effect, coefficients=held)])
+    model = variant_model(start, score)
     names = tuple(effect.parameter(c.name) for c in effect.terms if c.name not in held)
     free = (*start.names, *names)
     bounds = effect_bounds(fitter.problem, model, effect)
@@ -145,6 +145,12 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     if found is not None and steps == MOST_STEPS and in_time:
         return fitter.settled(found, bounds, WORTH_A_RESTART)
     return found
+
+
+def variant_model(start: Fit, score: Score) -> Model:
+    """The model of a fit with one variant on top, before it is fitted."""
+    effect = score.variant.effect
+    return start.model.with_effects([replace(effect, coefficients=fixed_coefficients(effect))])
 
 
 def _warmed(start: Fit, warm: Fit) -> Fit:

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.attribute import Alternative, fit_variant
+from adaptive_flot.discovery.attribute import Alternative, fit_variant, variant_model
 from adaptive_flot.discovery.catalogue import finer
-from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
@@ -30,9 +29,10 @@ def contest(problem: Problem, found: Search, near: Sequence[Alternative], proces
     Unchanged when nothing of the kind is left, when too many are near, or when who wins does not stand on fresh rows.
     """
     best = found.alternatives[0]
-    scorer, _ = scorer_of(problem, best.fit)
-    score = _lacking(scorer, best)
-    if score is None or not near or len(near) > MOST_RIVALS or score.gain > MINOR * best.gain:
+    if not 0 < len(near) <= MOST_RIVALS:
+        return found
+    score = _lacking(scorer_of(problem, best.fit)[0], best)
+    if score is None or score.gain > MINOR * best.gain:
         return found
     granted = score.candidate.name
     fitter = Fitter(problem)
@@ -40,7 +40,7 @@ def contest(problem: Problem, found: Search, near: Sequence[Alternative], proces
     if score is None:
         return found
     taking = [best, *(a for a in near if granted not in a.names)]
-    fits = parallel_map(lambda k: _granted(fitter, taking[k], score), range(len(taking)), processes)
+    fits = parallel_map(lambda k: fit_variant(fitter, taking[k].fit, score, MOST_STEPS), range(len(taking)), processes)
     told = {a.names: fit for a, fit in zip(taking, fits, strict=True) if fit}
     if len(told) < len(taking):
         return found
@@ -57,10 +57,7 @@ def contest(problem: Problem, found: Search, near: Sequence[Alternative], proces
         for a in found.alternatives
     ]
     changed.sort(key=lambda a: (a.told is None, a.fit.bic if a.told is None else a.told))
-    model = winner.fit.model.with_effects([score.variant.effect])
-    values = dict(zip(told[winner.names].names, map(float, told[winner.names].values), strict=True))
-    whole = replace(told[winner.names], model=model.with_parameters(values))
-    scorer, _ = scorer_of(problem, whole)
+    scorer, _ = scorer_of(problem, told[winner.names].with_model(lambda: variant_model(winner.fit, score)))
     left, threshold = what_is_left(scorer, threshold_of(scorer))
     return replace(
         found,
@@ -80,11 +77,6 @@ def _shaped(fitter: Fitter, best: Alternative, score: Score) -> Score | None:
     start = dict(first.model.fitted_effects()[-1].coefficients)
     fine = finer(score.variant, start) if score.candidate.driver == "time" else None
     return replace(score, variant=fine[0], start=fine[1]) if fine else replace(score, start=start)
-
-
-def _granted(fitter: Fitter, a: Alternative, score: Score) -> Fit | None:
-    fit = fit_variant(fitter, a.fit, score, MOST_STEPS)
-    return replace(fit, model=None) if fit else None  # type: ignore[arg-type]  # a model does not pickle
 
 
 def _lacking(scorer: Scorer, best: Alternative) -> Score | None:

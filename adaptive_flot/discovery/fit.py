@@ -6,7 +6,8 @@ norm (15.9).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +60,16 @@ class Fit:
         """Measured minus predicted (N, m)."""
         r: FloatArray = problem.measured - self.predicted
         return r
+
+    def __getstate__(self) -> dict[str, object]:
+        """A fit pickles without its model, whose equations do not pickle; `with_model` puts it back."""
+        return {**self.__dict__, "model": None}
+
+    def with_model(self, make: Callable[[], Model]) -> Fit:
+        """The fit with the model that was fitted, made anew where it came without from another process."""
+        if self.model is not None:
+            return self
+        return replace(self, model=make().with_parameters(dict(zip(self.names, map(float, self.values), strict=True))))
 
     def std(self) -> FloatArray:
         """Standard deviation of each free parameter (q,)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.attribute import Alternative, effect_bounds, fit_variant, fixed_coefficients
+from adaptive_flot.discovery.attribute import Alternative, effect_bounds, fit_variant, variant_model
 from adaptive_flot.discovery.direction import nameable
 from adaptive_flot.discovery.entries import (
     Job,
@@ -89,8 +89,7 @@ class _Heats:
     def _run(self, jobs: list[Job], steps: int = MOST_STEPS) -> list[Run]:
         def work(k: int) -> Fit | None:
             job = jobs[k]
-            fit = fit_variant(self.fitter, self._start(job.lane), job.score, steps, job.warm)
-            return replace(fit, model=None) if fit else None  # type: ignore[arg-type]  # a model does not pickle
+            return fit_variant(self.fitter, self._start(job.lane), job.score, steps, job.warm)
 
         fits = parallel_map(work, range(len(jobs)), self.processes, self.done)
         found = [
@@ -180,11 +179,8 @@ def _finalists(loss: float, ranked: list[Run], tied: set[tuple[str, str]]) -> li
     return chosen[:MOST_FINALISTS]
 
 
-def _alternative(base: Fit, start: Fit, score: Score, bare: Fit, before: Alternative | None) -> Alternative:
-    model = start.model.with_effects([score.variant.effect])
-    held = {score.variant.effect.parameter(k): v for k, v in fixed_coefficients(score.variant.effect).items()}
-    values = dict(zip(bare.names, map(float, bare.values), strict=True))
-    fit = replace(bare, model=model.with_parameters({**held, **values}))
+def _alternative(base: Fit, start: Fit, score: Score, found: Fit, before: Alternative | None) -> Alternative:
+    fit = found.with_model(lambda: variant_model(start, score))
     return Alternative(
         (*(before.names if before else ()), score.candidate.name),
         (*(before.known if before else ()), nameable(fit.model, fit.model.fitted_effects()[-1], score.candidate.known)),

@@ -16,7 +16,8 @@ from adaptive_flot.discovery.noise import correlation_times
 from adaptive_flot.discovery.parallel import parallel_map
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray, Model
 
 BEAM = 3
 """Alternatives of one round that the next extends."""
@@ -82,7 +83,7 @@ class JointFits:
 
         jobs = [(c, k) for c in range(len(wanted)) for k in range(STARTS)]
         best: dict[int, tuple[float, int]] = {}
-        for (c, k), fit in zip(jobs, self._bare(first, jobs, done), strict=True):
+        for (c, k), fit in zip(jobs, parallel_map(first, jobs, self.processes, done), strict=True):
             if fit is not None and (c not in best or fit.loss < best[c][0]):
                 best[c] = fit.loss, k
         order = sorted(best, key=lambda c: best[c][0])
@@ -93,19 +94,10 @@ class JointFits:
         jobs = [(c, k) for c in order[:POLISHED] for k in (best[c][1], *range(STARTS, 2 * STARTS))]
         jobs += [(c, best[c][1]) for c in order[POLISHED : 2 * POLISHED]]
         ended: dict[int, Alternative] = {}
-        for (c, k), fit in zip(jobs, self._bare(last, jobs, done), strict=True):
+        for (c, k), fit in zip(jobs, parallel_map(last, jobs, self.processes, done), strict=True):
             if fit is not None and (c not in ended or fit.loss < ended[c].fit.loss):
                 ended[c] = self._alternative(wanted[c], k, fit)
         return sorted(((a, wanted[c]) for c, a in ended.items()), key=lambda x: x[0].fit.bic)
-
-    def _bare(
-        self, work: Callable[[tuple[int, int]], Fit | None], jobs: list[tuple[int, int]], done: Callable[[], None]
-    ) -> list[Fit | None]:
-        def without_model(job: tuple[int, int]) -> Fit | None:
-            fit = work(job)
-            return replace(fit, model=None) if fit else None  # type: ignore[arg-type]  # a model does not pickle
-
-        return parallel_map(without_model, jobs, self.processes, done)
 
     def _variants(self, combination: Combination, k: int) -> list[Score]:
         """The best variant of each effect at start 0; another one of its best form at the others."""
@@ -121,7 +113,7 @@ class JointFits:
         rng = np.random.default_rng([k, 7])
         effects = [v.variant.effect for v in variants]
         held = [fixed_coefficients(e) for e in effects]
-        model = self.base.model.with_effects([replace(e, coefficients=h) for e, h in zip(effects, held, strict=True)])
+        model = self._model(effects)
         start: dict[str, float] = {}
         bounds: dict[str, tuple[float, float]] = {}
         free = list(self.base.names)
@@ -138,12 +130,12 @@ class JointFits:
             start |= dict(zip(self.base.names, map(float, self.base.values * factors), strict=True))
         return self.fitter.fit(model, tuple(free), start, self.base, bounds, rounds=2, steps=steps)
 
-    def _alternative(self, combination: Combination, k: int, bare: Fit) -> Alternative:
+    def _model(self, effects: list[Effect]) -> Model:
+        return self.base.model.with_effects([replace(e, coefficients=fixed_coefficients(e)) for e in effects])
+
+    def _alternative(self, combination: Combination, k: int, found: Fit) -> Alternative:
         effects = [v.variant.effect for v in self._variants(combination, k)]
-        model = self.base.model.with_effects(effects)
-        held = {e.parameter(n): x for e in effects for n, x in fixed_coefficients(e).items()}
-        values = dict(zip(bare.names, map(float, bare.values), strict=True))
-        fit = replace(bare, model=model.with_parameters({**held, **values}))
+        fit = found.with_model(lambda: self._model(effects))
         known = tuple(nameable(fit.model, e, True) for e in fit.model.fitted_effects()[-len(effects) :])
         return Alternative(combination.names, known, fit, self.base.loss - fit.loss, fit.bic - self.base.bic)
 

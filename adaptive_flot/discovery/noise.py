@@ -65,6 +65,14 @@ class Noise:
         return np.array(found)
 
 
+def with_rows_before(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The rows (N,) that are true and those before them that whitening looks back to."""
+    found = rows.copy()
+    for lag in range(1, MOST_LAGS + 1):
+        found[:-lag] |= rows[lag:]
+    return found
+
+
 def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
     """Return the standard deviation of the finite entries, each counted up to CLIP of it (Huber's proposal 2)."""
     z = e[np.isfinite(e)]

@@ -15,7 +15,9 @@ from adaptive_flot.greybox.nodes import place_nodes
 from adaptive_flot.greybox.record import RecordSimulator
 
 LONGEST = (6, 4, 3, 2)
-"""Rows from node to node that are tried."""
+"""Most rows from node to node that are tried."""
+GROWTHS = (1.0, 0.5, 0.35, 0.25)
+"""Rows that nodes may be further apart for each row since the last move of an input: what a move sets off dies away."""
 UNNOTICED = 2.0
 """Sum of the squared errors of the coarser run, in standard deviations of the noise, that makes no difference: it
 changes minus two log-likelihood by about as much, a fifth of what a name asks for."""
@@ -46,10 +48,10 @@ def with_nodes(problem: Problem, fit: Fit) -> Problem:
     record = problem.record
     noise = 1.4826 * np.nanmedian(np.abs(np.diff(fit.residual(problem) / problem.weights, axis=0)), axis=0) / np.sqrt(2)
     size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
-    for longest in LONGEST:
-        nodes = place_nodes(record, longest)
+    placed = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
+    for nodes in sorted(placed, key=lambda nodes: len(nodes.rows)):
         if len(nodes.rows) > WORTHWHILE * len(record):
-            continue
+            break
         run = RecordSimulator(fit.model, record.dt, nodes)
         free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
         if np.sum(((free - fit.predicted) / size) ** 2) < UNNOTICED:

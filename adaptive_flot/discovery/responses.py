@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.nodes import NodeStepper
@@ -96,9 +96,11 @@ class Responses:
         self._at_once = np.logical_not(np.any(self._G != 0, axis=(0, 1)))
         self._direct = self._spread(np.concatenate([self._H[:1], self._H]))
 
-    def _spread(self, values: FloatArray) -> FloatArray:
-        """Values at all rows from those that were simulated."""
-        return values if self._nodes is None else self._nodes.spread(values)
+    def _spread(self, values: FloatArray, rows: BoolArray | None = None) -> FloatArray:
+        """Values at all rows, or those that are true, from values at the rows that were simulated."""
+        if self._nodes is None:
+            return values if rows is None else values[rows]
+        return self._nodes.spread(values, rows)
 
     def _describe(self, model: Model, p: FloatArray) -> None:
         """Series of drivers and of the values at the sites."""
@@ -124,28 +126,29 @@ class Responses:
         inputs[:, : self._q] = 1.0
         return self._propagate(S, list(range(self._q)), inputs)
 
-    def _propagate(self, S: FloatArray, source: list[int], courses: FloatArray) -> FloatArray:
+    def _propagate(
+        self, S: FloatArray, source: list[int], courses: FloatArray, rows: BoolArray | None = None
+    ) -> FloatArray:
         """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N - 1, r)."""
         m = len(self.problem.columns)
         where = np.array(source, dtype=np.intp)
-        slow = np.flatnonzero(~self._at_once[where])
+        at_once, slow = np.flatnonzero(self._at_once[where]), np.flatnonzero(~self._at_once[where])
         drive = np.concatenate([courses[:1], courses])
-        by_step = courses if self._nodes is None else self._nodes.means(drive)
-        G, H = (table[:, :, where[slow]] for table in (self._G, self._H))
+        by_step = (courses if self._nodes is None else self._nodes.means(drive))[:, slow]
         out = np.empty((len(self._steps) + 1, m, S.shape[1]))
         for i in range(len(self._steps)):
-            out[i + 1] = self._C[i] @ S  # outputs at the end of the interval, by the state at its start
-            out[i + 1][:, slow] += H[i] * by_step[i, slow]
+            np.matmul(self._C[i], S, out=out[i + 1])  # outputs at the end of the interval, by the state at its start
+            out[i + 1][:, slow] += self._H[i][:, where[slow]] * by_step[i]
             S = self._A[i] @ S
-            S[:, slow] += G[i] * by_step[i, slow]
+            S[:, slow] += self._G[i][:, where[slow]] * by_step[i]
         out[0] = out[1]
-        found = self._spread(out)
-        at_once = np.flatnonzero(self._at_once[where])
-        found[:, :, at_once] += self._direct[:, :, where[at_once]] * drive[:, None, at_once]
+        found = self._spread(out, rows)
+        direct, drive = (self._direct, drive) if rows is None else (self._direct[rows], drive[rows])
+        found[:, :, at_once] += direct[:, :, where[at_once]] * drive[:, None, at_once]
         return found
 
-    def of(self, courses: list[Course]) -> FloatArray:
-        """Answers (N, m, r) of the measured outputs to r courses."""
+    def of(self, courses: list[Course], rows: BoolArray | None = None) -> FloatArray:
+        """Answers (N, m, r) of the measured outputs to r courses; of the rows (N,) that are true only, if any given."""
         source = [self._q + self.sites.index(c.site) for c in courses]
         table = np.empty((len(self.problem.record) - 1, len(courses)))
         for j, c in enumerate(courses):
@@ -156,7 +159,7 @@ class Responses:
             elif default and not c.offset:
                 v = v * self.site_values[c.site][1:]
             table[:, j] = v
-        return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table)
+        return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table, rows)
 
     def _inverse(self, site: str) -> FloatArray:
         """One over the value at a site (N,), bounded: a pump that is off has no relative change."""

@@ -13,9 +13,9 @@ import numpy as np
 
 from adaptive_flot.discovery.catalogue import ONSETS, Candidate, event
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.noise import CLIP, Noise, without_spikes
+from adaptive_flot.discovery.noise import CLIP, Noise, with_rows_before, without_spikes
 from adaptive_flot.discovery.problem import Problem
-from adaptive_flot.discovery.responses import Responses
+from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.model import FloatArray
 
@@ -64,13 +64,15 @@ class Scorer:
         self._count = int(np.isfinite(problem.measured[self.rows]).sum())
         variants = [v for c in candidates for v in c.variants]
         courses = [course for v in variants for course in v.courses]
-        answers = responses.of(courses) / problem.weights[:, :, None]
-        nuisance = responses.nuisance / problem.weights[:, :, None]
+        self._reached = with_rows_before(self.rows)
+        answers = self._answers(courses)
+        nuisance = (responses.nuisance / problem.weights[:, :, None])[self._reached]
         residual = without_spikes(fit.residual(problem) / problem.weights)
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in courses])
         self.noise = self._clean_noise(residual, answers, nuisance, variants)
         e = self.noise.whiten(residual)
-        self._present = np.isfinite(e) & self.rows[:, None]
+        present = np.isfinite(e) & self.rows[:, None]
+        self._present = present[self._reached]
         base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
         self._base = base
         columns = self.noise.whiten(answers)[self._present]
@@ -79,7 +81,7 @@ class Scorer:
         columns -= base @ (base.T @ columns)
         left = np.einsum("ij,ij->j", columns, columns)
         columns[:, left < ABSORBED**2 * size] = 0.0  # what is left is rounding
-        self.residual = self._project(np.clip(e[self._present], -1e3, 1e3))
+        self.residual = self._project(np.clip(e[present], -1e3, 1e3))
         self._columns = columns
         self._along = columns.T @ self.residual
         self._slices: list[slice] = []
@@ -88,6 +90,10 @@ class Scorer:
             self._slices.append(slice(at, at + len(v.courses)))
             at += len(v.courses)
         self._grams = {s.start: columns[:, s].T @ columns[:, s] for s in self._slices}
+
+    def _answers(self, courses: list[Course]) -> FloatArray:
+        """Weighted answers to r courses on the rows of `_reached` (rows, m, r)."""
+        return self._responses.of(courses, self._reached) / self.problem.weights[self._reached][:, :, None]
 
     @staticmethod
     def _prior(offset: bool, responses: Responses, site: str) -> float:
@@ -111,8 +117,9 @@ class Scorer:
         std = np.maximum(np.nan_to_num(std), self.problem.floor)
         r = residual[self.rows] / std
         present = np.isfinite(r)
-        X = (answers[self.rows][:, :, wanted] * self._size[wanted] / std[:, None])[present]
-        Z = (nuisance[self.rows] / std[:, None])[present]
+        inside = self.rows[self._reached]
+        X = (answers[inside][:, :, wanted] * self._size[wanted] / std[:, None])[present]
+        Z = (nuisance[inside] / std[:, None])[present]
         y = r[present]
         base, _ = np.linalg.qr(Z)
         X -= base @ (base.T @ X)
@@ -174,8 +181,7 @@ class Scorer:
             for factor in (LENGTHS if length else (1.0,))
             if time[0] < onset < time[-1]
         ]
-        answers = self._responses.of([v.courses[0] for v in variants]) / self.problem.weights[:, :, None]
-        columns = self.noise.whiten(answers)[self._present]
+        columns = self.noise.whiten(self._answers([v.courses[0] for v in variants]))[self._present]
         columns -= self._base @ (self._base.T @ columns)
         gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
         best = int(np.argmax(gains))

@@ -91,16 +91,19 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
     return Built(dae, ode, decay, tuple(scope.sites.values()), site_values)
 
 
-def tangent(dae: ca.Function, decay: ca.Function, directions: int) -> ca.Function:
-    """The right-hand side and its derivatives along several directions: Jacobians, worked out once, times each."""
+def tangent(dae: ca.Function, decay: ca.Function, seeds: ca.DM) -> ca.Function:
+    """The right-hand side and its derivatives along several directions: Jacobians, worked out once, times each.
+
+    The directions of the parameters, `seeds` (np, q), are constants: as symbols they would triple the work of building.
+    """
     t, x, u, p, z = dae.sx_in()
-    dx, dp = ca.SX.sym("dx", x.numel(), directions), ca.SX.sym("dp", p.numel(), directions)
+    dx = ca.SX.sym("dx", x.numel(), seeds.shape[1])
     rates, residual, y, _ = dae(t, x, u, p, z)
     decays = decay(t, x, u, p, z)
     both = ca.vertcat(rates, y, decays)
 
     def along(value: ca.SX) -> ca.SX:
-        return ca.mtimes(ca.jacobian(value, x), dx) + ca.mtimes(ca.jacobian(value, p), dp)
+        return ca.mtimes(ca.jacobian(value, x), dx) + ca.mtimes(ca.jacobian(value, p), seeds)
 
     change = along(both)
     if z.numel():
@@ -111,9 +114,9 @@ def tangent(dae: ca.Function, decay: ca.Function, directions: int) -> ca.Functio
     nx = x.numel()
     return ca.Function(
         "tangent",
-        [t, x, u, p, z, dx, dp],
+        [t, x, u, p, z, dx],
         [rates, y, decays, change[:nx, :], change[nx:-nx, :], change[-nx:, :]],
-        ["t", "x", "u", "p", "z", "dx", "dp"],
+        ["t", "x", "u", "p", "z", "dx"],
         ["xdot", "y", "decay", "dxdot", "dy", "ddecay"],
         {"cse": True},
     )

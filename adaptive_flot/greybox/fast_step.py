@@ -96,7 +96,7 @@ def fast_step_along(
             decay = model.decay(time, state.value, u, p, z)
             return Moving(xdot, ca.SX(xdot.numel(), 0)), Moving(y, ca.SX(y.numel(), 0)), Moving(decay, state.along)
         # values and derivatives from one function, which has much in common
-        xdot, y, decay, *slopes = model.tangent(q)(time, state.value, u, p, z, state.along, seeds)
+        xdot, y, decay, *slopes = model.tangent(seeds)(time, state.value, u, p, z, state.along)
         return Moving(xdot, slopes[0]), Moving(y, slopes[1]), Moving(decay, slopes[2])
 
     def remainder(time: ca.SX, state: Moving, decay: Moving) -> Moving:

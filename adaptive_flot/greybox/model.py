@@ -36,14 +36,14 @@ __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Sc
 class Model:
     """Named quantities plus equations; building it compiles nothing and takes milliseconds.
 
-    Attributes `dae`, `ode` and `decay`, and what `tangent(q)` returns, are CasADi functions of `(t, x, u, p[, z])`:
+    Attributes `dae`, `ode` and `decay`, and what `tangent(seeds)` returns, are CasADi functions of `(t, x, u, p[, z])`:
 
     ========= ============================================= ==========================================
     function  arguments                                     results
     ========= ============================================= ==========================================
     `dae`     t, x (nx,), u (nu,), p (np,), z (nz,)         dx/dt (nx,), residual (nz,), y (ny,), s (ns,)
     `ode`     t, x, u, p                                    dx/dt, y, s, z, with z solved inside
-    `tangent` t, x, u, p, z, dx (nx, q), dp (np, q)         derivatives of dx/dt, y and decay along q (dx, dp)
+    `tangent` t, x, u, p, z, dx (nx, q)                     dx/dt, y, decay; then their derivatives along (dx, seeds)
     `decay`   t, x, u, p, z                                 decay rate of each state (nx,), 0 where none is given
     ========= ============================================= ==========================================
 
@@ -222,11 +222,14 @@ class Model:
         """Explicit right-hand side with the algebraic loop closed inside, see the class."""
         return self._built.ode
 
-    def tangent(self, directions: int = 1) -> ca.Function:
-        """Derivatives of the right-hand side and the outputs along directions, with z moving along; see the class."""
-        key = "tangent", directions
+    def tangent(self, seeds: ca.DM) -> ca.Function:
+        """The right-hand side, the outputs and their derivatives along q directions, z moving along; see the class.
+
+        The directions are (dx, seeds): `seeds` (np, q) are those of the parameters, constants, most of them zero.
+        """
+        key = "tangent", seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros())
         if key not in self.kept:
-            self.kept[key] = tangent(self.dae, self.decay, directions)
+            self.kept[key] = tangent(self.dae, self.decay, seeds)
         return self.kept[key]
 
     @property

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, lil_array
+from scipy.sparse import csr_array
 
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.fast_step import Moving, fast_step, fast_step_along
@@ -20,8 +20,6 @@ from adaptive_flot.greybox.stepper import Stepper
 
 MOVE = 0.001
 """An input that changes from one row to the next by more than this share of its range has moved."""
-SETTLING = (1, 2, 3)
-"""Rows from node to node after a move, before they are `longest` apart."""
 STENCIL = 4
 """Nodes that a row between them is interpolated from."""
 
@@ -46,9 +44,10 @@ class Nodes:
     inputs: FloatArray
     weights: csr_array
 
-    def spread(self, values: FloatArray) -> FloatArray:
-        """Values at all rows (N, ...) from those at the nodes (M, ...)."""
-        found: FloatArray = self.weights @ values.reshape(len(values), -1)
+    def spread(self, values: FloatArray, rows: NDArray[np.bool_] | None = None) -> FloatArray:
+        """Values at all rows (N, ...), or those of them that are true, from values at the nodes (M, ...)."""
+        weights = self.weights if rows is None else self.weights[rows]
+        found: FloatArray = weights @ values.reshape(len(values), -1)
         return found.reshape(-1, *values.shape[1:])
 
     def means(self, values: FloatArray) -> FloatArray:
@@ -57,46 +56,49 @@ class Nodes:
         return sums / np.diff(self.rows).reshape(-1, *(1,) * (values.ndim - 1))
 
 
-def place_nodes(record: Dataset, longest: int) -> Nodes:
-    """Nodes of a record that are at most `longest` rows apart."""
+def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
+    """Nodes of a record, one row apart after a move and further by `growth` rows a row since, up to `longest` rows."""
     u = record.inputs
     moved = np.zeros(len(u), dtype=bool)
     moved[1:] = (np.abs(np.diff(u, axis=0)) > MOVE * np.ptp(u, axis=0)).any(axis=1)
     moved[0] = True
     starts = np.flatnonzero(moved)
-    parts = [_segment(int(a), int(b), longest) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
+    parts = [_segment(int(a), int(b), longest, growth) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
     rows = np.concatenate(parts)
-    weights = lil_array((len(u), len(rows)))
-    offset = 0
-    for part in parts:
-        _interpolate(part, offset, weights)
-        offset += len(part)
-    nodes = Nodes(rows, np.empty(0), csr_array(weights))
+    offsets = np.cumsum([0, *map(len, parts[:-1])])
+    triplets = [_interpolation(part, offset) for part, offset in zip(parts, offsets, strict=True)]
+    weight, row, node = (np.concatenate(c) for c in zip(*triplets, strict=True))
+    weights = csr_array((weight, (row, node)), shape=(len(u), len(rows)))
+    nodes = Nodes(rows, np.empty(0), weights)
     return replace(nodes, inputs=np.column_stack([nodes.means(u), np.diff(rows) * record.dt]))
 
 
-def _segment(start: int, stop: int, longest: int) -> IntArray:
+def _segment(start: int, stop: int, longest: int, growth: float) -> IntArray:
     """Nodes of the rows start to stop - 1, between which no input moves; both ends are nodes."""
     rows = [start]
     while rows[-1] < stop - 1:
-        gap = SETTLING[len(rows) - 1] if len(rows) <= len(SETTLING) else longest
+        gap = 1 + int(growth * (rows[-1] - start))
         rows.append(min(rows[-1] + min(gap, longest), stop - 1))
     return np.array(rows if len(rows) >= STENCIL else range(start, stop), dtype=np.intp)
 
 
-def _interpolate(nodes: IntArray, offset: int, weights: lil_array) -> None:
-    """Fill the weights of the rows from the first to the last node of a segment: Lagrange's polynomials."""
+def _interpolation(nodes: IntArray, offset: int) -> tuple[FloatArray, IntArray, IntArray]:
+    """Weights of the nodes in the rows from the first to the last node of a segment: Lagrange's polynomials.
+
+    As weight, row and node of each entry; the first node of the segment is the one numbered `offset`.
+    """
     count = min(STENCIL, len(nodes))
-    for row in range(nodes[0], nodes[-1] + 1):
-        after = int(np.searchsorted(nodes, row))
-        if nodes[after] == row:
-            weights[row, after + offset] = 1.0
-            continue
-        first = int(np.clip(after - count // 2, 0, len(nodes) - count))
-        at = nodes[first : first + count].astype(float)
-        for k in range(count):
-            others = np.delete(at, k)
-            weights[row, first + k + offset] = float(np.prod((row - others) / (at[k] - others)))
+    between = np.setdiff1d(np.arange(nodes[0], nodes[-1] + 1), nodes)
+    first = np.clip(np.searchsorted(nodes, between) - count // 2, 0, len(nodes) - count)
+    stencil = first[:, None] + np.arange(count)
+    at = nodes[stencil].astype(float)
+    weights, columns = [np.ones(len(nodes))], [np.arange(len(nodes))]
+    for k in range(count):
+        others = np.delete(at, k, axis=1)
+        weights.append(np.prod((between[:, None] - others) / (at[:, k, None] - others), axis=1))
+        columns.append(stencil[:, k])
+    rows = [nodes, *[between] * count]
+    return np.concatenate(weights), np.concatenate(rows), np.concatenate(columns) + offset
 
 
 class NodeStepper(Stepper):

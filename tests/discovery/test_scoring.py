@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.catalogue import Candidate, catalogue, finer, spline_values
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
+from adaptive_flot.discovery.noise import Noise, with_rows_before
 from adaptive_flot.discovery.problem import Problem, make_problem
 from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.discovery.scoring import Scorer
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.nodes import place_nodes
 from adaptive_flot.greybox.stepper import Stepper
 from tests.discovery.heated import DT, EXPONENT, Truth, heated_tank, tank_record
 
@@ -85,6 +90,33 @@ def test_an_answer_is_what_the_model_does(weak: tuple[Problem, Fit, Scorer]) -> 
             inputs = problem.record.inputs[1:]
             runs.append(Stepper(model, DT).simulate(fit.initial_state, inputs, model.parameter_values, DT).outputs)
         np.testing.assert_allclose(answer[1:, :, j], (runs[1] - runs[0]) / small, rtol=2e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+def test_scores_see_the_same_answers_on_the_rows_they_need(weak: tuple[Problem, Fit, Scorer], coarse: bool) -> None:
+    """Answers on the rows fitted, and the few before that whitening looks back to, are the same to the bit."""
+    problem, fit, _ = weak
+    if coarse:
+        problem = replace(problem, nodes=place_nodes(problem.record, 4))
+    responses = Responses(problem, fit)
+    fan = problem.record.inputs[:, 1]
+    courses = [Course("heat_loss", np.log(fan / 10), False), Course("thermometer", np.ones(600), True)]
+    rows = problem.rows("estimate")
+    np.testing.assert_array_equal(responses.of(courses, rows), responses.of(courses)[rows])
+    noise = Noise(np.array([0.1]), np.array([[0.5, 0.2, 0.1]]))
+    reached = with_rows_before(rows)
+    every, some = noise.whiten(responses.of(courses)), noise.whiten(responses.of(courses, reached))
+    np.testing.assert_array_equal(some[rows[reached]], every[rows])
+
+
+def test_a_fit_that_went_through_a_pickle_has_its_model_again() -> None:
+    """Fits come back from other processes without the equations, which do not pickle."""
+    _, fit = _fitted(Truth())
+    back = pickle.loads(pickle.dumps(fit))
+    assert back.model is None
+    again = back.with_model(heated_tank)
+    np.testing.assert_array_equal(again.model.parameter_values, fit.model.parameter_values)
+    assert fit.with_model(heated_tank) is fit
 
 
 def test_a_score_is_the_gain_of_the_full_fit(weak: tuple[Problem, Fit, Scorer]) -> None:

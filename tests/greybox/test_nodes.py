@@ -32,14 +32,20 @@ def _record(seed: int, rows: int = ROWS) -> Dataset:
     return Dataset("moves", np.arange(2.0, 2.0 * rows + 1, 2.0), 2.0, inputs, np.zeros((rows, 1)))
 
 
-@given(st.integers(0, 1000), st.integers(2, 6))
-def test_nodes_stand_at_every_move_and_at_both_ends(seed: int, longest: int) -> None:
+@given(st.integers(0, 1000), st.integers(2, 6), st.floats(0.1, 1.0))
+def test_nodes_stand_at_every_move_and_at_both_ends(seed: int, longest: int, growth: float) -> None:
     record = _record(seed)
-    nodes = place_nodes(record, longest)
+    nodes = place_nodes(record, longest, growth)
     moved = 1 + np.flatnonzero((np.diff(record.inputs, axis=0) != 0).any(axis=1))
     assert {0, ROWS - 1, *moved, *(moved - 1)} <= set(nodes.rows.tolist())
     assert 1 <= np.diff(nodes.rows).min() and np.diff(nodes.rows).max() <= longest
     assert np.sum(nodes.inputs[:, -1]) == pytest.approx(record.time[-1] - record.time[0])
+
+
+def test_nodes_move_apart_as_what_a_move_set_off_dies_away() -> None:
+    still = Dataset("still", np.arange(60.0), 1.0, np.ones((60, 1)), np.zeros((60, 1)))
+    assert place_nodes(still, 6, 0.5).rows[:8].tolist() == [0, 1, 2, 4, 7, 11, 17, 23]
+    assert place_nodes(still, 3, 1.0).rows[:6].tolist() == [0, 1, 3, 6, 9, 12]
 
 
 @given(st.integers(0, 1000))
@@ -66,7 +72,7 @@ def test_a_run_over_nodes_and_its_derivatives_are_those_of_every_row() -> None:
     """The inputs stand still between nodes, so nothing but the interpolation differs."""
     record, model = tank_record(), heated_tank()
     x0, p, wrt = np.array([305.0]), model.parameter_values, ("efficiency", "loss")
-    nodes = place_nodes(record, 4)
+    nodes = place_nodes(record, 4, 1.0)
     assert len(nodes.rows) < 0.6 * len(record)
     every, some = RecordSimulator(model, record.dt), RecordSimulator(model, record.dt, nodes)
     np.testing.assert_allclose(some.outputs(record, x0, p), every.outputs(record, x0, p), atol=1e-3)
