@@ -46,7 +46,7 @@ bench-discovery: $(READY) ## Judge 300 records with a hidden effect, rivals besi
 	@$(BIN)/python -m benchmarks.hidden_effects full $(BENCH_ARGS)
 
 bench-discovery-quick: $(READY) ## The same on the first 30 records (minutes)
-	@$(BIN)/python -m benchmarks.hidden_effects full --count 30 --method correlation --out results/hidden-effects-quick $(BENCH_ARGS)
+	@$(BIN)/python -m benchmarks.hidden_effects full --count 30 --method bic --method drift --out results/hidden-effects-quick $(BENCH_ARGS)
 
 bench-measured: $(READY) ## Discovery on measured records and shared examples in ../shared (minutes)
 	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)
