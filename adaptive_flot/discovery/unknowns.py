@@ -63,8 +63,7 @@ class Unknowns:
         self._range = np.array(low) / self.scale, np.array(high) / self.scale
         self._prior = np.where(unbound, np.inf, PRIOR_SCALES)
         self._prior_centre = np.array([p.value for p in parameters]) / self.scale
-        directions = np.zeros((len(self.x0), 0)) if like is None else like.directions
-        self.turn(np.vstack([directions, np.zeros((len(self.x0) - len(directions), directions.shape[1]))]))
+        self.turn(self._first_directions(like))
 
     def turn(self, directions: FloatArray) -> None:
         """Make these directions (nx, r) of the initial state the free ones."""
@@ -82,30 +81,36 @@ class Unknowns:
         if record.initial_state is not None and n == len(record.initial_state):
             return record.initial_state
         if like is not None:
-            known = like.initial_state
-        else:
-            guess = np.array([self.model.initial_guess.get(s.name, s.scale) for s in self.model.states])
-            if not self.model.starts_steady:
-                return guess
-            try:
-                known = steady_state(self.model, record.inputs[0], self.base).state
-            except RangeError:
-                return guess
-        if len(known) == n:
-            return known.copy()
-        return self._settled_filters(known)
+            return self._settled_filters(dict(zip(like.model.names("states"), like.initial_state, strict=True)))
+        guess = np.array([self.model.initial_guess.get(s.name, s.scale) for s in self.model.states])
+        if not self.model.starts_steady:
+            return guess
+        try:
+            return steady_state(self.model, record.inputs[0], self.base).state
+        except RangeError:
+            return guess
 
-    def _settled_filters(self, known: FloatArray) -> FloatArray:
-        """Initial state with the states of new effects where they are at rest beside the known ones."""
-        record, nx = self.problem.record, len(self.model.states)
-        x = np.concatenate([known, np.ones(nx - len(known))])
-        new = slice(len(known), nx)
+    def _first_directions(self, like: Fit | None) -> FloatArray:
+        """Free directions of the initial state of a fit (nx, r), in the states that the model has in common with it."""
+        if like is None:
+            return np.zeros((len(self.x0), 0))
+        rows = dict(zip(like.model.names("states"), like.directions, strict=True))
+        nothing = np.zeros(like.directions.shape[1])
+        return np.array([rows.get(name, nothing) for name in self.model.names("states")])
+
+    def _settled_filters(self, known: Mapping[str, float]) -> FloatArray:
+        """Initial state with the states of new effects where they are at rest beside the known ones, by name."""
+        record, names = self.problem.record, self.model.names("states")
+        x = np.array([known.get(name, 1.0) for name in names])
+        new = [i for i, name in enumerate(names) if name not in known]
+        if not new:
+            return x
         arguments = record.time[0], x, record.inputs[0], self.base
         slope = np.array(self.model.ode.factory("slope", ["t", "x", "u", "p"], ["jac:xdot:x"])(*arguments))
         rate = np.array(self.model.ode(*arguments)[0]).ravel()
         if not (np.isfinite(slope).all() and np.isfinite(rate).all()):
             return x  # the run from here will not be finite either, and is told so
-        x[new] -= np.linalg.lstsq(slope[new, new], rate[new], rcond=None)[0]
+        x[new] -= np.linalg.lstsq(slope[np.ix_(new, new)], rate[new], rcond=None)[0]
         return x
 
     def unpack(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.descent import SHARES, Descent
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.problem import Problem, make_problem
+from adaptive_flot.discovery.simplify import simpler
 from adaptive_flot.discovery.unknowns import Unknowns
+from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.processes import flotation
 from tests.discovery.heated import EXPONENT, heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")
@@ -53,6 +61,57 @@ def test_a_start_that_is_far_too_large_still_comes_to_the_truth(base: tuple[Prob
     found = Fitter(problem).fit(model, (EXPONENT_NAME,), {EXPONENT_NAME: start}, fit, shrink=(EXPONENT_NAME,))
     assert found is not None
     assert dict(zip(found.names, found.values, strict=True))[EXPONENT_NAME] == pytest.approx(EXPONENT, abs=0.03)
+
+
+LATE = (
+    Effect("heating", "lag", "lag", {"amplitude": 1.0, "time_constant": 90.0}, {"scale": 1000.0}),
+    Effect("thermometer", "lag", "lag", {"amplitude": 1.0, "time_constant": 60.0}, {"scale": 300.0}),
+)
+
+
+@pytest.mark.parametrize("left", [(), (0,), (1,), (1, 0)])
+def test_a_fit_starts_from_one_with_more_effects(base: tuple[Problem, Fit], left: tuple[int, ...]) -> None:
+    """An effect that goes takes its states with it; those of the others keep their value, wherever they now stand."""
+    problem, fit = base
+    larger = fit.model.with_effects(LATE)
+    values = 300.0 + np.arange(len(larger.states))
+    like = replace(fit, model=larger, initial_state=values, directions=np.diag(values))
+    smaller = fit.model.with_effects([LATE[k] for k in left])
+    unknowns = Unknowns(problem, smaller, (), {}, like, {})
+    of_larger = dict(zip(larger.names("states"), values, strict=True))
+    expected = [of_larger[name] for name in smaller.names("states")]
+    np.testing.assert_array_equal(unknowns.x0, expected)
+    np.testing.assert_array_equal(unknowns.directions.sum(axis=1), expected)
+    assert Fitter(problem).fit(smaller, like=like, rounds=1, steps=1) is not None
+
+
+def test_a_dependence_with_a_state_can_be_tried_as_a_constant() -> None:
+    """What depends on the concentrate grade follows it through a state, which a constant does not have."""
+    cell = flotation.make_model()
+    adapted = tuple(p.name for p in cell.parameters if p.role == "estimated")
+    held = np.array([[2.0e-3, 1.7e-4, 0.36], [1.5e-3, 1.7e-4, 0.36], [1.8e-3, 2.0e-4, 0.38]])
+    inputs = np.repeat(held, 120, axis=0)
+    x0 = steady_state(cell, inputs[0], cell.parameter_values).state
+    blank = Dataset("cell", np.arange(1.0, 361.0), 1.0, inputs, np.zeros((360, len(cell.outputs))))
+    clean = RecordSimulator(cell, 1.0).outputs(blank, x0, cell.parameter_values)
+    noise = 1e-3 * np.ptp(clean, axis=0) * np.random.default_rng(0).standard_normal(clean.shape)
+    problem = make_problem(replace(blank, outputs=clean + noise), cell, adapted, burn_in=10, guard=2)
+    fitter = Fitter(problem)
+    fit = fitter.fit(cell, rounds=1, steps=2)
+    assert fit is not None
+    effects = [
+        Effect("floatability_valuable", "grade", "power", settings={"reference": 0.2}),
+        Effect("gas_slip", "constant", "shift"),
+    ]
+    model = fit.model.with_effects(effects)
+    assert len(model.states) == len(cell.states) + 1
+    names = tuple(e.parameter(c.name) for e in effects for c in e.terms)
+    both = fitter.fit(model, names, like=fit, rounds=1, steps=1)
+    assert both is not None
+    alternative = Alternative(tuple((e.site, e.driver) for e in effects), (True, True), both, 0.0, 0.0)
+    (found,) = simpler(fitter, fit, alternative)
+    assert found.names == (("floatability_valuable", "constant"), ("gas_slip", "constant"))
+    assert len(found.fit.model.states) == len(cell.states) == len(found.fit.initial_state)
 
 
 def test_a_settled_fit_is_no_worse_and_stays(base: tuple[Problem, Fit]) -> None:
