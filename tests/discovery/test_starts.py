@@ -18,6 +18,7 @@ from adaptive_flot.discovery.simplify import simpler
 from adaptive_flot.discovery.unknowns import Unknowns
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.processes import flotation
@@ -74,7 +75,7 @@ def test_a_fit_starts_from_one_with_more_effects(base: tuple[Problem, Fit], left
     """An effect that goes takes its states with it; those of the others keep their value, wherever they now stand."""
     problem, fit = base
     larger = fit.model.with_effects(LATE)
-    values = 300.0 + np.arange(len(larger.states))
+    values: FloatArray = np.arange(300.0, 300.0 + len(larger.states))
     like = replace(fit, model=larger, initial_state=values, directions=np.diag(values))
     smaller = fit.model.with_effects([LATE[k] for k in left])
     unknowns = Unknowns(problem, smaller, (), {}, like, {})
