@@ -22,7 +22,7 @@ from adaptive_flot.studies.sweep import sweep
 from tests.studies.conftest import WriteStudy
 
 PROGRAM = str(Path(sys.executable).with_name("adaptive-flot"))
-SEEDS = 32
+SEEDS = 16
 PATIENCE_S = 120.0
 # a run takes a while on any machine, so that a kill falls into the middle of the study
 SLOW = """
@@ -36,6 +36,11 @@ class Slow(Fixed):
 """
 
 
+def _heed_interrupts() -> None:
+    """As in a terminal: tests that a shell runs in the background, as CI may, inherit that SIGINT is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 class Sweep:
     """A sweep as a process of its own."""
 
@@ -43,7 +48,13 @@ class Sweep:
         self.out = folder / "out"
         command = [PROGRAM, "sweep", "study.yaml", "--out", "out", *options]
         self.process = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+            command,
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=_heed_interrupts,
         )
 
     def done(self) -> list[str]:
@@ -68,7 +79,7 @@ class Sweep:
 
 @pytest.fixture
 def slow(write_study: WriteStudy, tmp_path: Path) -> Path:
-    """Folder of a study of 32 runs that take at least 0.2 s each."""
+    """Folder of a study of 16 runs that take at least 0.2 s each."""
     (tmp_path / "slow.py").write_text(SLOW)
     write_study({"estimators": {"slow": {"use": "slow:Slow"}}, "seeds": {"count": SEEDS}})
     return tmp_path
