@@ -37,7 +37,7 @@ class EffectCurve:
     change, low, high
         The change and its 95 % band (K,), linearised in the coefficients.
     seen
-        Values of the driver along the record (N - 1,).
+        Values of the driver on the rows from the first that any share has.
     anchor
         Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
         adapted parameters; None where it can.
@@ -62,7 +62,8 @@ def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, 
     if not wanted:
         return ()
     series, values = _series(problem, fit)
-    return tuple(_curve(fit, e, series[e.driver], values[e.site]) for e in wanted)
+    first = max(problem.first_row - 1, 0)  # the series begin at the second row
+    return tuple(_curve(fit, e, series[e.driver][first:], values[e.site]) for e in wanted)
 
 
 def _series(problem: Problem, fit: Fit) -> tuple[dict[str, FloatArray], dict[str, float]]:

@@ -82,6 +82,11 @@ class Problem:
         mask: BoolArray = np.isin(self.blocks, shares) if shares else self.blocks != ""
         return mask
 
+    @property
+    def first_row(self) -> int:
+        """First row of any share; those before are left out, since the initial state is not known."""
+        return int(np.argmax(self.rows()))
+
     def spans(self, share: str) -> tuple[tuple[float, float], ...]:
         """First and last time [s] of each contiguous part of a share."""
         inside = np.concatenate([[False], self.rows(share), [False]]).astype(int)

@@ -124,14 +124,18 @@ def _curve_picture(found: Discovery, problem: Problem, after: Fit, album: Album)
 
 
 def _before_after(found: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
-    time, panels = problem.record.time, []
+    shown, panels = slice(problem.first_row, None), []
+    time = problem.record.time[shown]
     for j, c in enumerate(problem.columns):
         q = found.model.outputs[c]
-        traces = [Trace("before", time, before.residual(problem)[:, j], Role.CONSTANT)]
+        traces = [Trace("before", time, before.residual(problem)[shown, j], Role.CONSTANT)]
         if after is not before:
-            traces.append(Trace("after", time, after.residual(problem)[:, j], Role.ESTIMATE))
+            traces.append(Trace("after", time, after.residual(problem)[shown, j], Role.ESTIMATE))
         panels.append(Panel(f"{tables.words(q.name)}: residual", q.unit, tuple(traces), height=0.8))
-    caption = "Measured minus free run over the whole record, without and with the effect."
+    caption = (
+        "Measured minus free run, without and with the effect, but for the first rows, which are left out because the "
+        "initial state is not known."
+    )
     return album.add(figures.time_figure(panels), caption, "Residual of each output over time, before and after")
 
 
@@ -146,13 +150,14 @@ def _telling(found: Discovery, problem: Problem) -> list[int]:
 def _residuals(found: Discovery, problem: Problem, j: int, album: Album) -> Picture:
     q = found.model.outputs[problem.columns[j]]
     assert found.before is not None and found.after is not None  # called with a search at hand
-    std = found.after.noise.stationary_std()[j] * problem.weights[:, j]
+    shown = slice(problem.first_row, None)
+    std = found.after.noise.stationary_std()[j] * problem.weights[shown, j]
     rows = []
     fits = [("before", found.before), ("after", found.after)] if found.after is not found.before else []
     for k, (label, fit) in enumerate(fits or [("model as it is", found.before)]):
         p = found.verdict.tests.get(f"ljung_box_{'after' if label == 'after' else 'before'}_{q.name}", float("nan"))
         role = Role.CONSTANT if k == 0 else Role.ESTIMATE
-        rows.append(Residuals(label, role, 0, problem.record.time, fit.residual(problem)[:, j] / std, p))
+        rows.append(Residuals(label, role, 0, problem.record.time[shown], fit.residual(problem)[shown, j] / std, p))
     caption = (
         f"{tables.words(q.name)}: free-run residual over the standard deviation of the noise, its autocorrelation with "
         "the band of white noise, and its histogram."

@@ -157,6 +157,8 @@ def test_the_curve_shows_the_shape_where_a_constant_is_an_adapted_parameter(drau
     assert draught.problem is not None and draught.after is not None
     (curve,) = effect_curves(draught.problem, draught.after, 1)
     assert curve.anchor is not None
+    first = draught.problem.first_row
+    np.testing.assert_array_equal(curve.seen, draught.problem.record.inputs[first:, 1])  # not what was left out
     truth = (curve.driver / curve.anchor) ** 0.6
     assert np.all(curve.low <= curve.high) and np.max(curve.high - curve.low) < 0.1
     assert np.mean((curve.low - 1e-9 <= truth) & (truth <= curve.high + 1e-9)) > 0.9
