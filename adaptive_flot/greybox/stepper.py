@@ -109,18 +109,14 @@ class Stepper:
 
     def one_step_jacobians(self, wrt: Sequence[str]) -> ca.Function:
         """Return `(x, t, u, p) -> (x_next, y, dx_dx, dx_dtheta, dy_dx, dy_dtheta)`, exact, in forward mode."""
-
-        def make() -> ca.Function:
-            x, t, u, p = self._symbols()
-            nx, q = x.numel(), len(wrt)
-            moved = ca.horzcat(ca.SX.eye(nx), ca.SX(nx, q))
-            seeds = ca.horzcat(ca.DM(p.numel(), nx), self._parameter_seeds(wrt))
-            end, y = self._along(moved, seeds)
-            blocks = [m.along[:, columns] for m in (end, y) for columns in (slice(0, nx), slice(nx, nx + q))]
-            names = ["x", "t", "u", "p"], ["x_next", "y", "dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"]
-            return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, {"cse": True})
-
-        return self._kept(("jacobians", *wrt), make)
+        x, t, u, p = self._symbols()
+        nx, q = x.numel(), len(wrt)
+        moved = ca.horzcat(ca.SX.eye(nx), ca.SX(nx, q))
+        seeds = ca.horzcat(ca.DM(p.numel(), nx), self._parameter_seeds(wrt))
+        end, y = self._along(moved, seeds)
+        blocks = [m.along[:, columns] for m in (end, y) for columns in (slice(0, nx), slice(nx, nx + q))]
+        names = ["x", "t", "u", "p"], ["x_next", "y", "dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"]
+        return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, {"cse": True})
 
     def simulate(
         self, x0: FloatArray, inputs: FloatArray, parameters: FloatArray | None = None, t0: float = 0.0
