@@ -178,6 +178,7 @@ def discover(
             "default where the record has been."
         ),
     ] = None,
+    report: Annotated[bool, typer.Option(help="Draw the report page too; a batch of records may do without.")] = True,
 ) -> None:
     """Find what physical effect a model lacks, from a measured record, and show the error before and after."""
     from adaptive_flot.console import print_discovery, stage_bar
@@ -200,6 +201,8 @@ def discover(
     if save_model is not None:
         saved = save_discovered(found, data, save_model, base=model, cell=cell, folder=data.parent)
         typer.echo(f"Model: {save_model}" if saved else f"Model: {save_model} not written, nothing was fitted")
+    if not report:
+        return
     from adaptive_flot.report.discovery import write_discovery_report
 
     write_discovery_report(found, data.stem, folder / "report.html", command=_command())

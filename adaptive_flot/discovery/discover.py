@@ -20,7 +20,7 @@ from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
 from adaptive_flot.discovery.locate import locate
 from adaptive_flot.discovery.noise import proportional
-from adaptive_flot.discovery.pace import with_nodes
+from adaptive_flot.discovery.pace import at_every_row, placements, with_nodes
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
 from adaptive_flot.discovery.search import Search, search
 from adaptive_flot.discovery.signals import input_range
@@ -155,29 +155,40 @@ def discover(
 def _prepare(
     record: Dataset, model: Model, adapted: tuple[str, ...], cycle: Sequence[str]
 ) -> tuple[Problem, Fit] | None:
-    """Split the record and fit the model as it is, twice: the first residual shows how the noise grows."""
+    """Split the record and fit the model as it is, twice: the first residual shows how the noise grows.
+
+    Rows that make no difference are left out of the runs: first to the model as it came, then to the first fit.
+    """
     burn_in = min(BURN_IN_ROWS, len(record) // 20)
     problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS, cycle=cycle)
-    first = Fitter(problem).fit(model, rounds=1)
+    start = Fitter(problem).fit(model, rounds=0)
+    if start is None:
+        return None
+    placed = placements(record)
+    problem = with_nodes(problem, start, placed)
+    first = Fitter(problem).fit(model, like=start, rounds=1)
     if first is None:
         return None
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
-    problem = problem.with_weights(proportional(seen, first.predicted))
+    problem = with_nodes(problem.with_weights(proportional(seen, first.predicted)), first, placed)
     fitter = Fitter(problem)
     base = fitter.fit(first.model, like=first, rounds=2)
     if base is None:
         return None
-    base = fitter.settled(base)
-    return with_nodes(problem, base), base
+    return problem, fitter.settled(base)
 
 
 def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:
-    fitter = Fitter(replace(problem, nodes=None), ("estimate", "confirm"))
-    before = fitter.with_intervals(fitter.fit(base.model, like=base, rounds=2) or base)
-    if best is None:
-        return before, before
-    after = fitter.fit(best.fit.model, best.fit.names, like=best.fit, rounds=2) or best.fit
-    return before, fitter.with_intervals(after)
+    """Fits to all rows but the report share, run at every row: of the model as it is, and of the best alternative."""
+    shares = ("estimate", "confirm")
+    fitter, every = Fitter(problem, shares), Fitter(replace(problem, nodes=None), shares)
+
+    def final(fit: Fit) -> Fit:
+        again = fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit
+        return every.with_intervals(at_every_row(fitter, again, {}))
+
+    before = final(base)
+    return before, before if best is None else final(best.fit)
 
 
 def on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tuple[Problem, Fit, Fit]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,8 @@ from adaptive_flot.discovery.descent import is_smooth
 from adaptive_flot.discovery.fit import Fit, loss_of
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.problem import Problem
-from adaptive_flot.greybox.nodes import place_nodes
+from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.nodes import Nodes, place_nodes
 from adaptive_flot.greybox.record import RecordSimulator
 
 LONGEST = (6, 4, 3, 2)
@@ -43,17 +44,24 @@ def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, flo
     return Fitter(every, fitter.share).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
 
 
-def with_nodes(problem: Problem, fit: Fit) -> Problem:
-    """The problem with the fewest nodes at which a fit's free run (at all rows) stays what it is, if there are any."""
-    record = problem.record
-    noise = 1.4826 * np.nanmedian(np.abs(np.diff(fit.residual(problem) / problem.weights, axis=0)), axis=0) / np.sqrt(2)
-    size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
+def placements(record: Dataset) -> list[Nodes]:
+    """Nodes that are tried, the fewest first."""
     placed = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
-    for nodes in sorted(placed, key=lambda nodes: len(nodes.rows)):
-        if len(nodes.rows) > WORTHWHILE * len(record):
-            break
+    fewest_first = sorted(placed, key=lambda nodes: len(nodes.rows))
+    return [nodes for nodes in fewest_first if len(nodes.rows) <= WORTHWHILE * len(record)]
+
+
+def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes]) -> Problem:
+    """The problem with the first of some nodes at which a fit's run stays what it is at every row, if there are any."""
+    record, every = problem.record, replace(problem, nodes=None)
+    run = RecordSimulator(fit.model, record.dt)
+    exact = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
+    difference = np.diff((problem.measured - exact) / problem.weights, axis=0)
+    noise = 1.4826 * np.nanmedian(np.abs(difference), axis=0) / np.sqrt(2)
+    size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
+    for nodes in placed:
         run = RecordSimulator(fit.model, record.dt, nodes)
         free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
-        if np.sum(((free - fit.predicted) / size) ** 2) < UNNOTICED:
+        if np.sum(((free - exact) / size) ** 2) < UNNOTICED:
             return replace(problem, nodes=nodes)
-    return problem
+    return every

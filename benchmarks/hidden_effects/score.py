@@ -18,7 +18,8 @@ from benchmarks.hidden_effects.tables import print_run, print_side_by_side
 def discover_command() -> str:
     """Command template of the product that is installed beside this interpreter."""
     script = Path(sys.executable).with_name("adaptive-flot")
-    options = "--json {json} --processes 1 --out results/hidden-effects-last"  # the records themselves run side by side
+    # the records themselves run side by side, and nobody looks at their pages
+    options = "--json {json} --processes 1 --no-report --out results/hidden-effects-last"
     return f"{shlex.quote(str(script))} discover {{record}} {options}"
 
 

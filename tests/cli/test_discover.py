@@ -32,6 +32,15 @@ def test_a_record_that_says_too_little_gets_a_verdict_a_report_and_no_model(
     assert not (tmp_path / "m.yaml").exists() and "nothing was fitted" in result.out
 
 
+def test_without_a_page_the_verdict_is_the_same(call: Call, table: WriteTable, tmp_path: Path) -> None:
+    assert call("discover", table(), "--out", "with").code == 0
+    result = call("discover", table(), "--out", "without", "--no-report")
+    assert result.code == 0 and "report" not in result.out.lower()
+    assert {f.name for f in (tmp_path / "without").iterdir()} == {"verdict.json"}
+    one, other = (json.loads((tmp_path / k / "verdict.json").read_text()) for k in ("with", "without"))
+    assert {**one, "seconds": 0} == {**other, "seconds": 0}
+
+
 @pytest.mark.parametrize(
     ("more", "says"),
     [
