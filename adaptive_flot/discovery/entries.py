@@ -20,6 +20,8 @@ MOST_COURSES = 3
 """Curves in time that are tried as events."""
 BENT = 0.3
 """A dependence is surely not flat when to flatten it costs this share of all it gained."""
+ADDS = 0.05
+"""A dependence that adds less than this share to the gain of the constant at its site is fitted again from there."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,27 @@ def constants(scorer: Scorer, fitted: list[Alternative]) -> list[tuple[Score, Fi
         shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
         found[site] = replace(shift, start={"amplitude": float(np.mean(values))}), a.fit
     return list(found.values())
+
+
+def unbent(constant: Run, fitted: list[Run], scorer: Scorer) -> list[Job]:
+    """Dependences that hardly gained more than a constant at the same site: fits to start from the constant.
+
+    The constant is a special case of each, so that one which ends no better may have come to rest elsewhere. `scorer`
+    tells the usual value at the site, by which an offset is a relative change.
+    """
+    effect, reached = constant.alternative.effects[-1], constant.alternative
+    if effect.driver != "constant":
+        return []
+    jobs = []
+    for run in fitted:
+        own = run.alternative.effects[-1]
+        if own.site != effect.site or own.driver in STATELESS_DRIVERS:
+            continue
+        if run.alternative.gain < (1 + ADDS) * reached.gain:
+            level = effect.coefficients["amplitude"] * scorer.in_mode(effect.site, effect.mode, own.mode)
+            start = {c.name: level if c.name.startswith(("value", "amplitude")) else 0.0 for c in own.terms}
+            jobs.append(Job(constant.lane, replace(run.score, start=start), reached.fit))
+    return jobs
 
 
 def _bend(fit: Fit, effect: Effect) -> float:

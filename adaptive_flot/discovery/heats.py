@@ -23,6 +23,7 @@ from adaptive_flot.discovery.entries import (
     is_curve,
     more_freedom,
     step,
+    unbent,
 )
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
@@ -63,7 +64,8 @@ def refit(
     first = heats.first()
     last = heats.last(first)
     followers = heats.followers(last)
-    found = best_of_each([*heats.steps(followers, last), *followers, *last, *first])
+    bent = heats.bent(followers, last)
+    found = best_of_each([*heats.steps(followers, last), *bent, *followers, *last, *first])
     ranked = [run.alternative for run in best_of_each([*heats.freed(found, last), *found])]
     exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
     return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
@@ -126,6 +128,11 @@ class _Heats:
             jobs += (Job(i, s, warm) for s, warm in constants(lane.scorer, own))
             jobs += (Job(i, s) for s in events(lane.scores, _close(own)))
         return self._run(jobs)
+
+    def bent(self, followers: list[Run], last: list[Run]) -> list[Run]:
+        """Dependences that came to no more than the constant at their site, which they contain: again, from there."""
+        ended = best_of_each(last)
+        return self._run([job for run in followers for job in unbent(run, ended, self.lanes[run.lane].scorer)])
 
     def steps(self, followers: list[Run], last: list[Run]) -> list[Run]:
         """Steps, which are simulated at every row: only where an event near the best came to be as short as one."""

@@ -51,15 +51,15 @@ def placements(record: Dataset) -> list[Nodes]:
     return [nodes for nodes in fewest_first if len(nodes.rows) <= WORTHWHILE * len(record)]
 
 
-def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes]) -> Problem:
-    """The problem with the first of some nodes at which a fit's run stays what it is at every row, if there are any."""
+def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes] | None = None) -> Problem:
+    """The problem with the first `placements` at which a fit's run stays what it is at every row, if there are any."""
     record, every = problem.record, replace(problem, nodes=None)
     run = RecordSimulator(fit.model, record.dt)
     exact = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
     difference = np.diff((problem.measured - exact) / problem.weights, axis=0)
     noise = 1.4826 * np.nanmedian(np.abs(difference), axis=0) / np.sqrt(2)
     size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
-    for nodes in placed:
+    for nodes in placements(record) if placed is None else placed:
         run = RecordSimulator(fit.model, record.dt, nodes)
         free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
         if np.sum(((free - exact) / size) ** 2) < UNNOTICED:

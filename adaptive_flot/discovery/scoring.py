@@ -91,6 +91,13 @@ class Scorer:
             at += len(v.courses)
         self._grams = {s.start: columns[:, s].T @ columns[:, s] for s in self._slices}
 
+    def in_mode(self, site: str, mode: str | None, wanted: str | None) -> float:
+        """Factor that turns a small change at a site, given in one mode (None: the site's own), into another mode."""
+        own = next(s.mode for s in self.fit.model.sites if s.name == site)
+        usual = float(np.median(np.abs(self._responses.site_values[site])))
+        given, found = (mode or own) == "offset", (wanted or own) == "offset"
+        return 1.0 if given == found else usual if found else 1 / max(usual, 1e-300)
+
     def _answers(self, courses: list[Course]) -> FloatArray:
         """Weighted answers to r courses on the rows of `_reached` (rows, m, r)."""
         return self._responses.of(courses, self._reached) / self.problem.weights[self._reached][:, :, None]

@@ -1,0 +1,95 @@
+"""A dependence contains the constant at its site: it may be started from there, and then says the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.attribute import Alternative, fit_variant
+from adaptive_flot.discovery.entries import ADDS, Run, unbent
+from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.fitter import Fitter
+from adaptive_flot.discovery.problem import Problem, make_problem
+from adaptive_flot.discovery.scoring import Score, Scorer
+from adaptive_flot.discovery.search import scorer_of
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.record import RecordSimulator
+from tests.discovery.heated import Truth, heated_tank, tank_record
+
+ADAPTED = ("efficiency", "loss")
+SITE = "thermometer"
+
+
+@pytest.fixture(scope="module")
+def scored() -> tuple[Problem, Fit, Scorer]:
+    """A record whose thermometer is off in its second half, and its scores."""
+    problem = make_problem(tank_record(Truth(exponent=0.0, offset=1.0)), heated_tank(), ADAPTED, burn_in=30, guard=5)
+    fit = Fitter(problem).fit(heated_tank())
+    assert fit is not None
+    return problem, fit, scorer_of(problem, fit)[0]
+
+
+def _run(base: Fit, score: Score, fit: Fit, gain: float) -> Run:
+    return Run(0, score, Alternative((score.candidate.name,), (True,), fit, gain, -gain))
+
+
+def _variants(scorer: Scorer, driver: str, mode: str | None) -> list[Score]:
+    candidate = next(c for c in scorer.candidates if c.name == (SITE, driver))
+    return [s for s in scorer.variant_scores(candidate) if s.variant.effect.mode == mode]
+
+
+def _fitted(problem: Problem, base: Fit, score: Score) -> Fit:
+    found = fit_variant(Fitter(problem), base, score, 16)
+    assert found is not None
+    return found
+
+
+def _run_of(problem: Problem, base: Fit, effect_of: Score, start: dict[str, float], at: Fit) -> FloatArray:
+    """Outputs with the start values of a job, all else being that of a fit."""
+    effect = replace(effect_of.variant.effect, coefficients=start)
+    values = dict(zip(at.names, map(float, at.values), strict=True))
+    model = base.model.with_parameters({n: values[n] for n in base.names}).with_effects([effect])
+    run = RecordSimulator(model, problem.record.dt)
+    found: FloatArray = run.outputs(problem.record, at.initial_state, model.parameter_values)[:, problem.columns]
+    return found
+
+
+@pytest.mark.parametrize("mode", [None, "factor"])
+def test_a_dependence_starts_as_the_constant_it_contains(scored: tuple[Problem, Fit, Scorer], mode: str | None) -> None:
+    """As an offset to rounding; as a factor to what the temperature moves around its usual value."""
+    problem, base, scorer = scored
+    (constant,) = _variants(scorer, "constant", None)[:1]
+    shift = _fitted(problem, base, constant)
+    curves = [s for s in _variants(scorer, "fan_speed", mode) if s.variant.effect.form == "curve"]
+    assert curves
+    rested = _run(base, curves[0], _fitted(problem, base, curves[0]), 0.0)
+    (job,) = unbent(_run(base, constant, shift, 100.0), [rested], scorer)
+    assert job.warm is shift
+    there = _run_of(problem, base, job.score, job.score.start, shift)
+    tolerance = 1e-9 if mode is None else 0.2 * abs(shift.model.fitted_effects()[-1].coefficients["amplitude"])
+    np.testing.assert_allclose(there, shift.predicted, rtol=0, atol=tolerance)
+
+
+def test_only_a_dependence_that_adds_nothing_starts_again(scored: tuple[Problem, Fit, Scorer]) -> None:
+    problem, base, scorer = scored
+    (constant,) = _variants(scorer, "constant", None)[:1]
+    shift = _fitted(problem, base, constant)
+    curve = next(s for s in _variants(scorer, "fan_speed", None) if s.variant.effect.form == "curve")
+    fit = _fitted(problem, base, curve)
+    reached = _run(base, constant, shift, 100.0)
+    assert unbent(reached, [_run(base, curve, fit, 100.0 * (1 + 1.01 * ADDS))], scorer) == []
+    assert len(unbent(reached, [_run(base, curve, fit, 100.0 * (1 + 0.99 * ADDS))], scorer)) == 1
+    assert unbent(_run(base, curve, fit, 100.0), [reached], scorer) == []  # what is no constant starts nothing
+    assert unbent(reached, [reached], scorer) == []
+
+
+@pytest.mark.parametrize(
+    ("mode", "wanted", "factor"), [(None, None, 1.0), (None, "factor", 1 / 300), ("factor", None, 300.0)]
+)
+def test_a_change_in_another_mode(
+    scored: tuple[Problem, Fit, Scorer], mode: str | None, wanted: str | None, factor: float
+) -> None:
+    """An offset of 1 K is a change by one part in about 300 of the temperature."""
+    assert scored[2].in_mode(SITE, mode, wanted) == pytest.approx(factor, rel=0.15)
