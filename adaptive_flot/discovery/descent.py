@@ -170,17 +170,13 @@ class Descent:
     def _tried(
         self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
     ) -> tuple[FloatArray, FloatArray, float, float] | None:
-        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next.
-
-        The next starts lower only where the first try was good: else it would spend a run on finding so again.
-        """
-        first = damping
+        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next."""
         while damping < MOST_DAMPING:
             trial = np.clip(z + step_of(damping), self.unknowns.lower, self.unknowns.upper)
             there = self._predict(trial)
             new = self._objective(trial, there, noise)
             if new < value:
-                return trial, there, new, max(damping / 10, LEAST_DAMPING) if damping == first else damping
+                return trial, there, new, max(damping / 10, LEAST_DAMPING)
             damping *= 10
         return None
 
