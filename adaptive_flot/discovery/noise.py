@@ -21,6 +21,9 @@ CLIP = 3.0
 _CLIPPED_VARIANCE = 0.99503
 """E[min(z^2, CLIP^2)] of a standard normal z."""
 MOST_LAGS = 3
+IMPULSE = np.eye(1, 501)[0]
+DIED_AWAY = 1e-12
+"""Answer to an impulse after 500 rows below which an autoregression is stable, without a look at its poles."""
 MEMORY = 2.0
 """Noise is at most this many times as large as its innovations: what is slower and smoother is no measurement noise but
 physics that is missing, and a noise model that may be as slow as it likes would explain it away."""
@@ -153,9 +156,10 @@ def _pulled(a: FloatArray, share: float) -> FloatArray:
 
 def _memory(a: FloatArray) -> float:
     """Standard deviation of an autoregression over that of its innovations; infinite when it is not stable."""
-    if np.max(np.abs(np.roots(np.concatenate([[1.0], -a])))) >= 1:
+    response = lfilter([1.0], np.concatenate([[1.0], -a]), IMPULSE)
+    last = np.max(np.abs(response[-len(a) :]))
+    if not last < DIED_AWAY and np.max(np.abs(np.roots(np.concatenate([[1.0], -a])))) >= 1:
         return float("inf")
-    response = lfilter([1.0], np.concatenate([[1.0], -a]), np.concatenate([[1.0], np.zeros(500)]))
     return float(np.sqrt(np.sum(response**2)))
 
 

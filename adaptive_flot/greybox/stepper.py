@@ -17,6 +17,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.compiled import compiled
@@ -25,8 +26,8 @@ from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
 
 IDAS_TOLERANCE = 1e-11
-CHUNK = 2000
-"""Rows a `mapaccum` call takes at once; longer records are cut, so memory does not grow with the record."""
+CHUNK = 64
+"""Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""
 
 
 @dataclass(frozen=True)
@@ -144,11 +145,11 @@ class Stepper:
         if self.accurate:
             return self._simulate_by_rows(x, u, p, t)
         parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        for rows in _chunks(len(u)):
-            accumulated = self._accumulated(self.step, (), rows.stop - rows.start, 1)
-            by_row = np.tile(p[:, None], rows.stop - rows.start) if p.ndim == 1 else p[rows].T
-            found = accumulated(x[:, None], t[None, rows], u[rows].T, by_row)
-            parts.append((found[0].T, found[1].T, found[2].T))
+        by_row = np.tile(p, (len(u), 1)) if p.ndim == 1 else p
+        for rows, count in _chunks(len(u)):
+            accumulated = self._accumulated(self.step, (), len(rows), 1)
+            found = accumulated(x[:, None], t[None, rows], u[rows].T, by_row[rows].T)
+            parts.append((found[0].T[:count], found[1].T[:count], found[2].T[:count]))
             x = parts[-1][0][-1]
         widths = (len(q) for q in (self.model.states, self.model.outputs, self.model.signals))
         xs, ys, ss = (np.vstack([np.empty((0, w)), *(part[i] for part in parts)]) for i, w in enumerate(widths))
@@ -188,13 +189,13 @@ class Stepper:
         function = self.sensitivity_step(tuple(wrt), q)
         ys: list[FloatArray] = []
         dys: list[FloatArray] = []
-        for rows in _chunks(len(u)):
-            count = rows.stop - rows.start
-            accumulated = self._accumulated(function, tuple(wrt), count, 2)
-            xs, gs, y, dy = accumulated(x[:, None], gradient, t[None, rows], u[rows].T, np.tile(p[:, None], count))
-            x, gradient = xs[:, -1], gs[:, -q:]
-            ys.append(y.T)
-            dys.append(dy.reshape(-1, count, q).transpose(1, 0, 2))
+        for rows, count in _chunks(len(u)):
+            accumulated = self._accumulated(function, tuple(wrt), len(rows), 2)
+            held = np.tile(p[:, None], len(rows))
+            xs, gs, y, dy = accumulated(x[:, None], gradient, t[None, rows], u[rows].T, held)
+            x, gradient = xs[:, count - 1], gs[:, (count - 1) * q : count * q]
+            ys.append(y.T[:count])
+            dys.append(dy.reshape(-1, len(rows), q).transpose(1, 0, 2)[:count])
         return Sensitivities(np.vstack(ys), np.concatenate(dys), x, gradient)
 
     def sensitivity_step(self, wrt: Sequence[str], unknowns: int | None = None) -> ca.Function:
@@ -278,8 +279,13 @@ class Stepper:
         return u, p, t0 + self.dt * np.arange(len(u), dtype=float)
 
 
-def _chunks(n: int) -> list[slice]:
-    return [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
+def _chunks(n: int) -> list[tuple[NDArray[np.intp], int]]:
+    """Rows of each call, equally many in all so that one function serves them, and how many of these count.
+
+    The last call repeats its last row.
+    """
+    size = math.ceil(n / max(1, math.ceil(n / CHUNK)))
+    return [(np.minimum(np.arange(i, i + size), n - 1), min(size, n - i)) for i in range(0, n, max(size, 1))]
 
 
 def _idas_step(model: Model, dt: float) -> ca.Function:

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 import jinja2
-from matplotlib.figure import Figure
 
-from adaptive_flot.report.style import data_uri
+if TYPE_CHECKING:  # what prints tables has no need of Matplotlib, which takes a while to load
+    from matplotlib.figure import Figure
 
 MINUS = "−"
 
@@ -56,6 +57,8 @@ class Album:
 
     def add(self, figure: Figure, caption: str, alt: str) -> Picture:
         """Embed a figure and give it the next number."""
+        from adaptive_flot.report.style import data_uri
+
         self.pictures.append(Picture(len(self.pictures) + 1, data_uri(figure), caption, alt))
         return self.pictures[-1]
 

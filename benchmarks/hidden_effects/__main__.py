@@ -50,20 +50,24 @@ def score(
     method: Annotated[str | None, typer.Option(help="A rival of this benchmark, by name.")] = None,
     label: Annotated[str | None, typer.Option(help="Name of the run; default the method or `discover`.")] = None,
     jobs: Jobs = 2,
-    timeout: Annotated[float, typer.Option(min=1.0, help="Seconds a record may take.")] = 300.0,
+    timeout: Annotated[float, typer.Option(min=1.0, help="Seconds a command may take for a record.")] = 300.0,
     count: Annotated[int | None, typer.Option(min=1, help="Only the first records.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the summary here too.")] = None,
 ) -> None:
     """Run a discover command (default: adaptive-flot discover) on every record and print how often it is right."""
     from benchmarks.hidden_effects.generate import load_answers
-    from benchmarks.hidden_effects.run import run_command
+    from benchmarks.hidden_effects.run import run_command, run_method
     from benchmarks.hidden_effects.score import discover_command, finish, method_command
 
     template = method_command(method) if method else (command or discover_command())
+    total = len(load_answers(folder, count))
     label = label or method or "discover"
     with progress() as bar:
-        task = bar.add_task(label, total=len(load_answers(folder, count)))
-        run_command(folder, label, template, jobs, timeout, lambda: bar.advance(task), count)
+        task = bar.add_task(label, total=total)
+        if method:
+            run_method(folder, method, label, template, jobs, lambda: bar.advance(task), count)
+        else:
+            run_command(folder, label, template, jobs, timeout, lambda: bar.advance(task), count)
     finish(folder, label, json, count)
 
 
@@ -74,7 +78,7 @@ def full(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the records.")] = 2026,
     method: Annotated[list[str] | None, typer.Option(help="Rivals (repeatable); default all.")] = None,
     jobs: Jobs = 2,
-    timeout: Annotated[float, typer.Option(min=1.0, help="Seconds a record may take.")] = 300.0,
+    timeout: Annotated[float, typer.Option(min=1.0, help="Seconds a command may take for a record.")] = 300.0,
 ) -> None:
     """Generate, run the product and its rivals, print all side by side."""
     from benchmarks.hidden_effects.rivals import RIVALS

@@ -14,8 +14,9 @@ import shlex
 import signal
 import subprocess
 import time
+import traceback
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +44,65 @@ def run_command(
         raise DataError(f"--command {command!r}: must hold {{record}} and {{json}}")
     run = folder / "runs" / label
     _claim(run, command)
+    with ThreadPoolExecutor(jobs) as pool:
+        todo = _left(folder, run, advance, count)
+        for future in as_completed([pool.submit(_one, folder, run, name, command, timeout) for name in todo]):
+            future.result()
+            advance()
+
+
+def run_method(
+    folder: Path, method: str, label: str, command: str, jobs: int, advance: Callable[[], None] = lambda: None,
+    count: int | None = None,
+) -> None:  # fmt: skip
+    """The same for a rival, of which `command` says how to run it alone: in processes that load the libraries once.
+
+    Raises
+    ------
+    DataError
+        Another command ran under this label.
+    """
+    run = folder / "runs" / label
+    _claim(run, command)
+    with ProcessPoolExecutor(jobs) as pool:
+        todo = _left(folder, run, advance, count)
+        for future in as_completed([pool.submit(_judged, folder, run, name, method) for name in todo]):
+            future.result()
+            advance()
+
+
+def _left(folder: Path, run: Path, advance: Callable[[], None], count: int | None) -> list[str]:
+    """Names of the records that have no verdict yet; `advance` is called for the others."""
     names = list(load_answers(folder, count))
     todo = [name for name in names if not (run / "verdicts" / f"{name}.meta.json").is_file()]
     for _ in range(len(names) - len(todo)):
         advance()
-    with ThreadPoolExecutor(jobs) as pool:
-        for future in as_completed([pool.submit(_one, folder, run, name, command, timeout) for name in todo]):
-            future.result()
-            advance()
+    return todo
+
+
+def _judged(folder: Path, run: Path, name: str, method: str) -> None:
+    """Judge one record with a rival and write how it ended."""
+    from benchmarks.hidden_effects.rivals import judge
+
+    begun, status, printed = time.perf_counter(), "ok", ""
+    out = run / "verdicts" / f"{name}.json"
+    out.unlink(missing_ok=True)
+    try:
+        judge(method, record_file(folder, name), out, answer_file(folder, name) if method == "oracle" else None)
+    except Exception:  # whatever a rival stumbles over on one record is an outcome of that record
+        status, printed = "crash", traceback.format_exc()
+    _ended(run, name, {"status": status, "exit": int(status != "ok"), "seconds": _since(begun)}, printed)
+
+
+def _since(begun: float) -> float:
+    return round(time.perf_counter() - begun, 3)
+
+
+def _ended(run: Path, name: str, meta: dict[str, Any], printed: str) -> None:
+    """Write how a record ended, and the end of what was printed if it did not end well."""
+    if meta["status"] != "ok":
+        write_text(run / "verdicts" / f"{name}.log", printed[-LOG_CHARACTERS:] + "\n")
+    write_text(run / "verdicts" / f"{name}.meta.json", json.dumps(meta) + "\n")
 
 
 def _claim(run: Path, command: str) -> None:
@@ -72,10 +124,7 @@ def _one(folder: Path, run: Path, name: str, command: str, timeout: float) -> No
     words = shlex.split(command)
     for key, path in paths.items():
         words = [word.replace(key, str(path)) for word in words]
-    meta, printed = _execute(words, timeout)
-    if meta["status"] != "ok":
-        write_text(run / "verdicts" / f"{name}.log", printed[-LOG_CHARACTERS:] + "\n")
-    write_text(run / "verdicts" / f"{name}.meta.json", json.dumps(meta) + "\n")
+    _ended(run, name, *_execute(words, timeout))
 
 
 def _execute(words: list[str], timeout: float) -> tuple[dict[str, Any], str]:
@@ -95,4 +144,4 @@ def _execute(words: list[str], timeout: float) -> tuple[dict[str, Any], str]:
         os.killpg(process.pid, signal.SIGKILL)
         printed, _ = process.communicate()
         status = "timeout"
-    return {"status": status, "exit": process.returncode, "seconds": round(time.perf_counter() - begun, 3)}, printed
+    return {"status": status, "exit": process.returncode, "seconds": _since(begun)}, printed

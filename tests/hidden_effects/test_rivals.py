@@ -1,5 +1,6 @@
 """Rivals write verdicts that can be scored; the oracle shows that an answer tells the whole truth."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from benchmarks.hidden_effects.outcome import classify
 from benchmarks.hidden_effects.results import removed_share
 from benchmarks.hidden_effects.rivals import RIVALS, bic, correlation, drift, judge, spline
 from benchmarks.hidden_effects.rivals.base import Prepared
+from benchmarks.hidden_effects.run import run_method
 from benchmarks.hidden_effects.verdict import Verdict, read_verdict
 
 
@@ -45,6 +47,32 @@ def test_a_rival_judges_a_file(folder: Path, tmp_path: Path) -> None:
     level = verdict.error["level_m"]
     std = load_answers(folder)["record_0000"]["noise"]["std"]["level_m"]
     assert level.before == pytest.approx(std, rel=0.3)
+
+
+def test_rivals_judge_a_folder_and_no_failure_stops_the_rest(folder: Path, tmp_path: Path) -> None:
+    """As one by one: a record that can not be read is a crash of its own, what is done is not done again."""
+    for part in ("records", "answers"):
+        (tmp_path / part).mkdir()
+    for name in ("record_0000", "record_0001"):
+        answer = json.loads(answer_file(folder, "record_0000").read_text())
+        answer_file(tmp_path, name).write_text(json.dumps(answer | {"record": name}))
+    pd.read_csv(record_file(folder, "record_0000")).iloc[:1400].to_csv(
+        record_file(tmp_path, "record_0000"), index=False
+    )
+    record_file(tmp_path, "record_0001").write_text("no,record\n")
+    run_method(tmp_path, "correlation", "mine", "the command", jobs=2)
+    verdicts = tmp_path / "runs" / "mine" / "verdicts"
+    metas = [json.loads((verdicts / f"record_000{k}.meta.json").read_text())["status"] for k in (0, 1)]
+    assert metas == ["ok", "crash"]
+    assert "Error" in (verdicts / "record_0001.log").read_text()
+    judge("correlation", record_file(tmp_path, "record_0000"), tmp_path / "alone.json")
+    one, other = read_verdict(verdicts / "record_0000.json"), read_verdict(tmp_path / "alone.json")
+    assert isinstance(one, Verdict) and one == other
+    record_file(tmp_path, "record_0000").unlink()
+    run_method(tmp_path, "correlation", "mine", "the command", jobs=2)  # nothing is left to do
+    assert json.loads((verdicts / "record_0000.meta.json").read_text())["status"] == "ok"
+    with pytest.raises(DataError, match="this label ran"):
+        run_method(tmp_path, "correlation", "mine", "another", jobs=1)
 
 
 def test_the_oracle_needs_the_answer(tmp_path: Path) -> None:
