@@ -91,10 +91,11 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
     return Built(dae, ode, decay, tuple(scope.sites.values()), site_values)
 
 
-def tangent(dae: ca.Function, decay: ca.Function, seeds: ca.DM) -> ca.Function:
+def tangent(ode: ca.Function, dae: ca.Function, decay: ca.Function, seeds: ca.DM) -> ca.Function:
     """The right-hand side and its derivatives along several directions: Jacobians, worked out once, times each.
 
     The directions of the parameters, `seeds` (np, q), are constants: as symbols they would triple the work of building.
+    The algebraic variable is solved for inside, as in `ode`: the solution and the derivatives have much in common.
     """
     t, x, u, p, z = dae.sx_in()
     dx = ca.SX.sym("dx", x.numel(), seeds.shape[1])
@@ -112,11 +113,13 @@ def tangent(dae: ca.Function, decay: ca.Function, seeds: ca.DM) -> ca.Function:
         change += ca.mtimes(ca.jacobian(both, z), dz)
     change = ca.densify(change)
     nx = x.numel()
+    results = [rates, y, decays, change[:nx, :], change[nx:-nx, :], change[-nx:, :]]
+    at_z = ca.Function("tangent_at", [t, x, u, p, z, dx], results)
     return ca.Function(
         "tangent",
-        [t, x, u, p, z, dx],
-        [rates, y, decays, change[:nx, :], change[nx:-nx, :], change[-nx:, :]],
-        ["t", "x", "u", "p", "z", "dx"],
+        [t, x, u, p, dx],
+        list(at_z(t, x, u, p, ode(t, x, u, p)[3], dx)),
+        ["t", "x", "u", "p", "dx"],
         ["xdot", "y", "decay", "dxdot", "dy", "ddecay"],
         {"cse": True},
     )

@@ -8,7 +8,6 @@ flotation cell (bubble swarms that leave the pulp within a second) would else as
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial
 
@@ -38,9 +37,8 @@ class Moving:
 
     def __mul__(self, other: Moving) -> Moving:
         """Elementwise product, by the product rule."""
-        q = self.along.shape[1]
-        along = [self.value * other.along[:, j] + self.along[:, j] * other.value for j in range(q)]
-        return Moving(self.value * other.value, _columns(along, self.value.numel()))
+        along = _scaled(self.value, other.along) + _scaled(other.value, self.along)
+        return Moving(self.value * other.value, along)
 
     def __rmul__(self, factor: float) -> Moving:
         return Moving(factor * self.value, factor * self.along)
@@ -91,12 +89,12 @@ def fast_step_along(
 
     def rates(time: ca.SX, state: Moving) -> tuple[Moving, Moving, Moving]:
         """Slope, outputs and decay rates."""
-        xdot, y, _, z = model.ode(time, state.value, u, p)
         if not q:
+            xdot, y, _, z = model.ode(time, state.value, u, p)
             decay = model.decay(time, state.value, u, p, z)
             return Moving(xdot, ca.SX(xdot.numel(), 0)), Moving(y, ca.SX(y.numel(), 0)), Moving(decay, state.along)
         # values and derivatives from one function, which has much in common
-        xdot, y, decay, *slopes = model.tangent(seeds)(time, state.value, u, p, z, state.along)
+        xdot, y, decay, *slopes = model.tangent(seeds)(time, state.value, u, p, state.along)
         return Moving(xdot, slopes[0]), Moving(y, slopes[1]), Moving(decay, slopes[2])
 
     def remainder(time: ca.SX, state: Moving, decay: Moving) -> Moving:
@@ -150,7 +148,7 @@ def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
         return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
     # each weight depends on its own decay rate only: one derivative serves all directions
     slopes = ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in weights])
-    moved = [_columns([d * h * decay.along[:, j] for j in range(q)], n) for d in slopes(h * decay.value, h)]
+    moved = [_scaled(d * h, decay.along) for d in slopes(h * decay.value, h)]
     return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
 
 
@@ -181,5 +179,6 @@ def closed_phi(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     return first, second, third, halved
 
 
-def _columns(columns: Sequence[ca.SX], n: int) -> ca.SX:
-    return ca.horzcat(*columns) if columns else ca.SX(n, 0)
+def _scaled(factors: ca.SX, along: ca.SX) -> ca.SX:
+    """Each row of a matrix (n, q) times its own factor (n,); q may be 0."""
+    return ca.repmat(factors, 1, along.shape[1]) * along if along.shape[1] else along

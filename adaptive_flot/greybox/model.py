@@ -43,7 +43,7 @@ class Model:
     ========= ============================================= ==========================================
     `dae`     t, x (nx,), u (nu,), p (np,), z (nz,)         dx/dt (nx,), residual (nz,), y (ny,), s (ns,)
     `ode`     t, x, u, p                                    dx/dt, y, s, z, with z solved inside
-    `tangent` t, x, u, p, z, dx (nx, q)                     dx/dt, y, decay; then their derivatives along (dx, seeds)
+    `tangent` t, x, u, p, dx (nx, q)                        dx/dt, y, decay; then their derivatives along (dx, seeds)
     `decay`   t, x, u, p, z                                 decay rate of each state (nx,), 0 where none is given
     ========= ============================================= ==========================================
 
@@ -229,7 +229,7 @@ class Model:
         """
         key = "tangent", seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros())
         if key not in self.kept:
-            self.kept[key] = tangent(self.dae, self.decay, seeds)
+            self.kept[key] = tangent(self.ode, self.dae, self.decay, seeds)
         return self.kept[key]
 
     @property
