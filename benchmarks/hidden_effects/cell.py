@@ -25,6 +25,7 @@ _AIR, _FEED, _FEED_GRADE, _BUBBLE, _SLIP, _BURST, _COALESCENCE, _EXPONENT, _RECO
 _CONCENTRATE, _FLOAT_1, _FLOAT_2, _VALVE = range(11, 15)
 _LEVEL_SENSOR, _DRAINAGE = INDEX["level_sensor"], INDEX["film_drainage"]
 Two = tuple[float, float]  # chalcopyrite, quartz
+_NOMINAL = [1.0] * len(SITES)
 _AXIAL = math.sqrt(math.sqrt(3.0) - math.pi / 2.0)
 
 
@@ -85,6 +86,21 @@ class World:
     def n_core(self) -> int:
         """Number of states before those of the effects."""
         return N_GAS + len(self.populations) * (2 if self.dead_share else 1)
+
+    @cached_property
+    def valuable(self) -> tuple[int, ...]:
+        """Which populations are chalcopyrite."""
+        return tuple(k for k, p in enumerate(self.populations) if p.mineral == 0)
+
+    @cached_property
+    def valuable_feed(self) -> float:
+        """Their feed concentration in all [kg/m3]."""
+        return sum(self.populations[k].feed for k in self.valuable)
+
+    @cached_property
+    def valve_acts(self) -> bool:
+        """Whether an effect is at the tails valve."""
+        return any(i.site == _VALVE for i in self.influences)
 
 
 class Froth(NamedTuple):
@@ -180,13 +196,13 @@ def evaluate(t: float, x: Sequence[float], u: Sequence[float], world: World, mem
     h_p, r, masses = x[1], x[2:N_GAS], x[N_GAS : N_GAS + count]
     depth = c.CELL_HEIGHT - h_p
     volume = (1.0 - world.dead_share) * c.AREA * h_p
-    valuable = sum(m for m, p in zip(masses, populations, strict=True) if p.mineral == 0) / volume
+    valuable = sum([masses[k] for k in world.valuable]) / volume
     signals = Signals(u[0], u[1], h_p, depth, math.nan, sum(masses) / volume, valuable)
     f, own = _factors(t, x[core:], signals, world, memory)
     q_air, q_feed = u[0] * f[_AIR], u[1] * f[_FEED]
     h_measured = h_p * f[_LEVEL_SENSOR]
     asked = c.LEVEL_GAIN * h_measured + x[0]
-    if f[_VALVE] == 1.0 and any(i.site == _VALVE for i in world.influences):  # a valve effect needs what is asked
+    if world.valve_acts and f[_VALVE] == 1.0:  # a valve effect needs what is asked
         signals = signals._replace(tails_asked=asked)
         f, own = _factors(t, x[core:], signals, world, memory)
     q_tails = asked * f[_VALVE]
@@ -208,7 +224,7 @@ def evaluate(t: float, x: Sequence[float], u: Sequence[float], world: World, mem
     for influence, states in zip(world.influences, own, strict=True):
         if influence.rates is not None:
             rates += influence.rates(t, signals, states, grade)
-    fed = sum(p.feed for p in populations if p.mineral == 0) * f[_FEED_GRADE] * q_feed
+    fed = world.valuable_feed * f[_FEED_GRADE] * q_feed
     air_recovery = z.alpha * z.v_gas * c.AREA / q_air
     return Instant(rates, grade, concentrate[0] / fed, air_recovery, h_measured, q_tails, z, signals, f)
 
@@ -216,6 +232,8 @@ def evaluate(t: float, x: Sequence[float], u: Sequence[float], world: World, mem
 def _factors(t: float, extra: Sequence[float], signals: Signals, world: World, memory: Sequence[list[float]]
              ) -> tuple[list[float], list[Sequence[float]]]:  # fmt: skip
     """Product of the multipliers of each site, and the slice of own states of each influence."""
+    if not world.influences:
+        return _NOMINAL, []
     f, own, at = [1.0] * len(SITES), [], 0
     for influence, held in zip(world.influences, memory, strict=True):
         states: Sequence[float] = held or extra[at : at + len(influence.start)]
