@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 from adaptive_flot.discovery.curve import EffectCurve
 from adaptive_flot.discovery.scoring import Score
 from adaptive_flot.report import style
+from adaptive_flot.report.figures import legend_above
 
 LEAST_SHOWN = 1e-4
 """Shares of the best candidate below this all look alike."""
@@ -90,13 +91,13 @@ def curve_figure(curves: Sequence[EffectCurve]) -> Figure:
             f"{'factor on' if c.relative else 'added to'}\n{_words(c.effect.site)} "
             f"[{style.unit_text(c.unit or '-', own)}]"
         )
-        ax.legend(loc="best", ncols=3)
         below.hist(seen, bins=60, range=(float(x[0]), float(x[-1])), color=style.CONSTANT)
         below.set_ylabel("rows")
         below.set_xlabel(f"{_words(c.effect.driver)} [{style.unit_text(c.driver_unit or '-', power)}]")
         for one in (ax, below):
             one.set_xlim(float(x[0]), float(x[-1]))
     figure.align_ylabels(list(grid[:, 0]))
+    legend_above(figure, list(grid[::2, 0]))
     return figure
 
 
