@@ -115,8 +115,9 @@ def rival(
     judge(name, record, json, answer)
 
 
-try:
-    app()
-except AdaptiveFlotError as error:
-    print(error, file=sys.stderr)
-    raise SystemExit(2) from None
+if __name__ == "__main__":  # a process of a pool may load this file under another name
+    try:
+        app()
+    except AdaptiveFlotError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(2) from None
