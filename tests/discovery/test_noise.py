@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from adaptive_flot.discovery.noise import (
     MEMORY,
     Noise,
+    _memory,
     clipped_std,
     correlation_times,
     fit_noise,
@@ -42,6 +43,19 @@ def test_an_autoregression_is_recovered_and_whitened(seed: int, a: float) -> Non
 def test_spread_of_an_autoregression_is_the_closed_form(a: float, expected: float) -> None:
     """Variance of x_k = a x_{k-1} + e: 1 / (1 - a^2)."""
     assert Noise(np.ones(1), np.array([[a, 0.0, 0.0]])).stationary_std()[0] == pytest.approx(expected, rel=1e-3)
+
+
+@given(poles=st.lists(st.floats(-1.3, 1.3), min_size=3, max_size=3))
+def test_memory_is_infinite_from_the_unit_circle_on(poles: list[float]) -> None:
+    """Whatever the answer to an impulse still shows; else the size is that of a longer answer."""
+    a = np.asarray(-np.poly(poles)[1:], dtype=np.float64)
+    reach = np.max(np.abs(poles))
+    assume(abs(reach - 1) > 1e-3)
+    if reach > 1:
+        assert _memory(a) == np.inf
+    else:
+        longer = lfilter([1.0], np.concatenate([[1.0], -a]), np.eye(1, 100_000)[0])
+        assert _memory(a) == pytest.approx(np.sqrt(np.sum(longer**2)), rel=0.3 if reach > 0.99 else 1e-3)
 
 
 def test_a_slow_wave_is_not_called_noise() -> None:
