@@ -201,12 +201,14 @@ def discover(
     if save_model is not None:
         saved = save_discovered(found, data, save_model, base=model, cell=cell, folder=data.parent)
         typer.echo(f"Model: {save_model}" if saved else f"Model: {save_model} not written, nothing was fitted")
+    page = folder / "report.html"
     if not report:
+        page.unlink(missing_ok=True)  # that of an earlier verdict
         return
     from adaptive_flot.report.discovery import write_discovery_report
 
-    write_discovery_report(found, data.stem, folder / "report.html", command=_command())
-    typer.echo(f"Report: {folder / 'report.html'}")
+    write_discovery_report(found, data.stem, page, command=_command())
+    typer.echo(f"Report: {page}")
 
 
 @app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift --out results/comparison")

@@ -34,6 +34,8 @@ def test_a_record_that_says_too_little_gets_a_verdict_a_report_and_no_model(
 
 def test_without_a_page_the_verdict_is_the_same(call: Call, table: WriteTable, tmp_path: Path) -> None:
     assert call("discover", table(), "--out", "with").code == 0
+    (tmp_path / "without").mkdir()
+    (tmp_path / "without" / "report.html").write_text("of an earlier verdict")
     result = call("discover", table(), "--out", "without", "--no-report")
     assert result.code == 0 and "report" not in result.out.lower()
     assert {f.name for f in (tmp_path / "without").iterdir()} == {"verdict.json"}
