@@ -1,7 +1,7 @@
 """The menu of truths: what may act where, what it depends on, its sign, its shapes and how far it may go.
 
-Effects known in flotation (DISCOVERY.md, "Sites and drivers") plus a disturbance for every site; amplitude signs
-follow the physics where they have one (0 = either).
+Effects known in flotation (sites and drivers as a metallurgist would list them) plus a disturbance for every site;
+amplitude signs follow the physics where they have one (0 = either).
 """
 
 from __future__ import annotations

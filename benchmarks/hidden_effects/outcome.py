@@ -6,7 +6,7 @@
 | right_class   | the truth is in a class of at most three                                                |
 | right_place   | unnamed, with the right site and driver                                                 |
 | part          | one of two effects named, none wrong                                                    |
-| tolerated     | neither right nor wrong: a drift of C called an effect on C over time, a failing sensor |
+| tolerated     | neither right nor wrong: a drift called an effect on n or C over time, a failing sensor |
 | vague         | a class with the truth, but of more than three; unnamed at another place                |
 | abstained     | `insufficient` or `abstain` where there was more to say; a command that refused (exit 2) |
 | missed        | `none` where an effect is                                                               |

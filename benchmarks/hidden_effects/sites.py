@@ -1,4 +1,4 @@
-"""Names and indices of the sites and drivers, as `DISCOVERY.md` lists them, and of a few sites that nobody lists."""
+"""Names and indices of the sites and drivers, and of a few sites that no list of known effects has."""
 
 from __future__ import annotations
 

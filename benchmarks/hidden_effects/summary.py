@@ -45,7 +45,7 @@ def rate(what: str, hit: pd.Series, asked: str = "") -> Rate:
 
 
 def rates(table: pd.DataFrame) -> list[Rate]:
-    """The figures of DISCOVERY.md, then those that explain them."""
+    """The figures that are asked for, then those that explain them."""
     outcome, category = table["outcome"], table["category"]
     hidden = category.isin(["single", "pair", "beyond"])
     controls = category.isin(["none", "drift"])

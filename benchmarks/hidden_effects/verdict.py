@@ -1,4 +1,4 @@
-"""The verdict a discover command writes (DISCOVERY.md, "Machine-readable verdict"), as far as a score needs it."""
+"""The verdict a discover command writes (`--json`), as far as a score needs it."""
 
 from __future__ import annotations
 

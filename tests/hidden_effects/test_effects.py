@@ -42,7 +42,7 @@ def test_effects_of_size_zero_are_the_nominal_cell(site: str, short: Experiment,
 
 
 def test_the_catalogue_has_every_site_and_driver() -> None:
-    """DISCOVERY.md's lists, without which no figure of the benchmark speaks for all of them."""
+    """The lists of sites and drivers, without which no figure of the benchmark speaks for all of them."""
     assert {e.site for e in CATALOGUE} == set(LISTED_SITES)
     assert {e.driver for e in CATALOGUE} == set(DRIVERS)
 
