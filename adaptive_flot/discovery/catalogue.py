@@ -54,9 +54,11 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     taken = {(e.site, e.driver) for e in model.effects}
     time = responses.problem.record.time
     found = []
+    signals = {s.name for s in model.signals} - set(model.late_drivers)
     for site in model.sites:
+        unknown = signals - set(site.signals)  # defined further down: no effect here can depend on it
         for driver in ("constant", "time", *responses.drivers, "lag", "delay", "saturation"):
-            if (site.name, driver) in taken or not _makes_sense(site, driver):
+            if (site.name, driver) in taken or driver in unknown or not _makes_sense(site, driver):
                 continue
             variants = tuple(_variants(site, driver, time, responses))
             if site.role == "sensor" and driver not in DYNAMIC_DRIVERS:
@@ -150,7 +152,10 @@ def event(site: Site, form: str, time: FloatArray, onset: float, length: float, 
 def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states: Sequence[str]) -> Iterator[Variant]:
     reference = float(np.median(values))
     spread = float(np.quantile(values, 0.98) - np.quantile(values, 0.02))
-    if not (reference > 0 and spread > LEAST_RANGE * reference):
+    if not reference > 0:
+        yield from _on_signed(site, driver, values, offset)
+        return
+    if not spread > LEAST_RANGE * reference:
         return
     ones = np.ones(len(values))
     logs = np.log(np.maximum(values / reference, 1e-6))
@@ -162,6 +167,17 @@ def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states
         yield _curve(site, driver, values, knots, offset)
     if site.role == "flow" and driver in states:
         yield from _spills(site, driver, values)
+
+
+def _on_signed(site: Site, driver: str, values: FloatArray, offset: bool) -> Iterator[Variant]:
+    """A straight line and a curve over a signal that is off most of the time, or changes its sign: no power law."""
+    low, high = (float(q) for q in np.quantile(values, [0.02, 0.98]))
+    if not high - low > LEAST_RANGE * float(np.mean(np.abs(values))):
+        return
+    yield _curve(site, driver, values, (low, high), offset)
+    knots = _knots(values)
+    if knots is not None:
+        yield _curve(site, driver, values, knots, offset)
 
 
 def _spills(site: Site, driver: str, values: FloatArray) -> Iterator[Variant]:
@@ -183,11 +199,13 @@ def _knots(values: FloatArray) -> tuple[float, ...] | None:
 
 
 def finer(variant: Variant, start: Mapping[str, float]) -> tuple[Variant, dict[str, float]] | None:
-    """The same curve with more knots, and the start values that draw the coarse one; None for other forms."""
+    """The same curve with more knots, and the start values that draw the coarse one; None for others and for a line."""
     effect = variant.effect
     if effect.form != "curve":
         return None
     coarse = [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
+    if len(coarse) == 2:
+        return None
     count = FINE_TIME_KNOTS if effect.driver == "time" else FINE_KNOTS
     knots = tuple(float(k) for k in np.linspace(coarse[0], coarse[-1], count))
     values = spline_values(np.array(knots), coarse) @ [start[f"value_{k + 1}"] for k in range(len(coarse))]

@@ -11,7 +11,7 @@ from typing import cast
 import numpy as np
 
 from adaptive_flot.discovery.fit import Fit, loss_of
-from adaptive_flot.discovery.noise import Noise
+from adaptive_flot.discovery.noise import Noise, noise_by_differences
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.discovery.unknowns import Unknowns
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -28,6 +28,8 @@ TOLERANCE = 0.1
 """A step that improves minus two log-likelihood by less ends the search: a fortieth of what any test asks for."""
 SLOW = 2e-3
 """Or one that improves it by less than this share of what the search has gained so far."""
+FAR_OFF = 0.05
+"""A run is far off when no larger a share of the measurements is within what the first steps look at."""
 KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
 constant change more."""
@@ -90,7 +92,7 @@ class Descent:
         predicted, slope = self._jacobian(z)
         if not (np.isfinite(predicted).all() and _moderate(slope)):
             return None
-        noise, exact = self._first_noise(), True
+        noise, exact = self._first_noise(predicted), True
         for turn in range(rounds):
             if not exact:
                 predicted, slope = self._derived(z, predicted, slope)
@@ -122,14 +124,21 @@ class Descent:
 
     def _white_std(self) -> FloatArray:
         """Noise by differencing: it needs no model."""
-        weighted = self.problem.measured / self.problem.weights
-        d = np.diff(weighted, axis=0)
-        found = np.array([np.nanmedian(np.abs(c)) * 1.4826 / np.sqrt(2) for c in d.T])
+        found = noise_by_differences(self.problem.measured / self.problem.weights)
         return cast(FloatArray, np.maximum(np.nan_to_num(found), self.problem.floor))
 
-    def _first_noise(self) -> Noise:
-        """White, and large: the first steps must not be steered by what a wrong model leaves."""
-        return Noise(np.maximum(3 * self._white_std(), self.problem.floor), np.zeros((len(self.problem.columns), 1)))
+    def _first_noise(self, predicted: FloatArray | None = None) -> Noise:
+        """White, and large: the first steps must not be steered by what a wrong model leaves.
+
+        As large as the error itself where a prediction is so far off that next to nothing would count.
+        """
+        std = np.maximum(3 * self._white_std(), self.problem.floor)
+        if predicted is not None:
+            off = np.abs((self.problem.measured - predicted) / self.problem.weights)[self.rows]
+            seen = np.isfinite(off)
+            if np.sum(off[seen] <= (self.problem.clip * std * np.ones_like(off))[seen]) < FAR_OFF * seen.sum():
+                std = np.maximum(std, np.nan_to_num(np.nanmedian(off, axis=0)))
+        return Noise(std, np.zeros((len(self.problem.columns), 1)))
 
     def _descend(
         self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise, steps: int
@@ -198,13 +207,15 @@ class Descent:
 
     def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
         """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
-        size = np.diag(A) + 1e-12 * np.max(np.diag(A))
+        size = np.diag(A) + 1e-12 * np.max(np.diag(A), initial=0.0)
         at_lower = (z <= self.unknowns.lower) & (b < 0)
         at_upper = (z >= self.unknowns.upper) & (b > 0)
         move = ~(at_lower | at_upper)
 
         def step(damping: float) -> FloatArray:
             found = np.zeros(len(b))
+            if not A.any():
+                return found  # the record says nothing of any unknown
             system = A[np.ix_(move, move)] + damping * np.diag(size[move])
             found[move] = np.linalg.solve(system, b[move])
             return found

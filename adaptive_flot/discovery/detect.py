@@ -46,16 +46,19 @@ class Symptom:
         p value of whiteness (Ljung-Box, of the residual itself).
     inputs
         p value of independence of the past of each input, by name; of the whitened residual.
+    follows
+        Inputs of which it is not independent.
     onset_s
         Time at which the mean of the residual changes most; None when it does not (moving sums of the residual itself).
     shows
-        Whether any of the tests rejects, by Holm's procedure over all outputs.
+        Whether any of the tests rejects; by Holm's procedure over all tests of all outputs, as `follows` and `onset_s`.
     """
 
     output: str
     size: float
     white: float
     inputs: dict[str, float]
+    follows: tuple[str, ...]
     onset_s: float | None
     shows: bool
 
@@ -63,8 +66,7 @@ class Symptom:
         if not self.shows:
             return f"{self.output}: nothing beyond noise (residual {self.size:.2f} x the noise)"
         said = f"{self.output}: residual {self.size:.1f} x the noise"
-        after = [name for name, p in self.inputs.items() if p < LEVEL]
-        said += f", follows {', '.join(after)}" if after else ""
+        said += f", follows {', '.join(self.follows)}" if self.follows else ""
         return said + (f", which changes most at about {self.onset_s:.0f} s" if self.onset_s is not None else "")
 
 
@@ -91,6 +93,7 @@ class Detection:
                 "residual_over_noise": s.size,
                 "ljung_box": s.white,
                 "independence": s.inputs,
+                "follows": list(s.follows),
                 "onset_s": s.onset_s,
             }
             for s in self.symptoms
@@ -113,11 +116,10 @@ def detect(problem: Problem, base: Fit) -> Detection:
     symptoms = []
     for name, size, white_p, inputs, (_, onset) in found:
         whole = next(rejected)
-        by_input = [next(rejected) for _ in inputs]
+        follows = tuple(n for n, rejects in [(n, next(rejected)) for n in inputs] if rejects)
         changed = next(rejected)
-        symptoms.append(
-            Symptom(name, size, white_p, inputs, onset if changed else None, whole or any(by_input) or changed)
-        )
+        shows = whole or bool(follows) or changed
+        symptoms.append(Symptom(name, size, white_p, inputs, follows, onset if changed else None, shows))
     return Detection(tuple(symptoms))
 
 

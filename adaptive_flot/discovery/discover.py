@@ -19,12 +19,12 @@ from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
 from adaptive_flot.discovery.locate import locate
-from adaptive_flot.discovery.noise import proportional
-from adaptive_flot.discovery.pace import at_every_row, placements, with_nodes
-from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem, make_problem
+from adaptive_flot.discovery.pace import at_every_row
+from adaptive_flot.discovery.prepare import prepare, shared
+from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.search import Search, search
 from adaptive_flot.discovery.signals import input_range
-from adaptive_flot.discovery.verdict import LEAST_MARGIN, Judgement, NamedEffect, Verdict, disputed, judge
+from adaptive_flot.discovery.verdict import LEAST_MARGIN, Judgement, NamedEffect, Verdict, disputed, held_up, judge
 from adaptive_flot.discovery.verify import changes, whiteness
 from adaptive_flot.discovery.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
@@ -32,9 +32,6 @@ from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.record import RecordSimulator
-
-BURN_IN_ROWS = 30
-GUARD_ROWS = 5
 
 
 @dataclass(frozen=True)
@@ -115,7 +112,10 @@ def discover(
     if checked.reasons:
         return Discovery(_insufficient(checked, began), model, checked)
     progress("fit the model as it is")
-    prepared = _prepare(checked.record, model, names, CYCLE if report_record is None else WITHOUT_REPORT)
+    problem, checked = shared(checked, model, names, CYCLE if report_record is None else WITHOUT_REPORT)
+    if checked.reasons:
+        return Discovery(_insufficient(checked, began), model, checked)
+    prepared = prepare(problem, model)
     if prepared is None:
         reason = f"the model can not simulate the record: check the units of its columns and the model '{model.name}'"
         checked = replace(checked, reasons=(reason,))
@@ -131,10 +131,10 @@ def discover(
     if wants_joint(problem, found):
         problem, found = search_jointly(problem, found, processes=processes, progress=progress)
         base = found.base
-    if rivals := disputed(found):
+    if problem.whiten and (rivals := disputed(found)):
         progress("grant each what is left")
         found = contest(problem, found, rivals, processes)
-    judgement = judge(found)
+    found, judgement = held_up(problem, found, judge(found))
     progress("fit once more, without the report share")
     before, after = _final(problem, base, judgement.best)
     verdict = _verdict(problem, checked, found, judgement, before, after, report_record)
@@ -150,32 +150,6 @@ def discover(
     extended = after.model if judgement.word in ("named", "class", "unnamed") else before.model
     verdict = replace(verdict, seconds=time.perf_counter() - began)
     return Discovery(verdict, extended, checked, problem, found, judgement, before, after)
-
-
-def _prepare(
-    record: Dataset, model: Model, adapted: tuple[str, ...], cycle: Sequence[str]
-) -> tuple[Problem, Fit] | None:
-    """Split the record and fit the model as it is, twice: the first residual shows how the noise grows.
-
-    Rows that make no difference are left out of the runs: first to the model as it came, then to the first fit.
-    """
-    burn_in = min(BURN_IN_ROWS, len(record) // 20)
-    problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS, cycle=cycle)
-    start = Fitter(problem).fit(model, rounds=0)
-    if start is None:
-        return None
-    placed = placements(record)
-    problem = with_nodes(problem, start, placed)
-    first = Fitter(problem).fit(model, like=start, rounds=1)
-    if first is None:
-        return None
-    seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
-    problem = with_nodes(problem.with_weights(proportional(seen, first.predicted)), first, placed)
-    fitter = Fitter(problem)
-    base = fitter.fit(first.model, like=first, rounds=2)
-    if base is None:
-        return None
-    return problem, fitter.settled(base)
 
 
 def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:

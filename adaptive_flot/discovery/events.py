@@ -22,8 +22,9 @@ POINTS = 300
 ONSETS = 60
 DURATIONS = (0.03, 0.08, 0.15, 0.25, 0.4, 0.6)
 """Durations of ramps and washouts that are tried, as shares of the record."""
-SLOW_S = 120.0
-"""A change over at least this long is a drift; of an adapted parameter, that is what adaptation is there to follow."""
+SLOW_S, SLOW_ROWS = 120.0, 50
+"""A change over at least this long, and so many rows, is a drift; of an adapted parameter, that is what adaptation is
+there to follow. Over fewer rows a record can not tell it from a step."""
 LARGE = 0.4
 """Change of a logarithm (a factor of 1.5) beyond any drift that adaptation is known to follow: a quarter."""
 SUDDEN = 0.03
@@ -114,25 +115,25 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
     return Variant(curve, (), names), dict(zip(names, map(float, values), strict=True))
 
 
-def slow(effect: Effect) -> bool:
+def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
     """Whether a course in time is a drift, and not an event: a ramp that lasts, or a curve with even knots.
 
-    Such a curve is an event after all where it changes much, and half of that at once.
+    Such a curve is an event after all where it changes much, and half of that at once: in less than `shortest` [s].
     """
     if effect.form == "curve":
         knots = np.atleast_1d(np.asarray(effect.settings["knots"], dtype=float))
         gaps = np.diff(knots)
-        return bool(np.ptp(gaps) < 1e-3 * np.max(gaps)) and not _jumps(effect, knots)
-    return effect.form == "ramp" and effect.coefficients["duration"] >= SLOW_S
+        return bool(np.ptp(gaps) < 1e-3 * np.max(gaps)) and not _jumps(effect, knots, shortest)
+    return effect.form == "ramp" and effect.coefficients["duration"] >= shortest
 
 
-def _jumps(effect: Effect, knots: FloatArray) -> bool:
+def _jumps(effect: Effect, knots: FloatArray, shortest: float) -> bool:
     """Whether a curve changes by a large factor, half of all it ever changes in a short time."""
     t = np.linspace(knots[0], knots[-1], POINTS)
     values = spline_values(t, [float(k) for k in knots]) @ [
         effect.coefficients.get(f"value_{k + 1}", 0.0) for k in range(len(knots))
     ]
-    ahead = max(1, round(SLOW_S / float(t[1] - t[0])))
+    ahead = max(1, round(shortest / float(t[1] - t[0])))
     whole = float(np.ptp(values))
     return whole > LARGE and bool(np.max(np.abs(values[ahead:] - values[:-ahead]), initial=0.0) > whole / 2)
 

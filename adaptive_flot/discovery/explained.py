@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.problem import Problem
+from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 
@@ -29,11 +29,11 @@ RIDGE = 1e-2
 def nothing_explained(problem: Problem, fit: Fit) -> str | None:
     """Why the record can not be judged when no input explains any output; None when one does."""
     names = [fit.model.outputs[c].name for c in problem.columns]
-    rows = problem.rows("confirm", "report")
+    rows = problem.rows("confirm")
     by_model = _shares(problem.measured[rows], fit.predicted[rows])
     if np.max(by_model) >= LEAST_EXPLAINED:
         return None
-    by_regression = regression_shares(problem.record, problem.columns)
+    by_regression = regression_shares(problem.record, problem.columns, problem.rows("report"))
     if np.max(by_regression) >= LEAST_EXPLAINED:
         return None
     best = int(np.argmax(by_regression))
@@ -45,13 +45,17 @@ def nothing_explained(problem: Problem, fit: Fit) -> str | None:
     )
 
 
-def regression_shares(record: Dataset, columns: tuple[int, ...]) -> FloatArray:
+def regression_shares(record: Dataset, columns: tuple[int, ...], unseen: BoolArray | None = None) -> FloatArray:
     """Share of the variance (m,) that filtered inputs explain, by cross-validation over contiguous blocks.
+
+    Measurements of the rows (N,) that are `unseen` take no part.
 
     The larger of two: of the output itself, and of its faster part, in which a slow process that wanders far shows what
     moves it.
     """
     X, Y = _filtered(record), record.outputs[:, columns]
+    if unseen is not None:
+        Y = np.where(unseen[:, None], np.nan, Y)
     found: FloatArray = np.maximum(_validated(X, Y), _validated(_fast(X), _fast(Y)))
     return found
 

@@ -21,6 +21,7 @@ from adaptive_flot.discovery.joint_fits import (
     discount,
     discounted,
 )
+from adaptive_flot.discovery.noise import noise_by_differences
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.search import (
     LEAST_EVIDENCE,
@@ -49,8 +50,7 @@ def dominated(problem: Problem, fit: Fit) -> bool:
     """Whether the error of a fit outweighs the noise by far; noise by differences, which needs no model."""
     rows = problem.rows("estimate")
     error = np.sqrt(np.nanmean(fit.residual(problem)[rows] ** 2, axis=0))
-    d = np.diff(problem.measured, axis=0)
-    noise = 1.4826 * np.nanmedian(np.abs(d), axis=0) / np.sqrt(2)
+    noise = np.nan_to_num(noise_by_differences(problem.measured))
     return bool(np.any(error > DOMINATES * np.maximum(noise, problem.floor)))
 
 
@@ -98,7 +98,7 @@ def search_jointly(
         reference = best.alternatives[0].fit if best else base
         if table.alternatives[0].fit.bic < reference.bic - LEAST_EVIDENCE:
             best = table
-    if best is None:
+    if best is None or not _better(plain, base, best.alternatives[0].fit, found, together):
         return problem, found
     progress("confirm")
     chosen_fit = best.alternatives[0].fit
@@ -106,7 +106,25 @@ def search_jointly(
     checked = verify(seen, *(cross_validated(plain, fit, processes) for fit in (base, chosen_fit)))
     checked = replace(checked, where="by cross-validation, on rows that also helped to choose the effects")
     left = _left(plain, chosen_fit, together)
-    return plain, Search(base, tuple(tables), best.alternatives, checked, left, LEAST_EVIDENCE, found.adapted_sites)
+    return plain, replace(
+        found,
+        base=base,
+        rounds=tuple(tables),
+        alternatives=best.alternatives,
+        verification=checked,
+        left=left,
+        left_threshold=LEAST_EVIDENCE,
+        together=1.0,
+    )
+
+
+def _better(problem: Problem, base: Fit, joint: Fit, found: Search, together: float) -> bool:
+    """Whether effects that were found at once beat what one after the other came to, fitted to the same rows."""
+    if not found.alternatives:
+        return True
+    one = found.alternatives[0].fit
+    again = Fitter(problem).fit(one.model, one.names, like=one, rounds=2, steps=LAST_STEPS)
+    return again is None or joint.bic < discount(problem, again, together).bic - LEAST_EVIDENCE
 
 
 def _left(problem: Problem, fit: Fit, together: float) -> float:

@@ -20,6 +20,8 @@ SECOND_LAG = 0.5
 LEAST_FOLLOW_S = 2.0
 """Time constant of a valve that has come loose; where rows are further apart, their distance."""
 DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
+LONGEST_DELAY = 0.2
+"""Longest dead time that is tried, as a share of the record."""
 LIMIT_QUANTILES = (0.6, 0.75, 0.9)
 """An actuator is scored with a limit at these quantiles of what is asked of it."""
 LIMIT_WIDTH = 0.01
@@ -58,14 +60,14 @@ def _moves(v: FloatArray) -> bool:
 
 def _asked(site: Site, responses: Responses) -> tuple[FloatArray, float]:
     """What is asked of an actuator, or comes to a sensor (N,), and its typical size."""
-    v = responses.site_values[site.name]
-    return v, float(np.median(np.abs(v))) or 1.0
+    return responses.site_values[site.name], responses.usual(site.name) or 1.0
 
 
 def _delayed(site: Site, responses: Responses) -> Iterator[Variant]:
     v, scale = _asked(site, responses)
     effect = Effect(site.name, "delay", "delay", settings={"scale": scale})
-    for dead_time in DELAYS_S:
+    time = responses.problem.record.time
+    for dead_time in (d for d in DELAYS_S if d <= LONGEST_DELAY * (time[-1] - time[0])):
         rows = max(1, round(dead_time / responses.problem.record.dt))
         delayed = np.concatenate([np.full(rows, v[0]), v[:-rows]])
         yield Variant(effect, (Course(site.name, delayed - v, True),), ("amplitude",), (("dead_time", dead_time),))

@@ -49,11 +49,16 @@ class Noise:
     lags: FloatArray
 
     def whiten(self, series: FloatArray) -> FloatArray:
-        """Whitened series over the innovation's standard deviation; series (N, m) or (N, m, q), weighted already."""
+        """Whitened series over the innovation's standard deviation; series (N, m) or (N, m, q), weighted already.
+
+        A value that is missing takes those with it that look back to it, whether or not this noise does, so that fits
+        with different noise models count the same rows; not where an output is too sparse for any but white noise.
+        """
         white = series.copy()
         for j, lags in enumerate(self.lags):
+            spreads = series.ndim == 2 and is_dense(series[:, j])
             for i, lag in enumerate(lags):
-                if lag or series.ndim == 2:  # a value that is missing takes those with it that look back to it
+                if lag or spreads:
                     white[i + 1 :, j] -= lag * series[: -(i + 1), j]
             white[:, j] /= self.std[j]
         return white
@@ -74,6 +79,36 @@ def with_rows_before(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     for lag in range(1, MOST_LAGS + 1):
         found[:-lag] |= rows[lag:]
     return found
+
+
+def is_dense(series: FloatArray) -> bool:
+    """Whether a series (N,), NaN where missing, has values whose past is measured: enough of them, and most."""
+    present = np.isfinite(series)
+    after = present[MOST_LAGS:].copy()
+    for lag in range(1, MOST_LAGS + 1):
+        after &= present[MOST_LAGS - lag : len(present) - lag]
+    pairs = int(after.sum())
+    return pairs >= FEWEST_PAIRS and pairs > 0.5 * int(present.sum())
+
+
+def noise_by_differences(series: FloatArray) -> FloatArray:
+    """Standard deviation of the noise of each column (m,) of a series (N, m) that is else smooth: it needs no model.
+
+    From one row to the next, or, of an output that is measured more rarely, from one value to the next. Robust, unless
+    most differences are zero: a coarse resolution shows in the others only. NaN of fewer than two values.
+    """
+    found = []
+    for r in series.T:
+        d = np.diff(r)
+        d = d[np.isfinite(d)]
+        if len(d) < FEWEST_PAIRS:
+            d = np.diff(r[np.isfinite(r)])
+        if not d.size:
+            found.append(np.nan)
+            continue
+        robust = 1.4826 * float(np.median(np.abs(d)))
+        found.append((robust or float(np.sqrt(np.mean(d**2)))) / np.sqrt(2))
+    return np.array(found)
 
 
 def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
@@ -123,7 +158,7 @@ def _one_output(r: FloatArray, rows: NDArray[np.bool_]) -> tuple[float, FloatArr
     past = np.column_stack([np.concatenate([np.full(i + 1, np.nan), clipped[: -(i + 1)]]) for i in range(MOST_LAGS)])
     usable = rows & np.isfinite(r) & np.isfinite(past).all(axis=1)
     count = int(usable.sum())
-    if count < FEWEST_PAIRS:
+    if count < FEWEST_PAIRS or not is_dense(r):
         return first, nothing
     best, chosen = np.inf, (first, nothing)
     for order in range(MOST_LAGS + 1):

@@ -10,6 +10,7 @@ import numpy as np
 from adaptive_flot.discovery.descent import is_smooth
 from adaptive_flot.discovery.fit import Fit, loss_of
 from adaptive_flot.discovery.fitter import Fitter
+from adaptive_flot.discovery.noise import noise_by_differences
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.nodes import Nodes, place_nodes
@@ -56,12 +57,13 @@ def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes] | None = None
     record, every = problem.record, replace(problem, nodes=None)
     run = RecordSimulator(fit.model, record.dt)
     exact = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
-    difference = np.diff((problem.measured - exact) / problem.weights, axis=0)
-    noise = 1.4826 * np.nanmedian(np.abs(difference), axis=0) / np.sqrt(2)
+    noise = noise_by_differences((problem.measured - exact) / problem.weights)
     size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
     for nodes in placements(record) if placed is None else placed:
         run = RecordSimulator(fit.model, record.dt, nodes)
         free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
-        if np.sum(((free - exact) / size) ** 2) < UNNOTICED:
+        with np.errstate(over="ignore", invalid="ignore"):  # a longer step may run off
+            noticed = float(np.sum(((free - exact) / size) ** 2))
+        if noticed < UNNOTICED:
             return replace(problem, nodes=nodes)
     return every

@@ -118,6 +118,11 @@ class Responses:
         self.drivers = {name: table[name] for name in names if not name.startswith(own)}
         self.site_values = {s.name: values[j] for j, s in enumerate(model.sites)}
 
+    def usual(self, site: str) -> float:
+        """Typical size of the value at a site: the median, or the mean of what is off most of the time."""
+        size = np.abs(self.site_values[site])
+        return float(np.median(size)) or float(np.mean(size))
+
     def _nuisance(self) -> FloatArray:
         directions = self.fit.directions
         n, r = len(self.problem.record), directions.shape[1]

@@ -13,7 +13,7 @@ import numpy as np
 
 from adaptive_flot.discovery.catalogue import ONSETS, Candidate, event
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.noise import CLIP, Noise, with_rows_before, without_spikes
+from adaptive_flot.discovery.noise import CLIP, Noise, noise_by_differences, with_rows_before, without_spikes
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.responses import Course, Responses
 from adaptive_flot.discovery.variant import Variant
@@ -94,7 +94,7 @@ class Scorer:
     def in_mode(self, site: str, mode: str | None, wanted: str | None) -> float:
         """Factor that turns a small change at a site, given in one mode (None: the site's own), into another mode."""
         own = next(s.mode for s in self.fit.model.sites if s.name == site)
-        usual = float(np.median(np.abs(self._responses.site_values[site])))
+        usual = self._responses.usual(site)
         given, found = (mode or own) == "offset", (wanted or own) == "offset"
         return 1.0 if given == found else usual if found else 1 / max(usual, 1e-300)
 
@@ -104,7 +104,7 @@ class Scorer:
 
     @staticmethod
     def _prior(offset: bool, responses: Responses, site: str) -> float:
-        return PRIOR_SHARE * (float(np.median(np.abs(responses.site_values[site]))) if offset else 1.0)
+        return PRIOR_SHARE * (responses.usual(site) if offset else 1.0)
 
     def _project(self, e: FloatArray) -> FloatArray:
         projected: FloatArray = e - self._base @ (self._base.T @ e)
@@ -119,9 +119,7 @@ class Scorer:
             if v.effect.form in ("shift", "power") or (v.effect.form == "curve" and v.effect.driver == "time"):
                 wanted += list(range(at, at + len(v.courses)))
             at += len(v.courses)
-        d = np.diff(residual, axis=0)
-        std = np.array([1.4826 * np.nanmedian(np.abs(c)) / np.sqrt(2) for c in d.T])
-        std = np.maximum(np.nan_to_num(std), self.problem.floor)
+        std = np.maximum(np.nan_to_num(noise_by_differences(residual)), self.problem.floor)
         r = residual[self.rows] / std
         present = np.isfinite(r)
         inside = self.rows[self._reached]

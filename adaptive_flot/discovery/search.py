@@ -10,6 +10,7 @@ import numpy as np
 from adaptive_flot.discovery.attribute import SHORTLIST, Alternative, shortlist
 from adaptive_flot.discovery.catalogue import catalogue
 from adaptive_flot.discovery.entries import Lane
+from adaptive_flot.discovery.events import SLOW_ROWS, SLOW_S
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.heats import refit
@@ -81,6 +82,8 @@ class Search:
         Innovations of the best alternative that tell one story: evidence counts once for so many.
     granted
         Site and driver of what the leading alternatives were granted when they were compared, if anything.
+    slow_s
+        Seconds from which a change of an adapted parameter is a drift.
     """
 
     base: Fit
@@ -92,6 +95,7 @@ class Search:
     adapted_sites: tuple[str, ...]
     together: float = 1.0
     granted: tuple[str, str] | None = None
+    slow_s: float = SLOW_S
 
 
 def search(
@@ -134,7 +138,8 @@ def search(
             break
         beam = _beam(rounds[-1], best, BEAM)
         rounds.append(_round(problem, fitter, base, [scorer], beam, processes, progress))
-    return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites), accepted)
+    slow_s = max(SLOW_S, SLOW_ROWS * problem.record.dt)
+    return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites, slow_s=slow_s), accepted)
 
 
 def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
@@ -147,7 +152,7 @@ def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
     far = [abs(v / own[n] - 1) > NEAR for n, v in zip(names, base.values, strict=False) if own[n]]
     if not any(far) or not nominal.starts_steady:
         return None
-    bounds = {n: (v * (1 - NEAR), v * (1 + NEAR)) for n, v in own.items()}
+    bounds = {n: (v - NEAR * abs(v), v + NEAR * abs(v)) for n, v in own.items() if v}
     return fitter.fit(nominal, bounds=bounds, rounds=2)
 
 
@@ -245,7 +250,7 @@ def better(problem: Problem, base: Fit, before: Alternative | None, found: Round
     if not found.alternatives:
         return False
     best, reference = found.alternatives[0], before.fit if before else base
-    if best.fit.bic > reference.bic - found.threshold:
+    if not best.fit.bic <= reference.bic - found.threshold:
         return False
     return before is None or _excess(problem, reference, best.fit) > SUBSTANCE * _excess(problem, base, best.fit)
 

@@ -78,10 +78,10 @@ class Unknowns:
 
     def _first_state(self, like: Fit | None) -> FloatArray:
         record, n = self.problem.record, len(self.model.states)
-        if record.initial_state is not None and n == len(record.initial_state):
-            return record.initial_state
         if like is not None:
             return self._settled_filters(dict(zip(like.model.names("states"), like.initial_state, strict=True)))
+        if record.initial_state is not None and n == len(record.initial_state):
+            return record.initial_state
         guess = np.array([self.model.initial_guess.get(s.name, s.scale) for s in self.model.states])
         if not self.model.starts_steady:
             return guess

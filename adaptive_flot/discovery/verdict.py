@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from adaptive_flot.discovery.attribute import Alternative
@@ -11,8 +11,9 @@ from adaptive_flot.discovery.detect import Detection
 from adaptive_flot.discovery.events import slow
 from adaptive_flot.discovery.experiment import Experiment
 from adaptive_flot.discovery.locate import Location
+from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.search import Search
-from adaptive_flot.discovery.verify import SURE, OutputChange
+from adaptive_flot.discovery.verify import SURE, OutputChange, verify
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 
 Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
@@ -174,7 +175,7 @@ def judge(found: Search) -> Judgement:
     rivals = _others(found, best)
     # a drift of what is adapted is the ordinary explanation: what is hardly better does not replace it
     alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * found.together)
-    drifting = next((a for a in alike if _only_drift(a, found.adapted_sites)), None)
+    drifting = next((a for a in alike if _only_drift(a, found)), None)
     if drifting:
         return Judgement("none", drifting, (), _others(found, drifting), margin)
     if not named:
@@ -192,6 +193,17 @@ def judge(found: Search) -> Judgement:
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
+
+
+def held_up(problem: Problem, found: Search, judged: Judgement) -> tuple[Search, Judgement]:
+    """The judgement, confirmed for what it names: a search confirms the best alternative, which may have no name."""
+    best = judged.best
+    if best is None or best is found.alternatives[0] or judged.word not in ("named", "class") or not problem.whiten:
+        return found, judged
+    checked = verify(problem, found.base, best.fit)
+    if checked.confirmed:
+        return replace(found, verification=checked), judged
+    return found, Judgement("abstain", found.alternatives[0], (), judged.rivals, judged.margin)
 
 
 def disputed(found: Search) -> tuple[Alternative, ...]:
@@ -231,7 +243,7 @@ def _only_adds_to(a: Alternative, b: Alternative) -> bool:
     return site == where and constant == "constant" and signal and b.fit.loss - a.fit.loss < LEAST_MARGIN
 
 
-def _only_drift(a: Alternative, adapted: tuple[str, ...]) -> bool:
+def _only_drift(a: Alternative, found: Search) -> bool:
     """Whether adapted parameters that change slowly are all there is; a change at an onset is an event with a cause."""
-    in_time = all(site in adapted and driver == "time" for site, driver in a.names)
-    return in_time and all(slow(e) for e in a.effects)
+    in_time = all(site in found.adapted_sites and driver == "time" for site, driver in a.names)
+    return in_time and all(slow(e, found.slow_s) for e in a.effects)

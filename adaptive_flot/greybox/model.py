@@ -72,8 +72,9 @@ class Model:
     late_drivers: tuple[str, ...] = ()
     """Drivers that are known only after the sites: signals which an effect follows through a state of its own."""
     known_effects: tuple[KnownEffect, ...] = ()
-    edges: tuple[str, ...] = ()
     """What a search may call by name; when empty, every site with every driver."""
+    edges: tuple[str, ...] = ()
+    """Outputs that may stay at the highest or lowest value of their range: no sensor is clipped there."""
     effects: tuple[Effect, ...] = ()
     """Effects attached by `with_effects`; their parameters and states follow those of the model."""
     compiled: bool = False

@@ -20,7 +20,8 @@ class Site:
     """A quantity that effects may act on.
 
     `role` says what kind of thing it is, `mode` how effects act on it by default, `passed` how often the equations
-    pass it (once per component of a quantity), `unit` what its value is given in.
+    pass it (once per component of a quantity), `unit` what its value is given in, `signals` the signals that are known
+    where it is passed first.
     """
 
     name: str
@@ -28,6 +29,7 @@ class Site:
     mode: Mode
     passed: int
     unit: str | None = None
+    signals: tuple[str, ...] = ()
 
 
 class Scope:
@@ -82,7 +84,7 @@ class Scope:
         effect acts here unless it says so itself: it multiplies the quantity by exp(g), or adds g in the quantity's
         unit. With `unit`, what an effect here is given in can be checked.
         """
-        before = self.sites.get(name, Site(name, role, mode, 0, unit))
+        before = self.sites.get(name, Site(name, role, mode, 0, unit, tuple(self.signals)))
         self.sites[name] = replace(before, passed=before.passed + 1)
         self.site_values.setdefault(name, value)
         for effect in self._effects:

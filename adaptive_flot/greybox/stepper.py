@@ -195,7 +195,7 @@ class Stepper:
             xs, gs, y, dy = accumulated(x[:, None], gradient, t[None, rows], u[rows].T, held)
             x, gradient = xs[:, count - 1], gs[:, (count - 1) * q : count * q]
             ys.append(y.T[:count])
-            dys.append(dy.reshape(-1, len(rows), q).transpose(1, 0, 2)[:count])
+            dys.append(dy.reshape(len(y), len(rows), q).transpose(1, 0, 2)[:count])
         return Sensitivities(np.vstack(ys), np.concatenate(dys), x, gradient)
 
     def sensitivity_step(self, wrt: Sequence[str], unknowns: int | None = None) -> ca.Function:

@@ -112,14 +112,14 @@ def symptom_table(found: Discovery) -> Table | None:
         return None
     rows = []
     for s in found.verdict.detection.symptoms:
-        follows = ", ".join(words(n) for n, p in s.inputs.items() if p < LEVEL) or "none"
+        follows = ", ".join(map(words, s.follows)) or "none"
         onset = "-" if s.onset_s is None else number(s.onset_s, ".0f")
         rows.append((words(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
     caption = (
         "Residual of the model as it is. Size: root mean square over the noise seen from row to row. Follows: inputs "
-        f"whose past the whitened residual depends on (p < {LEVEL:g}). Change: when its mean changes most (moving "
-        "sums). Missing: whether any test rejects, by Holm's procedure at 5 % over all outputs. These tests say that "
-        "something is missing; they choose nothing."
+        "whose past the whitened residual depends on. Change: when its mean changes most (moving sums). Missing: whether "
+        f"any test rejects; all by Holm's procedure at {100 * LEVEL:g} % over the tests of all outputs. These tests say "
+        "that something is missing; they choose nothing."
     )
     header = ("Output", "Size", "Follows", "Change [s]", "Missing")
     return Table(caption, header, tuple(rows), words=3)

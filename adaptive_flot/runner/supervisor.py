@@ -130,8 +130,9 @@ class Supervisor:
                 done = hand_over(running, steps, finding.extension, self._rebuild, begun.record[0])
                 found = self._compared(found, done, running.estimator.setup)
                 goes_on = done.running if found.extended else running
-        except AdaptiveFlotError as error:
-            found = replace(found, why=str(error))
+        except Exception as error:  # the loop goes on without a search that failed, whatever it was
+            words = str(error) if isinstance(error, AdaptiveFlotError) else f"{type(error).__name__}: {error}"
+            found = replace(found, why=words)
         self._quiet_until = now if found.extended else now + self.options.pause_s
         self.inquiries.append(found)
         return goes_on

@@ -15,6 +15,8 @@ from benchmarks.hidden_effects.outcome import Answer, classify
 from benchmarks.hidden_effects.record import BIN
 from benchmarks.hidden_effects.verdict import Verdict, read_verdict
 
+EXTENDING = ("named", "class", "unnamed")
+"""Verdicts that come with an extended model; the error after any other is that of a model which nobody is given."""
 REMOVABLE = 1.5  # base error over oracle error on the report block, from which there is something to remove
 
 
@@ -38,14 +40,17 @@ def removed_share(answer: Answer, verdict: Verdict | None) -> float:
     """Error removed on held-out rows as a share of an oracle's, in the output with most to remove.
 
     The rows are those the verdict says it kept for its report, else the last 20 %. The base and the oracle are the
-    benchmark's own, on these rows; of the verdict only `error.<output>.after` is used. No verdict or none of its error:
-    nothing was removed (0). NaN where there is nothing to remove. Not above 1, not below -1.
+    benchmark's own, on these rows; of the verdict only `error.<output>.after` is used. Nothing was removed (0) without
+    a verdict, without its error, or by one that hands out no extended model. NaN where there is nothing to remove. Not
+    above 1, not below -1.
     """
     name = main_output(answer)
     if name is None:
         return math.nan
-    block = verdict.error.get(name) if verdict else None
-    if verdict is None or block is None or block.after is None or not math.isfinite(block.after):
+    if verdict is None or verdict.verdict not in EXTENDING:
+        return 0.0
+    block = verdict.error.get(name)
+    if block is None or block.after is None or not math.isfinite(block.after):
         return 0.0
     base, oracle = _held_out(answer, verdict, name)
     if not base > oracle:
@@ -70,8 +75,8 @@ def _held_out(answer: Answer, verdict: Verdict, output: str) -> tuple[float, flo
 
 def result_row(answer: Answer, verdict: Verdict | str, meta: dict[str, Any]) -> dict[str, Any]:
     """One row; `meta` tells how the command ended (status, seconds)."""
-    found = verdict if isinstance(verdict, Verdict) else None
     status = meta.get("status", "ok")
+    found = verdict if isinstance(verdict, Verdict) and status == "ok" else None
     if found is None:
         outcome = {"timeout": "timeout", "refused": "abstained"}.get(status, "failed")
         if status == "refused" and "insufficient" in answer["right_verdicts"]:

@@ -14,7 +14,7 @@ from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.experiment import leading
 from adaptive_flot.discovery.fit import row_losses
 from adaptive_flot.discovery.search import Search
-from adaptive_flot.discovery.verdict import judge
+from adaptive_flot.discovery.verdict import held_up, judge
 from adaptive_flot.discovery.verify import Verification, changes, doubts, verify, whiteness
 from adaptive_flot.discovery.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
@@ -172,3 +172,16 @@ def test_a_drift_is_told_with_its_direction(draught: Discovery, course: list[flo
     effect = Effect("heat_loss", "time", "curve", {f"value_{k + 1}": v for k, v in enumerate(course)}, knots)
     after = replace(draught.after, model=heated_tank().with_effects([effect]))
     assert said in drift_words(draught.judgement, after)[0]
+
+
+def test_a_name_is_confirmed_for_what_it_names(draught: Discovery) -> None:
+    """The best alternative, which was confirmed, has no name; the one beside it has, and must stand by itself."""
+    assert draught.problem is not None and draught.search is not None
+    found = _search(draught, (BY_HEATER, False, 0.0), (BY_FAN, True, 5.0))
+    stands, judged = held_up(draught.problem, found, judge(found))
+    assert judged.word == "named" and stands.verification is not None and stands.verification != found.verification
+    nothing = replace(found.alternatives[1], fit=draught.search.base)
+    found = replace(found, alternatives=(found.alternatives[0], replace(nothing, told=None)))
+    found = replace(found, alternatives=tuple(replace(a, told=5.0 * k) for k, a in enumerate(found.alternatives)))
+    assert judge(found).word == "named"
+    assert held_up(draught.problem, found, judge(found))[1].word == "abstain"
