@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
-from adaptive_flot.discovery.detect import LEVEL
 from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.verify import SURE
 from adaptive_flot.greybox.effects import Effect
@@ -117,9 +116,9 @@ def symptom_table(found: Discovery) -> Table | None:
         rows.append((words(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
     caption = (
         "Residual of the model as it is. Size: root mean square over the noise seen from row to row. Follows: inputs "
-        "whose past the whitened residual depends on. Change: when its mean changes most (moving sums). Missing: whether "
-        f"any test rejects; all by Holm's procedure at {100 * LEVEL:g} % over the tests of all outputs. These tests say "
-        "that something is missing; they choose nothing."
+        "whose past the whitened residual depends on. Change: when its mean changes most (moving sums). Missing: "
+        "whether any test rejects. All by Holm's procedure at 5 % over the tests of all outputs. These tests say that "
+        "something is missing; they choose nothing."
     )
     header = ("Output", "Size", "Follows", "Change [s]", "Missing")
     return Table(caption, header, tuple(rows), words=3)
