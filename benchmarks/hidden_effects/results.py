@@ -15,8 +15,8 @@ from benchmarks.hidden_effects.outcome import Answer, classify
 from benchmarks.hidden_effects.record import BIN
 from benchmarks.hidden_effects.verdict import Verdict, read_verdict
 
-EXTENDING = ("named", "class", "unnamed")
-"""Verdicts that come with an extended model; the error after any other is that of a model which nobody is given."""
+UNDECIDED = ("abstain", "insufficient")
+"""Verdicts that stand for no model: the error that one writes beside them is that of a model which nobody is given."""
 REMOVABLE = 1.5  # base error over oracle error on the report block, from which there is something to remove
 
 
@@ -41,13 +41,13 @@ def removed_share(answer: Answer, verdict: Verdict | None) -> float:
 
     The rows are those the verdict says it kept for its report, else the last 20 %. The base and the oracle are the
     benchmark's own, on these rows; of the verdict only `error.<output>.after` is used. Nothing was removed (0) without
-    a verdict, without its error, or by one that hands out no extended model. NaN where there is nothing to remove. Not
+    a verdict, without its error, or by one that decides nothing. NaN where there is nothing to remove. Not
     above 1, not below -1.
     """
     name = main_output(answer)
     if name is None:
         return math.nan
-    if verdict is None or verdict.verdict not in EXTENDING:
+    if verdict is None or verdict.verdict in UNDECIDED:
         return 0.0
     block = verdict.error.get(name)
     if block is None or block.after is None or not math.isfinite(block.after):

@@ -95,6 +95,8 @@ def test_removed_error_is_measured_against_the_benchmarks_own_base() -> None:
     assert removed_share(SINGLE, half) == pytest.approx(0.5)
     assert removed_share(SINGLE, _verdict("named", BUBBLE)) == 0.0
     assert removed_share(SINGLE, None) == 0.0
+    for undecided in ("abstain", "insufficient"):  # the error of a model that nobody is given
+        assert removed_share(SINGLE, half.model_copy(update={"verdict": undecided})) == 0.0
     nothing_to_gain = SINGLE | {"base_error": SINGLE["oracle_error"]}
     assert math.isnan(removed_share(nothing_to_gain, half))
 
@@ -127,6 +129,10 @@ def test_a_command_that_fails_is_counted_and_one_that_refuses_abstains() -> None
     ends = ({"status": status, "seconds": 1.0} for status in ("crash", "timeout", "refused"))
     rows = [result_row(SINGLE, "no verdict written", end) for end in ends]
     assert [row["outcome"] for row in rows] == ["failed", "timeout", "abstained"]
+    left_behind = [
+        result_row(SINGLE, _verdict("named", BUBBLE), {"status": s, "seconds": 1.0}) for s in ("crash", "timeout")
+    ]
+    assert [row["outcome"] for row in left_behind] == ["failed", "timeout"]  # though it had written a verdict
     table = pd.DataFrame([*rows, result_row(SINGLE, _verdict("named", BUBBLE), {"seconds": 2.0})])
     shares = {r["what"]: r["share"] for r in as_json(table)["rates"]}
     assert shares["truth named or in a class of 3, single ordinary"] == 0.25
