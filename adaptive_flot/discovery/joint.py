@@ -31,9 +31,10 @@ from adaptive_flot.discovery.search import (
     what_is_left,
 )
 from adaptive_flot.discovery.verify import verify
+from adaptive_flot.greybox.stepper import Stepper
 
 CHEAP = 30_000
-"""Rows times squared states of a record up to which hundreds of fits are a matter of a minute."""
+"""Steps of a record times squared states up to which hundreds of fits are a matter of a minute."""
 MOST_AT_ONCE = 4
 DOMINATES = 3.0
 """Model error this many times as large as the noise is what a noise model would wrongly explain."""
@@ -42,7 +43,8 @@ DOMINATES = 3.0
 def wants_joint(problem: Problem, found: Search) -> bool:
     """Whether fits are cheap and the error of the best alternative outweighs the noise by far."""
     best = found.alternatives[0].fit if found.alternatives else found.base
-    cost = len(problem.record) * len(best.initial_state) ** 2
+    steps = len(problem.record) * Stepper(best.model, problem.record.dt).substeps
+    cost = steps * len(best.initial_state) ** 2
     return cost <= CHEAP and dominated(problem, best)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -13,11 +14,13 @@ from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.noise import noise_by_differences
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.greybox.dataset import Dataset
-from adaptive_flot.greybox.nodes import Nodes, place_nodes
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.nodes import Nodes, place_nodes, substeps
 from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepper import MOST_UNROLLED, Stepper
 
 LONGEST = (6, 4, 3, 2)
-"""Most rows from node to node that are tried."""
+"""Most rows from node to node, or steps at every row in one, that are tried."""
 GROWTHS = (1.0, 0.5, 0.35, 0.25)
 """Rows that nodes may be further apart for each row since the last move of an input: what a move sets off dies away."""
 UNNOTICED = 2.0
@@ -26,7 +29,7 @@ changes minus two log-likelihood by about as much, a fifth of what a name asks f
 NOTICED = 3.0
 """Difference of minus two log-likelihood from which a run at every row is worth its price."""
 WORTHWHILE = 0.8
-"""Nodes as a share of the rows above which there is nothing to save."""
+"""Nodes as a share of the steps at every row above which there is nothing to save."""
 
 
 def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, float]]) -> Fit:
@@ -45,9 +48,12 @@ def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, flo
     return Fitter(every, fitter.share).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
 
 
-def placements(record: Dataset) -> list[Nodes]:
-    """Nodes that are tried, the fewest first."""
-    placed = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
+def placements(record: Dataset, model: Model) -> list[Nodes]:
+    """Nodes that are tried, the fewest first; of a coarsely sampled record longer steps, where a row asks for many."""
+    steps = Stepper(model, record.dt).substeps
+    if steps > MOST_UNROLLED:
+        return [substeps(record, count) for count in sorted({math.ceil(steps / longest) for longest in LONGEST})]
+    placed: list[Nodes] = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
     fewest_first = sorted(placed, key=lambda nodes: len(nodes.rows))
     return [nodes for nodes in fewest_first if len(nodes.rows) <= WORTHWHILE * len(record)]
 
@@ -59,7 +65,7 @@ def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes] | None = None
     exact = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
     noise = noise_by_differences((problem.measured - exact) / problem.weights)
     size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
-    for nodes in placements(record) if placed is None else placed:
+    for nodes in placements(record, fit.model) if placed is None else placed:
         run = RecordSimulator(fit.model, record.dt, nodes)
         free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
         with np.errstate(over="ignore", invalid="ignore"):  # a longer step may run off

@@ -47,7 +47,7 @@ def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
     start = Fitter(problem).fit(model, rounds=0)
     if start is None:
         return None
-    placed = placements(problem.record)
+    placed = placements(problem.record, model)
     problem = with_nodes(problem, start, placed)
     first = Fitter(problem).fit(model, like=start, rounds=1)
     if first is None:

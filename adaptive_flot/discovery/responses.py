@@ -16,9 +16,9 @@ from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.nodes import NodeStepper
+from adaptive_flot.greybox.nodes import NodeStepper, substeps
 from adaptive_flot.greybox.rows import over_rows
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepper import MOST_UNROLLED, Stepper
 
 ROWS_AT_ONCE = 500
 LEAST_VALUE = 1e-6
@@ -59,7 +59,11 @@ class Responses:
         extended = model.with_effects([e for e in probes if e.label not in has])
         p0 = np.array([q.value for q in extended.parameters])
         record, self._nodes = problem.record, problem.nodes
-        stepper = Stepper(extended, record.dt) if self._nodes is None else NodeStepper(extended)
+        stepper = Stepper(extended, record.dt)
+        if self._nodes is None and stepper.substeps > MOST_UNROLLED:
+            self._nodes = substeps(record, stepper.substeps)
+        if self._nodes is not None:
+            stepper = NodeStepper(extended)
         self._steps = record.inputs[1:] if self._nodes is None else self._nodes.inputs
         run = stepper.simulate(fit.initial_state, self._steps, p0, float(record.time[0]))
         self._at = np.vstack([fit.initial_state, run.states])
@@ -73,7 +77,7 @@ class Responses:
     def _jacobians(self, stepper: Stepper, names: tuple[str, ...], p: FloatArray) -> None:
         function = stepper.one_step_jacobians(names)
         nx, q, ny = len(self.fit.initial_state), len(names), len(stepper.model.outputs)
-        time = self.problem.record.time if self._nodes is None else self.problem.record.time[self._nodes.rows]
+        time = self.problem.record.time if self._nodes is None else self._nodes.times
         n = len(self._steps)
         self._A, self._G = np.empty((n, nx, nx)), np.empty((n, nx, q))
         self._C, self._H = np.empty((n, ny, nx)), np.empty((n, ny, q))

@@ -1,7 +1,9 @@
-"""Fewer instants to simulate a densely sampled record at: close together after a move of an input, far apart else.
+"""Instants to simulate a record at, where its rows are too many or too few.
 
-Between two moves of the inputs everything is smooth, and a record sampled every second says most things several times.
-The free run steps from node to node; the rows between are interpolated by cubics that never reach across a move.
+Fewer in a densely sampled record: close together after a move of an input, far apart else. Between two moves of the
+inputs everything is smooth, and a record sampled every second says most things several times. The free run steps from
+node to node; the rows between are interpolated by cubics that never reach across a move. More in a coarsely sampled
+record, where an interval asks for several steps.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ class Nodes:
     ----------
     rows
         Rows (M,), the first and the last of the record among them.
+    times
+        Their times (M,) [s].
     inputs
         Mean inputs (M - 1, nu) of each interval and, as the last column, its length [s].
     weights
@@ -41,6 +45,7 @@ class Nodes:
     """
 
     rows: IntArray
+    times: FloatArray
     inputs: FloatArray
     weights: csr_array
 
@@ -56,6 +61,25 @@ class Nodes:
         return sums / np.diff(self.rows).reshape(-1, *(1,) * (values.ndim - 1))
 
 
+class Substeps(Nodes):
+    """All rows of a record, and as many instants between each two; `rows` tells the row at or before each."""
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """What is held in each interval (M - 1, ...), the values of the row at its end; values (N, ...)."""
+        found: FloatArray = np.repeat(values[1:], (len(self.rows) - 1) // (len(values) - 1), axis=0)
+        return found
+
+
+def substeps(record: Dataset, count: int) -> Substeps:
+    """Nodes that part each interval between two rows of a record into `count` equal ones."""
+    n = len(record)
+    rows = np.arange((n - 1) * count + 1, dtype=np.intp)
+    step = record.dt / count
+    inputs = np.column_stack([np.repeat(record.inputs[1:], count, axis=0), np.full(len(rows) - 1, step)])
+    weights = csr_array((np.ones(n), (np.arange(n), np.arange(n) * count)), shape=(n, len(rows)))
+    return Substeps(rows // count, record.time[0] + step * rows, inputs, weights)
+
+
 def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
     """Nodes of a record, one row apart after a move and further by `growth` rows a row since, up to `longest` rows."""
     u = record.inputs
@@ -69,7 +93,7 @@ def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
     triplets = [_interpolation(part, offset) for part, offset in zip(parts, offsets, strict=True)]
     weight, row, node = (np.concatenate(c) for c in zip(*triplets, strict=True))
     weights = csr_array((weight, (row, node)), shape=(len(u), len(rows)))
-    nodes = Nodes(rows, np.empty(0), weights)
+    nodes = Nodes(rows, record.time[rows], np.empty(0), weights)
     return replace(nodes, inputs=np.column_stack([nodes.means(u), np.diff(rows) * record.dt]))
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -26,6 +26,9 @@ from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
 
 IDAS_TOLERANCE = 1e-11
+MOST_UNROLLED = 4
+"""Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
+ten of them, with derivatives, takes longer to make than a record takes to simulate."""
 CHUNK = 64
 """Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""
 
@@ -76,6 +79,8 @@ class Stepper:
         self._options = {"cse": True}
         self._compiled = model.compiled and not accurate  # IDAS is machine code already
         self._records: dict[tuple[str, tuple[str, ...], int], FastCall] = {}
+        many = self.substeps > MOST_UNROLLED and not accurate
+        self._single = Stepper(model, self.dt / self.substeps, substeps=1) if many else None
 
     @property
     def step(self) -> ca.Function:
@@ -144,6 +149,11 @@ class Stepper:
         x = self._initial(x0)
         if self.accurate:
             return self._simulate_by_rows(x, u, p, t)
+        if self._single is not None:
+            one_by_one = p if p.ndim == 1 else np.repeat(p, self.substeps, axis=0)
+            run = self._single.simulate(x, np.repeat(u, self.substeps, axis=0), one_by_one, t0)
+            ends = slice(self.substeps - 1, None, self.substeps)
+            return Trajectory(t + self.dt, run.states[ends], run.outputs[ends], run.signals[ends])
         parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         by_row = np.tile(p, (len(u), 1)) if p.ndim == 1 else p
         for rows, count in _chunks(len(u)):
@@ -183,6 +193,11 @@ class Stepper:
         u, p, t = self._tables(inputs, parameters, t0)
         if p.ndim != 1:
             raise ModelError("sensitivities need one parameter vector for the whole record, got one a row")
+        if self._single is not None:
+            every = np.repeat(u, self.substeps, axis=0)
+            found = self._single.simulate_sensitivities(x0, every, p, wrt, x0_gradient, t0)
+            ends = slice(self.substeps - 1, None, self.substeps)
+            return replace(found, outputs=found.outputs[ends], gradient=found.gradient[ends])
         x = self._initial(x0)
         gradient = np.asarray(x0_gradient, dtype=float).reshape(x.size, -1)
         q = gradient.shape[1]

@@ -12,6 +12,7 @@ from adaptive_flot.discovery.fit import Fit, loss_of
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.pace import NOTICED, UNNOTICED, at_every_row, with_nodes
 from adaptive_flot.discovery.problem import Problem, make_problem
+from adaptive_flot.discovery.responses import Responses
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.nodes import place_nodes
 from adaptive_flot.greybox.record import RecordSimulator
@@ -86,3 +87,18 @@ def test_what_is_sudden_is_simulated_at_every_row(still: tuple[Problem, Fit], fo
     found = with_nodes(problem, fit)
     model = fit.model.with_effects([Effect("heat_loss", driver, form)])
     assert found.nodes is not None and is_smooth(model) is coarse
+
+
+def test_a_coarsely_sampled_record_takes_longer_steps_that_make_no_difference() -> None:
+    """A model that asks for fifteen steps a row, though one or two would do."""
+    fine = replace(heated_tank(), max_step_s=2.0)
+    problem = make_problem(tank_record(Truth(exponent=0.0)), fine, ADAPTED, burn_in=30, guard=5)
+    every = Fitter(problem).fit(fine)
+    assert every is not None
+    coarse = with_nodes(problem, every)
+    assert coarse.nodes is not None and len(coarse.nodes.times) < 4 * len(problem.record)
+    again = Fitter(coarse).fit(fine, like=every)
+    assert again is not None
+    np.testing.assert_allclose(again.values, every.values, atol=0.2 * every.std().min())
+    scores, others = (Responses(p, every).nuisance[1:] for p in (coarse, problem))
+    np.testing.assert_allclose(scores, others, rtol=1e-3, atol=1e-3 * np.abs(others).max())

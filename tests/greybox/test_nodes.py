@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import factorial
 
 import casadi as ca
@@ -15,7 +16,7 @@ from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.fast_step import closed_phi
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.nodes import Nodes, place_nodes
+from adaptive_flot.greybox.nodes import Nodes, place_nodes, substeps
 from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.processes import flotation
@@ -112,3 +113,18 @@ def test_a_cell_with_fast_bubbles_runs_alike_over_nodes_and_rows() -> None:
     scale = np.ptp(a, axis=0)
     assert np.max(np.abs(a - b)[settled] / scale) < 2e-2
     assert np.max(np.abs(a - b)[-1] / scale) < 2e-3
+
+
+def test_a_run_over_the_parts_of_coarse_rows_is_that_of_the_rows() -> None:
+    """Three steps a row as nodes, and the same three by the step of the interval."""
+    record, model = tank_record(rows=60), replace(heated_tank(), max_step_s=10.0)
+    nodes = substeps(record, 3)
+    x0, p, wrt = np.array([305.0]), model.parameter_values, ("efficiency", "loss")
+    gradient = np.hstack([np.zeros((1, 2)), np.ones((1, 1))])
+    some, every = RecordSimulator(model, record.dt, nodes), RecordSimulator(model, record.dt)
+    assert len(nodes.times) == len(nodes.rows) == 3 * 59 + 1
+    np.testing.assert_allclose(nodes.times[::3], record.time)
+    for a, b in zip(*(run.sensitivities(record, x0, p, wrt, gradient) for run in (some, every)), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
+    held = nodes.means(record.inputs)
+    np.testing.assert_array_equal(held, nodes.inputs[:, :-1])

@@ -11,7 +11,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model, Scope
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import CHUNK, Stepper
+from adaptive_flot.greybox.stepper import CHUNK, MOST_UNROLLED, Stepper
 
 NAMES = ["n", "C", "floatability.quartz"]
 
@@ -275,3 +275,36 @@ def test_initial_state_of_one_element_is_refused(fast: Stepper) -> None:
 
 def test_record_without_rows_is_simulated(fast: Stepper, start: FloatArray) -> None:
     assert fast.simulate(start, np.empty((0, 3))).states.shape == (0, 9)
+
+
+# -- coarsely sampled records ------------------------------------------------------------------------------------------
+
+
+def test_a_record_of_many_substeps_a_row_is_that_of_its_rows_one_by_one(model: Model, start: FloatArray) -> None:
+    """Ten steps a row, unrolled in one function for a sample, one by one for a record: the same run and derivatives."""
+    rows, p = 40, model.parameter_values
+    u = random_inputs(200, 3)[::5]
+    stepper = Stepper(model, 10.0)
+    assert stepper.substeps > MOST_UNROLLED
+    run = stepper.simulate(start, u, p, 5.0)
+    x, by_sample = start, []
+    for k in range(rows):
+        x, y, s = stepper.call(x, 5.0 + 10.0 * k, u[k], p)
+        by_sample.append(np.concatenate([x, y, s]))
+    np.testing.assert_allclose(np.hstack([run.states, run.outputs, run.signals]), by_sample, rtol=1e-9)
+    np.testing.assert_allclose(run.time, 15.0 + 10.0 * np.arange(rows))
+    by_row = stepper.simulate(start, u, np.tile(p, (rows, 1)), 5.0)
+    np.testing.assert_array_equal(by_row.outputs, run.outputs)
+    where = model.indices("parameters", NAMES)
+    found = stepper.simulate_sensitivities(start, u, p, NAMES, np.zeros((start.size, len(NAMES))), 5.0)
+    np.testing.assert_array_equal(found.outputs, run.outputs)
+
+    def outputs(values: FloatArray) -> FloatArray:
+        changed = p.copy()
+        changed[where] = values
+        return stepper.simulate(start, u, changed, 5.0).outputs
+
+    numeric = central(outputs, p[where])
+    for j in range(len(model.outputs)):
+        if np.abs(numeric[:, j]).max() > 1e-12:
+            assert_close(found.gradient[:, j], numeric[:, j], 1e-4)
