@@ -28,7 +28,7 @@ TOLERANCE = 0.1
 """A step that improves minus two log-likelihood by less ends the search: a fortieth of what any test asks for."""
 SLOW = 2e-3
 """Or one that improves it by less than this share of what the search has gained so far."""
-FAR_OFF = 0.05
+FAR_OFF = 0.01
 """A run is far off when no larger a share of the measurements is within what the first steps look at."""
 KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time

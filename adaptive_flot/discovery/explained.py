@@ -2,7 +2,8 @@
 
 Two ways, so that neither a poor model nor a poor regression decides alone: the free run of the fitted model, and a
 ridge regression on every input at every time scale (the inputs through first-order filters), both judged on rows that
-they were not fitted to.
+they were not fitted to. Like the data gate this takes all rows, those of the report too: it says whether there is
+anything to search for, and chooses no effect. On fewer rows a slow process passes for unexplained by chance.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.problem import BoolArray, Problem
+from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.greybox.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 
@@ -29,11 +30,11 @@ RIDGE = 1e-2
 def nothing_explained(problem: Problem, fit: Fit) -> str | None:
     """Why the record can not be judged when no input explains any output; None when one does."""
     names = [fit.model.outputs[c].name for c in problem.columns]
-    rows = problem.rows("confirm")
+    rows = problem.rows("confirm", "report")
     by_model = _shares(problem.measured[rows], fit.predicted[rows])
     if np.max(by_model) >= LEAST_EXPLAINED:
         return None
-    by_regression = regression_shares(problem.record, problem.columns, problem.rows("report"))
+    by_regression = regression_shares(problem.record, problem.columns)
     if np.max(by_regression) >= LEAST_EXPLAINED:
         return None
     best = int(np.argmax(by_regression))
@@ -45,17 +46,13 @@ def nothing_explained(problem: Problem, fit: Fit) -> str | None:
     )
 
 
-def regression_shares(record: Dataset, columns: tuple[int, ...], unseen: BoolArray | None = None) -> FloatArray:
+def regression_shares(record: Dataset, columns: tuple[int, ...]) -> FloatArray:
     """Share of the variance (m,) that filtered inputs explain, by cross-validation over contiguous blocks.
-
-    Measurements of the rows (N,) that are `unseen` take no part.
 
     The larger of two: of the output itself, and of its faster part, in which a slow process that wanders far shows what
     moves it.
     """
     X, Y = _filtered(record), record.outputs[:, columns]
-    if unseen is not None:
-        Y = np.where(unseen[:, None], np.nan, Y)
     found: FloatArray = np.maximum(_validated(X, Y), _validated(_fast(X), _fast(Y)))
     return found
 

@@ -9,12 +9,12 @@ from scipy.stats import binom
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.watching import watch
 
-WINDOW, WINDOWS, LEVEL = 200, 800, 0.05
+WINDOW, WINDOWS, LEVEL = 200, 400, 0.05
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-7])
 def test_white_innovations_alarm_in_the_stated_share_of_windows(size: float) -> None:
-    """Two outputs, four tests together, 800 windows: within the 0.1 and 99.9 % points of the binomial law, whatever
+    """Two outputs, four tests together, 400 windows: within the 0.1 and 99.9 % points of the binomial law, whatever
     the unit; and not so rarely that nothing would ever alarm."""
     noise = size * np.random.default_rng(1).standard_normal((WINDOWS, 2, WINDOW))
     alarms = sum(watch({"a": a, "b": b}, LEVEL) is not None for a, b in noise)
