@@ -23,6 +23,7 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.report import style
 from adaptive_flot.runner.discover import discover_file
+from benchmarks.hidden_effects.constants import CELL_HEIGHT
 from benchmarks.hidden_effects.curves import STATIC
 from benchmarks.hidden_effects.generate import record_file, write_record
 from benchmarks.hidden_effects.record import make_record
@@ -41,8 +42,12 @@ def find() -> tuple[Discovery, dict[str, Any]]:
         return discover_file(path, make_model(), processes=available_processes()), record.answer.as_dict()
 
 
-def truth(effect: dict[str, Any], driver: FloatArray) -> FloatArray:
-    """The factor that the generator puts on the site (K,)."""
+def truth(effect: dict[str, Any], name: str, driver: FloatArray) -> FloatArray:
+    """The factor that the generator puts on the site (K,), over the driver that was named: level and depth are one."""
+    if {name, effect["driver"]} == {"level", "froth_depth"}:
+        driver = CELL_HEIGHT - driver
+    elif name != effect["driver"]:
+        return np.full(len(driver), np.nan)  # another cause was named: there is no truth to draw over it
     scale, shape = effect["scale"], STATIC[effect["shape"]](effect["parameters"])
     z = (driver - scale["low"]) / (scale["high"] - scale["low"])
     factor: FloatArray = 1 + effect["amplitude"] * (np.array([shape(float(v)) for v in z]) - scale["centre"])
@@ -78,15 +83,14 @@ def _cause(ax: Axes, found: Discovery, answer: dict[str, Any]) -> None:
     (curve,) = effect_curves(found.problem, found.after, len(found.verdict.effects))
     ax.fill_between(1e3 * curve.driver, curve.low, curve.high, color=style.colour(0), alpha=0.22, lw=0)
     ax.plot(1e3 * curve.driver, curve.change, color=style.colour(0), label="found, 95 % band")
-    ax.plot(
-        1e3 * curve.driver, truth(answer["effects"][0], curve.driver), color=style.TRUTH, lw=1.1, ls="--", label="truth"
-    )
+    true = truth(answer["effects"][0], curve.effect.driver, curve.driver)
+    ax.plot(1e3 * curve.driver, true, color=style.TRUTH, lw=1.1, ls="--", label="truth")
     ax.axhline(1.0, color=style.CONSTANT, lw=1.0, ls=(0, (5, 1.5)))
     effect = curve.effect
     ax.set_title(f"Cause: {effect.site} by {effect.driver}".replace("_", " "))
     ax.set_xlabel(f"{effect.driver.replace('_', ' ')} [mm]")
     ax.set_ylabel(f"factor on {effect.site.replace('_', ' ')} [–]")
-    ax.legend(loc="lower left")
+    ax.legend(loc="lower left" if curve.change[0] > curve.change[-1] else "lower right")
 
 
 def _errors(ax: Axes, found: Discovery) -> None:
