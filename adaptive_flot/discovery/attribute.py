@@ -13,6 +13,7 @@ import numpy as np
 from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import MOST_STEPS, Fitter
+from adaptive_flot.discovery.lateness import LONGEST_DELAY
 from adaptive_flot.discovery.problem import Problem
 from adaptive_flot.discovery.scoring import Score, Scorer
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, Effect
@@ -202,5 +203,5 @@ def shape_bounds(problem: Problem) -> dict[str, tuple[float, float]]:
         "duration": (1.0, span),
         "time_constant": (0.2 * problem.record.dt, span),
         "time_constant_2": (0.2 * problem.record.dt, span),
-        "dead_time": (2.0 * problem.record.dt, 0.2 * span),
+        "dead_time": (2.0 * problem.record.dt, LONGEST_DELAY * span),
     }
