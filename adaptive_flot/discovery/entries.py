@@ -11,7 +11,7 @@ from adaptive_flot.discovery.catalogue import finer
 from adaptive_flot.discovery.events import event_scores, freer, step_score
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.scoring import Score, Scorer
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
 
 FORMS_EACH = 3
 MOST_CONSTANTS = 4
@@ -20,6 +20,8 @@ MOST_COURSES = 3
 """Curves in time that are tried as events."""
 BENT = 0.3
 """A dependence is surely not flat when to flatten it costs this share of all it gained."""
+NEARLY = 0.9
+"""First-order gain of the constant, as a share of that of a dependence at its site, from which it is tried anyway."""
 ADDS = 0.05
 """A dependence that adds less than this share to the gain of the constant at its site is fitted again from there."""
 
@@ -84,19 +86,22 @@ def forms(lane: Lane, run: Run) -> list[Job]:
 
 
 def constants(scorer: Scorer, fitted: list[Alternative]) -> list[tuple[Score, Fit]]:
-    """The constant change at the sites of the best fits, from what a dependence on a driver came to.
+    """The constant change at the sites of the best fits, from what a dependence on a driver or on time came to.
 
-    A dependence that turned out flat is that constant, which has the better name.
+    A dependence that turned out flat is that constant, which has the better name. And where the two are as good as the
+    same to first order, the constant must have been fitted too before the record can prefer the dependence.
     """
+    scores = {s.candidate.name: s.gain for s in scorer.scores()}
     at = {s.candidate.site.name: s for s in scorer.scores() if s.candidate.driver == "constant"}
     found: dict[str, tuple[Score, Fit]] = {}
     for a in fitted[:MOST_CONSTANTS]:
         effect = a.effects[-1]
         site, c = effect.site, effect.coefficients
         values = [v for k, v in c.items() if k.startswith(("value", "amplitude"))]
-        if effect.driver in STATELESS_DRIVERS or site not in at or site in found or not values:
+        if effect.driver in ("constant", *DYNAMIC_DRIVERS) or site not in at or site in found or not values:
             continue
-        if _bend(a.fit, effect) > BENT * max(a.gain, 0.0):
+        nearly = at[site].gain > NEARLY * scores.get((site, effect.driver), np.inf)
+        if not nearly and (effect.driver == "time" or _bend(a.fit, effect) > BENT * max(a.gain, 0.0)):
             continue
         shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
         found[site] = replace(shift, start={"amplitude": float(np.mean(values))}), a.fit

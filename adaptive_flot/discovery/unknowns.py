@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -17,6 +17,8 @@ DIRECTION_PRIOR = 5.0
 """Standard deviation of the weak prior of a direction of the initial state, in units of the states' scales."""
 PRIOR_SCALES = 20.0
 """Standard deviation of the weak prior of an effect's coefficients, in units of their scale."""
+LAGGED_SCALES = 0.1
+"""How far a direction moves the states of a new effect, in their scales: their usual value is about one."""
 
 
 class Unknowns:
@@ -91,12 +93,17 @@ class Unknowns:
             return guess
 
     def _first_directions(self, like: Fit | None) -> FloatArray:
-        """Free directions of the initial state of a fit (nx, r), in the states that the model has in common with it."""
+        """Free directions of the initial state (nx, r): those of a fit in the states that the model has in common with it.
+
+        And two for the states that it has beside: a record may start while a slow sensor is still on its way.
+        """
         if like is None:
             return np.zeros((len(self.x0), 0))
         rows = dict(zip(like.model.names("states"), like.directions, strict=True))
         nothing = np.zeros(like.directions.shape[1])
-        return np.array([rows.get(name, nothing) for name in self.model.names("states")])
+        states = self.model.states
+        known = np.array([rows.get(s.name, nothing) for s in states])
+        return np.hstack([known, _along([0.0 if s.name in rows else s.scale for s in states])])
 
     def _settled_filters(self, known: Mapping[str, float]) -> FloatArray:
         """Initial state with the states of new effects where they are at rest beside the known ones, by name."""
@@ -125,3 +132,12 @@ class Unknowns:
     def initial_gradient(self) -> FloatArray:
         """Derivative of the initial state by z (nx, q + r)."""
         return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
+
+
+def _along(scales: Sequence[float]) -> FloatArray:
+    """Directions (nx, r <= 2) of the states whose scale is not zero, a chain of lags: all as one, and evenly spread."""
+    new = np.flatnonzero(scales)
+    found = np.zeros((len(scales), min(len(new), 2)))
+    for k in range(found.shape[1]):
+        found[new, k] = LAGGED_SCALES * np.array(scales)[new] * np.linspace(1, -1, len(new)) ** k
+    return found
