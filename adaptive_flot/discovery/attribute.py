@@ -125,10 +125,13 @@ def _twins(a: Score, b: Score, drivers: Mapping[str, FloatArray]) -> bool:
     return abs(float(np.corrcoef(drivers[one.driver], drivers[other.driver])[0, 1])) > 1 - SAME_DRIVER
 
 
-def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit | None = None) -> Fit | None:
+def fit_variant(
+    fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit | None = None, drawn: bool = False
+) -> Fit | None:
     """Full fit of one variant on top of `start`, from the score's values or, where these are too large, smaller ones.
 
     `warm` is a fit with another form of the same effect: its adapted parameters and initial state are a better start.
+    Values that were `drawn` by a fit are taken as they are.
     """
     start = _warmed(start, warm) if warm else start
     effect = score.variant.effect
@@ -141,7 +144,8 @@ def fit_variant(fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit 
     rounds = 1 if steps < MOST_STEPS else 2
     shape = {effect.parameter(k) for k, _ in score.variant.start}
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
-    found = fitter.fit(model, free, limited(model, effect, first), start, bounds, rounds, steps, shrink)
+    first = first if drawn else limited(model, effect, first)
+    found = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
     in_time = effect.driver == "time" and effect.form == "curve" and len(names) <= FINE_TIME_KNOTS
     if found is not None and steps == MOST_STEPS and in_time:
         return fitter.settled(found, bounds, WORTH_A_RESTART)

@@ -10,6 +10,7 @@ from adaptive_flot.discovery.attribute import Alternative
 from adaptive_flot.discovery.catalogue import finer
 from adaptive_flot.discovery.events import event_scores, freer, step_score
 from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.knots import trimmed
 from adaptive_flot.discovery.scoring import Score, Scorer
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
 
@@ -41,6 +42,8 @@ class Job:
     lane: int
     score: Score
     warm: Fit | None = None
+    drawn: bool = False
+    """Whether the start values draw a curve that was fitted, and are no first-order answer."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +168,22 @@ def more_freedom(run: Run, low: float, high: float) -> list[Job]:
     if found is None:
         return []
     variant, start = found
-    return [Job(run.lane, replace(run.score, variant=variant, start=start), run.alternative.fit)]
+    return [Job(run.lane, replace(run.score, variant=variant, start=start), run.alternative.fit, drawn=True)]
+
+
+def fewer_knots(runs: list[Run], price: float) -> list[Job]:
+    """For each name the curve that should come out best without the knots that it does not need, from its fit."""
+    found: dict[tuple[tuple[str, str], ...], tuple[float, Job]] = {}
+    for run in runs:
+        a = run.alternative
+        less = trimmed(a.fit, a.effects[-1], price)
+        if less is None:
+            continue
+        promised = a.fit.bic - less.gain
+        if a.names not in found or promised < found[a.names][0]:
+            score = replace(run.score, variant=less.variant, start=less.start)
+            found[a.names] = promised, Job(run.lane, score, a.fit, drawn=True)
+    return [job for _, job in found.values()]
 
 
 def is_curve(run: Run) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.catalogue import spline_values
+from adaptive_flot.discovery.knots import MOST_KNOTS, is_even, knots_of
 from adaptive_flot.discovery.scoring import Score
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import Effect
@@ -29,8 +30,6 @@ LARGE = 0.4
 """Change of a logarithm (a factor of 1.5) beyond any drift that adaptation is known to follow: a quarter."""
 SUDDEN = 0.03
 """Share of the record up to which a ramp or a washout may as well be a step."""
-MOST_KNOTS = 28
-"""Knots of the freest curve in time."""
 AROUND = (-0.5, 0.0, 0.2, 0.45, 0.75, 1.1, 1.6, 2.5, 4.0)
 """Knots around an event, in lengths of it since its onset."""
 KNOT_GAP = 0.01
@@ -47,7 +46,7 @@ def event_scores(score: Score, curve: Effect) -> list[Score]:
     curve
         The fitted curve, with its coefficients.
     """
-    knots = [float(k) for k in np.atleast_1d(np.asarray(curve.settings["knots"]))]
+    knots = knots_of(curve)
     t = np.linspace(knots[0], knots[-1], POINTS)
     values = spline_values(t, knots) @ [curve.coefficients[f"value_{k + 1}"] for k in range(len(knots))]
     span = float(t[-1] - t[0])
@@ -94,7 +93,7 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
     if effect.form == "step" or (effect.form == "ramp" and slow(effect)):
         return None
     if effect.form == "curve":
-        old = [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
+        old = knots_of(effect)
         if len(old) >= MOST_KNOTS:
             return None
         at = np.linspace(low, high, MOST_KNOTS)
@@ -121,18 +120,15 @@ def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
     Such a curve is an event after all where it changes much, and half of that at once: in less than `shortest` [s].
     """
     if effect.form == "curve":
-        knots = np.atleast_1d(np.asarray(effect.settings["knots"], dtype=float))
-        gaps = np.diff(knots)
-        return bool(np.ptp(gaps) < 1e-3 * np.max(gaps)) and not _jumps(effect, knots, shortest)
+        knots = knots_of(effect)
+        return is_even(knots) and not _jumps(effect, knots, shortest)
     return effect.form == "ramp" and effect.coefficients["duration"] >= shortest
 
 
-def _jumps(effect: Effect, knots: FloatArray, shortest: float) -> bool:
+def _jumps(effect: Effect, knots: list[float], shortest: float) -> bool:
     """Whether a curve changes by a large factor, half of all it ever changes in a short time."""
     t = np.linspace(knots[0], knots[-1], POINTS)
-    values = spline_values(t, [float(k) for k in knots]) @ [
-        effect.coefficients.get(f"value_{k + 1}", 0.0) for k in range(len(knots))
-    ]
+    values = spline_values(t, knots) @ [effect.coefficients.get(f"value_{k + 1}", 0.0) for k in range(len(knots))]
     ahead = max(1, round(shortest / float(t[1] - t[0])))
     whole = float(np.ptp(values))
     return whole > LARGE and bool(np.max(np.abs(values[ahead:] - values[:-ahead]), initial=0.0) > whole / 2)

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from adaptive_flot.discovery.attribute import Alternative, effect_bounds, fit_variant, variant_model
 from adaptive_flot.discovery.direction import nameable
 from adaptive_flot.discovery.entries import (
@@ -18,6 +20,7 @@ from adaptive_flot.discovery.entries import (
     best_of_each,
     constants,
     events,
+    fewer_knots,
     first_forms,
     forms,
     is_curve,
@@ -66,7 +69,8 @@ def refit(
     followers = heats.followers(last)
     bent = heats.bent(followers, last)
     found = best_of_each([*heats.steps(followers, last), *bent, *followers, *last, *first])
-    ranked = [run.alternative for run in best_of_each([*heats.freed(found, last), *found])]
+    found = best_of_each([*heats.freed(found, last), *found])
+    ranked = [run.alternative for run in best_of_each([*heats.trimmed(found[:MOST_FREED]), *found])]
     exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
     return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
 
@@ -91,7 +95,7 @@ class _Heats:
     def _run(self, jobs: list[Job], steps: int = MOST_STEPS) -> list[Run]:
         def work(k: int) -> Fit | None:
             job = jobs[k]
-            return fit_variant(self.fitter, self._start(job.lane), job.score, steps, job.warm)
+            return fit_variant(self.fitter, self._start(job.lane), job.score, steps, job.warm, job.drawn)
 
         fits = parallel_map(work, range(len(jobs)), self.processes, self.done)
         found = [
@@ -149,11 +153,19 @@ class _Heats:
             freed += self._freer(others, found, last)
         return freed
 
+    def trimmed(self, runs: list[Run]) -> list[Run]:
+        """Curves without the knots that they do not need, so that no course loses for a freedom it did not use."""
+        most = max((run.alternative.gain for run in runs), default=0.0)
+        near = [run for run in runs if run.alternative.gain > CLOSE_GAIN * most]
+        count = self.fitter.problem.count(self.fitter.rows)
+        return self._run(fewer_knots(near, float(np.log(max(count, 2)))))
+
     def _freer(self, runs: list[Run], found: list[Run], last: list[Run]) -> list[Run]:
         names = {run.alternative.names for run in runs}
         curves = best_of_each([run for run in last if run.alternative.names in names and is_curve(run)])
         both = [*runs, *(c for c in curves if not any(c is run for run in runs))]
         free = self._run([job for run in both for job in more_freedom(run, self.low, self.high)])
+        free += self.trimmed(free)
         bound = {run.alternative.names: run.alternative.fit for run in found}
         problem = self.fitter.problem
         return [r for r in free if worth_its_freedom(problem, bound[r.alternative.names], r.alternative.fit)]

@@ -93,7 +93,7 @@ class Unknowns:
             return guess
 
     def _first_directions(self, like: Fit | None) -> FloatArray:
-        """Free directions of the initial state (nx, r): those of a fit in the states that the model has in common with it.
+        """Free directions of the initial state (nx, r): those of a fit, in the states that the model has in common.
 
         And two for the states that it has beside: a record may start while a slow sensor is still on its way.
         """
