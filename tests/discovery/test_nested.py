@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.attribute import Alternative, fit_variant
-from adaptive_flot.discovery.entries import ADDS, Run, unbent
+from adaptive_flot.discovery.entries import ADDS, Run, constants, unbent
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
 from adaptive_flot.discovery.problem import Problem, make_problem
@@ -83,6 +83,21 @@ def test_only_a_dependence_that_adds_nothing_starts_again(scored: tuple[Problem,
     assert len(unbent(reached, [_run(base, curve, fit, 100.0 * (1 + 0.99 * ADDS))], scorer)) == 1
     assert unbent(_run(base, curve, fit, 100.0), [reached], scorer) == []  # what is no constant starts nothing
     assert unbent(reached, [reached], scorer) == []
+
+
+@pytest.mark.parametrize(("from_the_start", "tried"), [(True, True), (False, False)])
+def test_a_constant_is_tried_where_it_is_nearly_as_good_as_a_course(from_the_start: bool, tried: bool) -> None:
+    """A thermometer that is off throughout, and one that jumps in the middle: that is no constant, to first order."""
+    right = tank_record(Truth(exponent=0.0, offset=0.0 if from_the_start else 4.0))
+    record = replace(right, outputs=right.outputs + 4.0) if from_the_start else right
+    problem = make_problem(record, heated_tank(), ADAPTED, burn_in=30, guard=5)
+    base = Fitter(problem).fit(heated_tank())
+    assert base is not None
+    scorer = scorer_of(problem, base)[0]
+    curve = next(s for s in _variants(scorer, "time", None) if s.variant.effect.form == "curve")
+    a = _run(base, curve, _fitted(problem, base, curve), 100.0).alternative
+    found = [(score.candidate.name, warm) for score, warm in constants(scorer, [a])]
+    assert found == ([((SITE, "constant"), a.fit)] if tried else [])
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.processes import flotation
-from tests.discovery.heated import EXPONENT, heated_tank, tank_record
+from tests.discovery.heated import DT, EXPONENT, NOISE, Truth, changed, heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")
 DRAUGHT = Effect("heat_loss", "fan_speed", "power", settings={"reference": 10.0})
@@ -84,6 +84,25 @@ def test_a_fit_starts_from_one_with_more_effects(base: tuple[Problem, Fit], left
     np.testing.assert_array_equal(unknowns.x0, expected)
     np.testing.assert_array_equal(unknowns.directions.sum(axis=1), expected)
     assert Fitter(problem).fit(smaller, like=like, rounds=1, steps=1) is not None
+
+
+def test_a_slow_sensor_may_be_on_its_way_when_the_record_starts() -> None:
+    """The thermometer starts 15 K below the tank and closes in by the exponential law, row by row."""
+    record, tau = tank_record(Truth(exponent=0.0, noise=0.0)), 300.0
+    shown, seen = float(record.outputs[0, 0]) - 15.0, []
+    for temperature in record.outputs[:, 0]:
+        shown += (1 - np.exp(-DT / tau)) * (temperature - shown)
+        seen.append(shown)
+    noisy = np.array(seen) + NOISE * np.random.default_rng(3).standard_normal(len(seen))
+    problem = make_problem(changed(record, noisy), heated_tank(), ADAPTED, burn_in=2, guard=5)
+    fit = Fitter(problem).fit(heated_tank())
+    assert fit is not None
+    slow = Effect("thermometer", "lag", "lag", {"amplitude": 1.0}, {"scale": 300.0})
+    name = slow.parameter("time_constant")
+    found = Fitter(problem).fit(fit.model.with_effects([slow]), (name,), {name: 100.0}, fit)
+    assert found is not None
+    assert dict(zip(found.names, found.values, strict=True))[name] == pytest.approx(tau, rel=0.06)
+    assert found.noise.std[0] == pytest.approx(NOISE, rel=0.15)
 
 
 def test_a_dependence_with_a_state_can_be_tried_as_a_constant() -> None:
