@@ -78,8 +78,8 @@ class Alternative:
 def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
     """Candidates worth a full fit, best first.
 
-    Left out is what adds nothing to a constant at its own site, and the second of two drivers that are one another's
-    mirror (level and froth depth) unless it is the one with a name.
+    Left out is what adds nothing to a constant at its own site, and of two drivers that are one another's mirror (level
+    and froth depth) the one without a name; else the one that scores worse; else the later one in the model.
     """
     scores = scorer.scores()
     best = scores[0].gain if scores else 0.0
@@ -93,7 +93,7 @@ def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
             continue
         twin = next((k for k in kept if _twins(k, score, scorer.drivers)), None)
         if twin is not None:
-            if c.known and not twin.candidate.known:
+            if _preferred(score, twin, list(scorer.drivers)):
                 kept[kept.index(twin)] = score
             continue
         if sum(k.candidate.site.name == c.site.name for k in kept) < SHORTLIST_EACH:
@@ -123,6 +123,15 @@ def _twins(a: Score, b: Score, drivers: Mapping[str, FloatArray]) -> bool:
     if one.site.name != other.site.name or one.driver not in drivers or other.driver not in drivers:
         return False
     return abs(float(np.corrcoef(drivers[one.driver], drivers[other.driver])[0, 1])) > 1 - SAME_DRIVER
+
+
+def _preferred(score: Score, twin: Score, order: list[str]) -> bool:
+    """Whether a mirror that scored no better is the one to keep. Where both score alike, rounding must not choose."""
+    own, other = score.candidate, twin.candidate
+    if own.known != other.known:
+        return own.known
+    alike = score.gain > (1 - SAME_DRIVER) * twin.gain
+    return alike and order.index(own.driver) < order.index(other.driver)
 
 
 def fit_variant(

@@ -176,8 +176,8 @@ def judge(found: Search) -> Judgement:
     # a drift of what is adapted is the ordinary explanation: what is hardly better does not replace it
     alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * found.together)
     drifting = next((a for a in alike if _only_drift(a, found)), None)
-    if drifting:
-        return Judgement("none", drifting, (), _others(found, drifting), margin)
+    if drifting:  # all there is, unless something else had to be granted to all
+        return Judgement("abstain" if found.granted else "none", drifting, (), _others(found, drifting), margin)
     if not named:
         return Judgement("unnamed" if len(close) == 1 else "abstain", best, (), rivals, margin)
     if named[0] is not best and not _near(named[0], best, LEAST_MARGIN * found.together):

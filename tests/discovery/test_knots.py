@@ -14,7 +14,7 @@ from adaptive_flot.discovery.catalogue import spline_values
 from adaptive_flot.discovery.events import freer
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.knots import MOST_KNOTS, is_even, trimmed
+from adaptive_flot.discovery.knots import MOST_KNOTS, is_even, knots_of, trimmed
 from adaptive_flot.discovery.problem import make_problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -37,7 +37,7 @@ def _regression(course: FloatArray, noise: float, seed: int) -> tuple[FloatArray
     """Measurements of a course, and the least-squares curve through all knots of the grid with its covariance."""
     measured = course + noise * np.random.default_rng(seed).standard_normal(len(TIME))
     basis = CubicSpline(GRID, np.eye(MOST_KNOTS), bc_type="natural")(TIME)
-    covariance = np.linalg.inv(basis.T @ basis) * noise**2
+    covariance: FloatArray = np.array(np.linalg.inv(basis.T @ basis) * noise**2, dtype=float)
     values = covariance @ basis.T @ measured / noise**2
     names = [f"value_{k + 1}" for k in range(MOST_KNOTS)]
     coefficients = dict(zip(names, map(float, values), strict=True))
@@ -68,7 +68,7 @@ def test_what_is_promised_is_what_least_squares_gives(any_fit: Fit, onset: float
     measured, effect, values, covariance = _regression(_dose(onset, decay), 0.05, seed)
     less = trimmed(_fit_of(any_fit, effect, values, covariance), effect, PRICE)
     assert less is not None
-    knots = np.array(less.variant.effect.settings["knots"], dtype=float)
+    knots = np.array(knots_of(less.variant.effect))
     spared = MOST_KNOTS - len(knots)
     exact = _loss(measured, GRID, 0.05) + PRICE * spared - _loss(measured, knots, 0.05)
     assert less.gain == pytest.approx(exact, abs=1e-6) and less.gain > 0
@@ -101,6 +101,6 @@ def test_knots_around_an_event_are_not_even() -> None:
     event = Effect("coalescence", "time", "washout", {"amplitude": 0.4, "onset": 1000.0, "time_constant": 100.0})
     found = freer(event, 0.0, 3000.0)
     assert found is not None
-    assert not is_even([float(k) for k in found[0].effect.settings["knots"]])
+    assert not is_even(knots_of(found[0].effect))
     assert is_even(list(np.linspace(0.0, 3000.0, 5)))
     assert is_even([GRID[k] for k in (0, 3, 4, 11, 27)])

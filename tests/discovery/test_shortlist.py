@@ -55,3 +55,14 @@ def test_of_two_drivers_that_say_the_same_one_is_enough(mirrored: bool) -> None:
     gains = {(SITES[0], "level"): 50.0, (SITES[0], "froth_depth"): 49.0}
     found = shortlist(_scorer(gains, {"level": level, "froth_depth": other}))
     assert len(found) == (1 if mirrored else 2)
+
+
+@pytest.mark.parametrize("off", [-1e-9, 0.0, 1e-9])
+def test_of_mirrors_that_score_alike_rounding_does_not_choose(off: float) -> None:
+    level = np.linspace(0, 1, 50)
+    gains = {(SITES[0], "level"): 50.0, (SITES[0], "froth_depth"): 50.0 * (1 + off)}
+    (found,) = shortlist(_scorer(gains, {"level": level, "froth_depth": 1 - level}))
+    assert found.candidate.driver == "level"
+    gains = {(SITES[0], "level"): 49.0, (SITES[0], "froth_depth"): 50.0}
+    (found,) = shortlist(_scorer(gains, {"level": level, "froth_depth": 1 - level}))
+    assert found.candidate.driver == "froth_depth"

@@ -64,6 +64,20 @@ def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, f
     assert all(rival is not judged.best for rival in judged.rivals)
 
 
+@pytest.mark.parametrize(("granted", "word"), [(None, "none"), (("heating", "time"), "abstain")])
+def test_a_drift_is_all_there_is_only_where_nothing_was_granted_beside_it(
+    draught: Discovery, granted: tuple[str, str] | None, word: str
+) -> None:
+    found = _search(draught, (BY_TIME, True, 0.0), (BY_FAN, True, 5.0))
+    drift = Effect("heat_loss", "time", "ramp", {"amplitude": 0.2, "onset": 0.0, "duration": 9000.0})
+    own = found.alternatives[0]
+    model = heated_tank().with_effects([drift])
+    alternatives = (replace(own, fit=replace(own.fit, model=model)), found.alternatives[1])
+    found = replace(found, alternatives=alternatives, granted=granted, adapted_sites=("heat_loss",))
+    judged = judge(found)
+    assert judged.word == word and judged.best is alternatives[0]
+
+
 def test_a_rival_that_could_as_well_have_been_better_is_not_told_apart(draught: Discovery) -> None:
     """Worse by 50, but a difference of 30 would be nothing unusual."""
     found = _search(draught, (BY_FAN, True, 0.0), (BY_HEATER, True, 50.0))
