@@ -69,8 +69,8 @@ def refit(
     followers = heats.followers(last)
     bent = heats.bent(followers, last)
     found = best_of_each([*heats.steps(followers, last), *bent, *followers, *last, *first])
-    found = best_of_each([*heats.freed(found, last), *found])
-    ranked = [run.alternative for run in best_of_each([*heats.trimmed(found[:MOST_FREED]), *found])]
+    found = best_of_each([*heats.trimmed(found[:MOST_FREED]), *found])
+    ranked = [run.alternative for run in best_of_each([*heats.freed(found, last), *found])]
     exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
     return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
 
@@ -163,7 +163,7 @@ class _Heats:
     def _freer(self, runs: list[Run], found: list[Run], last: list[Run]) -> list[Run]:
         names = {run.alternative.names for run in runs}
         curves = best_of_each([run for run in last if run.alternative.names in names and is_curve(run)])
-        both = [*runs, *(c for c in curves if not any(c is run for run in runs))]
+        both = [*(run for run in runs if not is_curve(run)), *curves]
         free = self._run([job for run in both for job in more_freedom(run, self.low, self.high)])
         free += self.trimmed(free)
         bound = {run.alternative.names: run.alternative.fit for run in found}
