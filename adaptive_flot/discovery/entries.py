@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.attribute import Alternative
-from adaptive_flot.discovery.catalogue import finer
+from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS, finer
 from adaptive_flot.discovery.events import event_scores, freer, step_score
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.knots import trimmed
@@ -184,6 +184,12 @@ def fewer_knots(runs: list[Run], price: float) -> list[Job]:
             score = replace(run.score, variant=less.variant, start=less.start)
             found[a.names] = promised, Job(run.lane, score, a.fit, drawn=True)
     return [job for _, job in found.values()]
+
+
+def from_scratch(jobs: list[Job]) -> list[Job]:
+    """The same curves from nothing: a rough one may have led the initial state astray, and each finer one with it."""
+    short = [job for job in jobs if len(job.score.start) <= FINE_TIME_KNOTS]
+    return [replace(j, score=replace(j.score, start=dict.fromkeys(j.score.start, 0.0)), warm=None) for j in short]
 
 
 def is_curve(run: Run) -> bool:

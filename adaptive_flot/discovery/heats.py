@@ -23,6 +23,7 @@ from adaptive_flot.discovery.entries import (
     fewer_knots,
     first_forms,
     forms,
+    from_scratch,
     is_curve,
     more_freedom,
     step,
@@ -155,17 +156,21 @@ class _Heats:
 
     def trimmed(self, runs: list[Run]) -> list[Run]:
         """Curves without the knots that they do not need, so that no course loses for a freedom it did not use."""
+        return self._run(self._fewer(runs))
+
+    def _fewer(self, runs: list[Run]) -> list[Job]:
         most = max((run.alternative.gain for run in runs), default=0.0)
         near = [run for run in runs if run.alternative.gain > CLOSE_GAIN * most]
         count = self.fitter.problem.count(self.fitter.rows)
-        return self._run(fewer_knots(near, float(np.log(max(count, 2)))))
+        return fewer_knots(near, float(np.log(max(count, 2))))
 
     def _freer(self, runs: list[Run], found: list[Run], last: list[Run]) -> list[Run]:
         names = {run.alternative.names for run in runs}
         curves = best_of_each([run for run in last if run.alternative.names in names and is_curve(run)])
         both = [*(run for run in runs if not is_curve(run)), *curves]
         free = self._run([job for run in both for job in more_freedom(run, self.low, self.high)])
-        free += self.trimmed(free)
+        fewer = self._fewer(free)
+        free += self._run([*fewer, *from_scratch(fewer)])
         bound = {run.alternative.names: run.alternative.fit for run in found}
         problem = self.fitter.problem
         return [r for r in free if worth_its_freedom(problem, bound[r.alternative.names], r.alternative.fit)]

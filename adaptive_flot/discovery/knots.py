@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS
+from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS, TIME_KNOTS
 from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import Effect
@@ -35,6 +35,8 @@ class Trimmed:
 def trimmed(fit: Fit, effect: Effect, price: float) -> Trimmed | None:
     """The last effect of a fit, a curve, with as few knots as the record asks for; None where it needs all.
 
+    Knots around an event stay: they are few, and tell an event from a drift.
+
     Parameters
     ----------
     fit
@@ -47,6 +49,8 @@ def trimmed(fit: Fit, effect: Effect, price: float) -> Trimmed | None:
     if effect.form != "curve":
         return None
     knots = knots_of(effect)
+    if effect.driver == "time" and not is_even(knots):
+        return None
     where = [fit.names.index(effect.parameter(f"value_{k + 1}")) for k in range(len(knots))]
     values: FloatArray = np.array(fit.values[where], dtype=float)
     information: FloatArray = np.array(
@@ -91,7 +95,7 @@ def knots_of(effect: Effect) -> list[float]:
 def is_even(knots: list[float]) -> bool:
     """Whether knots are evenly spread, or what trimming has left of the even knots of a course in time."""
     places = (np.array(knots) - knots[0]) / (knots[-1] - knots[0])
-    for count in (len(knots), FINE_TIME_KNOTS, MOST_KNOTS):
+    for count in (len(knots), TIME_KNOTS, FINE_TIME_KNOTS, MOST_KNOTS):
         steps = places * (count - 1)
         if np.max(np.abs(steps - np.round(steps))) < ON_GRID:
             return True
