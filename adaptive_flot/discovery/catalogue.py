@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.gate import LEAST_RANGE
 from adaptive_flot.discovery.lateness import late, limited
 from adaptive_flot.discovery.responses import Course, Responses
+from adaptive_flot.discovery.spline import knots_of, spline_values, through
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
-from adaptive_flot.greybox.static_forms import spline_basis
 
 ONSETS = 18
 """Steps at this many onsets score an event in time."""
@@ -203,15 +201,13 @@ def finer(variant: Variant, start: Mapping[str, float]) -> tuple[Variant, dict[s
     effect = variant.effect
     if effect.form != "curve":
         return None
-    coarse = [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
+    coarse = knots_of(effect)
     if len(coarse) == 2:
         return None
     count = FINE_TIME_KNOTS if effect.driver == "time" else FINE_KNOTS
-    knots = tuple(float(k) for k in np.linspace(coarse[0], coarse[-1], count))
-    values = spline_values(np.array(knots), coarse) @ [start[f"value_{k + 1}"] for k in range(len(coarse))]
-    fine = Effect(effect.site, effect.driver, "curve", settings={"knots": knots}, mode=effect.mode)
-    names = tuple(f"value_{k + 1}" for k in range(count))
-    return Variant(fine, (), names), dict(zip(names, map(float, values), strict=True))
+    knots = np.linspace(coarse[0], coarse[-1], count)
+    values = spline_values(knots, coarse) @ [start[f"value_{k + 1}"] for k in range(len(coarse))]
+    return through(effect, knots, values)
 
 
 def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...], offset: bool) -> Variant:
@@ -220,15 +216,3 @@ def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...]
     names = tuple(f"value_{k + 1}" for k in range(len(knots)))
     return Variant(effect, tuple(Course(site.name, b, offset) for b in basis.T), names)
 
-
-def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
-    """Cardinal natural splines (N, knots) at the values (N,): numbers from the very function the model uses."""
-    function = _spline_function(tuple(knots))
-    found: FloatArray = np.array(function.map(len(values))(values)).T
-    return found
-
-
-@lru_cache(maxsize=64)
-def _spline_function(knots: tuple[float, ...]) -> ca.Function:
-    x = ca.SX.sym("x")
-    return ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from adaptive_flot.discovery.spline import knots_of, values_of
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import KnownEffect
@@ -13,8 +14,8 @@ def trend(effect: Effect) -> float:
     """Positive where the value at the site rises with the driver over the record (or, of a constant, is larger)."""
     c = effect.coefficients
     if effect.form == "curve":
-        knots = np.atleast_1d(np.asarray(effect.settings["knots"], dtype=float))
-        return float((knots - knots.mean()) @ np.array([c[f"value_{k + 1}"] for k in range(len(knots))]))
+        knots = np.array(knots_of(effect))
+        return float((knots - knots.mean()) @ np.array(values_of(effect)))
     return float(next((c[name] for name in ("exponent", "slope", "amplitude") if name in c), 0.0))
 
 

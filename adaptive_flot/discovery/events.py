@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.catalogue import spline_values
-from adaptive_flot.discovery.knots import MOST_KNOTS, is_even, knots_of
+from adaptive_flot.discovery.knots import MOST_KNOTS, is_even
 from adaptive_flot.discovery.scoring import Score
+from adaptive_flot.discovery.spline import drawn, knots_of, through
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -48,7 +48,7 @@ def event_scores(score: Score, curve: Effect) -> list[Score]:
     """
     knots = knots_of(curve)
     t = np.linspace(knots[0], knots[-1], POINTS)
-    values = spline_values(t, knots) @ [curve.coefficients[f"value_{k + 1}"] for k in range(len(knots))]
+    values = drawn(curve, t)
     span = float(t[-1] - t[0])
     found = []
     for form, second in (("ramp", "duration"), ("washout", "time_constant")):
@@ -93,11 +93,10 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
     if effect.form == "step" or (effect.form == "ramp" and slow(effect)):
         return None
     if effect.form == "curve":
-        old = knots_of(effect)
-        if len(old) >= MOST_KNOTS:
+        if len(knots_of(effect)) >= MOST_KNOTS:
             return None
         at = np.linspace(low, high, MOST_KNOTS)
-        values = spline_values(at, old) @ [c[f"value_{k + 1}"] for k in range(len(old))]
+        values = drawn(effect, at)
     else:
         length = c["duration"] if effect.form == "ramp" else 2 * c["time_constant"]
         around = c["onset"] + length * np.array(AROUND)
@@ -108,10 +107,7 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
         values = c["amplitude"] * (
             np.minimum(since / c["duration"], 1) if ramp else 1 - np.exp(-since / c["time_constant"])
         )
-    settings = {"knots": tuple(float(k) for k in at)}
-    names = tuple(f"value_{k + 1}" for k in range(len(at)))
-    curve = Effect(effect.site, "time", "curve", settings=settings, mode=effect.mode)
-    return Variant(curve, (), names), dict(zip(names, map(float, values), strict=True))
+    return through(effect, at, values)
 
 
 def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
@@ -128,7 +124,7 @@ def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
 def _jumps(effect: Effect, knots: list[float], shortest: float) -> bool:
     """Whether a curve changes by a large factor, half of all it ever changes in a short time."""
     t = np.linspace(knots[0], knots[-1], POINTS)
-    values = spline_values(t, knots) @ [effect.coefficients.get(f"value_{k + 1}", 0.0) for k in range(len(knots))]
+    values = drawn(effect, t)
     ahead = max(1, round(shortest / float(t[1] - t[0])))
     whole = float(np.ptp(values))
     return whole > LARGE and bool(np.max(np.abs(values[ahead:] - values[:-ahead]), initial=0.0) > whole / 2)

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS, TIME_KNOTS
 from adaptive_flot.discovery.fit import Fit
+from adaptive_flot.discovery.spline import knots_of, through
 from adaptive_flot.discovery.variant import Variant
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -69,10 +70,7 @@ def trimmed(fit: Fit, effect: Effect, price: float) -> Trimmed | None:
         kept.pop(j + 1)
     if len(kept) == len(knots):
         return None
-    names = tuple(f"value_{k + 1}" for k in range(len(kept)))
-    curve = Effect(effect.site, effect.driver, "curve", settings={"knots": tuple(kept)}, mode=effect.mode)
-    start = dict(zip(names, map(float, drawn), strict=True))
-    return Trimmed(Variant(curve, (), names), start, price * (len(knots) - len(kept)) - lost)
+    return Trimmed(*through(effect, kept, drawn), price * (len(knots) - len(kept)) - lost)
 
 
 def _without(
@@ -85,11 +83,6 @@ def _without(
     found: FloatArray = np.asarray(np.linalg.lstsq(system, basis.T @ information @ values, rcond=None)[0], dtype=float)
     off = values - basis @ found
     return float(off @ information @ off), found
-
-
-def knots_of(effect: Effect) -> list[float]:
-    """Knots of a curve."""
-    return [float(k) for k in np.atleast_1d(np.asarray(effect.settings["knots"]))]
 
 
 def is_even(knots: list[float]) -> bool:
