@@ -215,4 +215,3 @@ def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...]
     basis = spline_values(values, knots)
     names = tuple(f"value_{k + 1}" for k in range(len(knots)))
     return Variant(effect, tuple(Course(site.name, b, offset) for b in basis.T), names)
-

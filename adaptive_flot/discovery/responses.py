@@ -16,11 +16,13 @@ from adaptive_flot.discovery.fit import Fit
 from adaptive_flot.discovery.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.nodes import NodeStepper, substeps
+from adaptive_flot.greybox.nodes import IntArray, NodeStepper, substeps
 from adaptive_flot.greybox.rows import over_rows
 from adaptive_flot.greybox.stepper import MOST_UNROLLED, Stepper
 
 ROWS_AT_ONCE = 500
+FILLED_AT_ONCE = 64
+"""Rows of answers that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
 LEAST_VALUE = 1e-6
 """Share of its largest value below which a site is at zero."""
 
@@ -100,8 +102,8 @@ class Responses:
         self._at_once = np.logical_not(np.any(self._G != 0, axis=(0, 1)))
         self._direct = self._spread(np.concatenate([self._H[:1], self._H]))
 
-    def _spread(self, values: FloatArray, rows: BoolArray | None = None) -> FloatArray:
-        """Values at all rows, or those that are true, from values at the rows that were simulated."""
+    def _spread(self, values: FloatArray, rows: IntArray | None = None) -> FloatArray:
+        """Values at all rows, or some of them, from values at the rows that were simulated."""
         if self._nodes is None:
             return values if rows is None else values[rows]
         return self._nodes.spread(values, rows)
@@ -131,43 +133,52 @@ class Responses:
         directions = self.fit.directions
         n, r = len(self.problem.record), directions.shape[1]
         S = np.hstack([np.zeros((len(directions), self._q)), directions])
-        inputs = np.zeros((n - 1, self._q + r))
+        inputs = np.zeros((n, self._q + r))
         inputs[:, : self._q] = 1.0
         return self._propagate(S, list(range(self._q)), inputs)
 
     def _propagate(
         self, S: FloatArray, source: list[int], courses: FloatArray, rows: BoolArray | None = None
     ) -> FloatArray:
-        """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N - 1, r)."""
-        m = len(self.problem.columns)
+        """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N, r).
+
+        What the courses are in row k acts in the interval that ends there; in the first row the same as in the second.
+        """
+        m, r = len(self.problem.columns), S.shape[1]
         where = np.array(source, dtype=np.intp)
         at_once, slow = np.flatnonzero(self._at_once[where]), np.flatnonzero(~self._at_once[where])
-        drive = np.concatenate([courses[:1], courses])
-        by_step = (courses if self._nodes is None else self._nodes.means(drive))[:, slow]
-        out = np.empty((len(self._steps) + 1, m, S.shape[1]))
+        # those that move a state, then those that only start somewhere: a block is quicker than picked columns
+        moving = np.concatenate([slow, np.arange(len(where), r)])
+        pushed, source_of = slice(0, len(slow)), where[slow]
+        by_step = (courses[1:] if self._nodes is None else self._nodes.means(courses))[:, slow]
+        S, out = S[:, moving], np.empty((len(self._steps) + 1, m, len(moving)))
         for i in range(len(self._steps)):
             np.matmul(self._C[i], S, out=out[i + 1])  # outputs at the end of the interval, by the state at its start
-            out[i + 1][:, slow] += self._H[i][:, where[slow]] * by_step[i]
+            out[i + 1][:, pushed] += self._H[i][:, source_of] * by_step[i]
             S = self._A[i] @ S
-            S[:, slow] += self._G[i][:, where[slow]] * by_step[i]
+            S[:, pushed] += self._G[i][:, source_of] * by_step[i]
         out[0] = out[1]
-        found = self._spread(out, rows)
-        direct, drive = (self._direct, drive) if rows is None else (self._direct[rows], drive[rows])
-        found[:, :, at_once] += direct[:, :, where[at_once]] * drive[:, None, at_once]
+        kept = np.flatnonzero(np.ones(len(courses), dtype=bool) if rows is None else rows)
+        found = np.empty((len(kept), m, r))
+        for first in range(0, len(kept), FILLED_AT_ONCE):
+            part, part_of = found[first : first + FILLED_AT_ONCE], kept[first : first + FILLED_AT_ONCE]
+            part[:, :, moving] = self._spread(out, part_of)
+            part[:, :, at_once] = self._direct[part_of][:, :, where[at_once]] * courses[part_of][:, None, at_once]
         return found
 
     def of(self, courses: list[Course], rows: BoolArray | None = None) -> FloatArray:
         """Answers (N, m, r) of the measured outputs to r courses; of the rows (N,) that are true only, if any given."""
         source = [self._q + self.sites.index(c.site) for c in courses]
-        table = np.empty((len(self.problem.record) - 1, len(courses)))
+        table = np.empty((len(self.problem.record), len(courses)))
         for j, c in enumerate(courses):
-            v = c.values[1:]
+            v = c.values
             default = self._offset[c.site]
             if c.offset and not default:
-                v = v * self._inverse(c.site)[1:]
+                v = v * self._inverse(c.site)
             elif default and not c.offset:
-                v = v * self.site_values[c.site][1:]
+                v = v * self.site_values[c.site]
             table[:, j] = v
+        table[0] = table[1]
         return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table, rows)
 
     def _inverse(self, site: str) -> FloatArray:

@@ -7,6 +7,7 @@ coloured noise nor soaked up by the very effect that is looked for.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,8 @@ PRIOR_SHARE = 0.3
 """Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
 DEPENDENT = 1e-12
 """Share of the strongest combination of a variant's answers below which one is rounding, in squares."""
+AT_ONCE = 100
+"""Rows or columns of a catalogue's answers (150 MB) that are worked on in one go: fresh memory is slow."""
 ABSORBED = 1e-7
 """Share of an answer that must be left after projection; less is rounding, in which anything can be found."""
 
@@ -75,10 +78,13 @@ class Scorer:
         self._present = present[self._reached]
         base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
         self._base = base
-        columns = self.noise.whiten(answers)[self._present]
+        columns = self._whitened(answers)
+        del answers  # each is 150 MB for a whole catalogue
         columns *= self._size  # from here on in standard deviations of the prior
         size = np.einsum("ij,ij->j", columns, columns)
-        columns -= base @ (base.T @ columns)
+        along = base.T @ columns
+        for part in _parts(len(columns)):
+            columns[part] -= base[part] @ along
         left = np.einsum("ij,ij->j", columns, columns)
         columns[:, left < ABSORBED**2 * size] = 0.0  # what is left is rounding
         self.residual = self._project(np.clip(e[present], -1e3, 1e3))
@@ -100,7 +106,16 @@ class Scorer:
 
     def _answers(self, courses: list[Course]) -> FloatArray:
         """Weighted answers to r courses on the rows of `_reached` (rows, m, r)."""
-        return self._responses.of(courses, self._reached) / self.problem.weights[self._reached][:, :, None]
+        found = self._responses.of(courses, self._reached)
+        found /= self.problem.weights[self._reached][:, :, None]
+        return found
+
+    def _whitened(self, answers: FloatArray) -> FloatArray:
+        """Whitened answers (values present, r); answers (rows, m, r). A few at a time, as fresh memory is slow."""
+        found = np.empty((int(self._present.sum()), answers.shape[2]))
+        for part in _parts(answers.shape[2]):
+            found[:, part] = self.noise.whiten(answers[:, :, part])[self._present]
+        return found
 
     @staticmethod
     def _prior(offset: bool, responses: Responses, site: str) -> float:
@@ -123,7 +138,9 @@ class Scorer:
         r = residual[self.rows] / std
         present = np.isfinite(r)
         inside = self.rows[self._reached]
-        X = (answers[inside][:, :, wanted] * self._size[wanted] / std[:, None])[present]
+        X = answers[np.ix_(inside, np.arange(answers.shape[1]), np.array(wanted, dtype=np.intp))][present]
+        X *= self._size[wanted]
+        X /= np.broadcast_to(std, present.shape)[present][:, None]
         Z = (nuisance[inside] / std[:, None])[present]
         y = r[present]
         base, _ = np.linalg.qr(Z)
@@ -186,7 +203,7 @@ class Scorer:
             for factor in (LENGTHS if length else (1.0,))
             if time[0] < onset < time[-1]
         ]
-        columns = self.noise.whiten(self._answers([v.courses[0] for v in variants]))[self._present]
+        columns = self._whitened(self._answers([v.courses[0] for v in variants]))
         columns -= self._base @ (self._base.T @ columns)
         gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
         best = int(np.argmax(gains))
@@ -217,3 +234,8 @@ class Scorer:
                 penalty = (len(variant.courses) + len(variant.start)) * np.log(self._count)
                 best = np.maximum(best, gain - penalty)
         return best
+
+
+def _parts(count: int) -> Iterator[slice]:
+    """Slices of a range, each of at most `AT_ONCE`."""
+    return (slice(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE))

@@ -49,8 +49,8 @@ class Nodes:
     inputs: FloatArray
     weights: csr_array
 
-    def spread(self, values: FloatArray, rows: NDArray[np.bool_] | None = None) -> FloatArray:
-        """Values at all rows (N, ...), or those of them that are true, from values at the nodes (M, ...)."""
+    def spread(self, values: FloatArray, rows: IntArray | None = None) -> FloatArray:
+        """Values at all rows (N, ...), or at some of them, from values at the nodes (M, ...)."""
         weights = self.weights if rows is None else self.weights[rows]
         found: FloatArray = weights @ values.reshape(len(values), -1)
         return found.reshape(-1, *values.shape[1:])
