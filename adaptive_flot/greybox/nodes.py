@@ -53,7 +53,7 @@ class Nodes:
         """Values at all rows (N, ...), or at some of them, from values at the nodes (M, ...)."""
         weights = self.weights if rows is None else self.weights[rows]
         found: FloatArray = weights @ values.reshape(len(values), -1)
-        return found.reshape(-1, *values.shape[1:])
+        return found.reshape(len(found), *values.shape[1:])
 
     def means(self, values: FloatArray) -> FloatArray:
         """Means (M - 1, ...) over the rows of each interval, the row at its end among them; values (N, ...)."""

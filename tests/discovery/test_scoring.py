@@ -110,6 +110,25 @@ def test_scores_see_the_same_answers_on_the_rows_they_need(weak: tuple[Problem, 
     np.testing.assert_array_equal(some[rows[reached]], every[rows])
 
 
+@pytest.mark.parametrize("coarse", [False, True])
+def test_an_answer_does_not_depend_on_its_company(weak: tuple[Problem, Fit, Scorer], coarse: bool) -> None:
+    """Courses that move the tank and courses that only the sensor shows, mixed, against each alone and against none."""
+    problem, fit, _ = weak
+    if coarse:
+        problem = replace(problem, nodes=place_nodes(problem.record, 4))
+    responses, fan, rows = Responses(problem, fit), problem.record.inputs[:, 1], problem.rows("estimate")
+    courses = [
+        Course("thermometer", np.linspace(0, 1, 600), True),
+        Course("heat_loss", np.log(fan / 10), False),
+        Course("thermometer", fan, False),
+        Course("heating", np.ones(600), False),
+    ]
+    together = responses.of(courses, rows)
+    for j, course in enumerate(courses):
+        np.testing.assert_allclose(responses.of([course], rows)[:, :, 0], together[:, :, j], rtol=1e-12, atol=1e-12)
+    assert responses.of([], rows).shape == (rows.sum(), 1, 0)
+
+
 def test_a_fit_that_went_through_a_pickle_has_its_model_again() -> None:
     """Fits come back from other processes without the equations, which do not pickle."""
     _, fit = _fitted(Truth())
