@@ -20,6 +20,7 @@ from adaptive_flot.discovery.gate import Gate, gate
 from adaptive_flot.discovery.joint import search_jointly, wants_joint
 from adaptive_flot.discovery.locate import locate
 from adaptive_flot.discovery.pace import at_every_row
+from adaptive_flot.discovery.parallel import one_thread
 from adaptive_flot.discovery.prepare import prepare, shared
 from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.search import Search, search
@@ -60,6 +61,7 @@ class Discovery:
     after: Fit | None = None
 
 
+@one_thread()
 def discover(
     model: Model,
     record: Dataset,

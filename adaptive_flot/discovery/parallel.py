@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
 
 from adaptive_flot.greybox.rows import core_count
 
@@ -17,6 +20,17 @@ _work: Callable[[Any], Any] | None = None
 def _call(item: Any) -> Any:
     assert _work is not None  # set before the fork
     return _work(item)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Linear algebra on one thread, in this process and those that it forks.
+
+    Cores are for processes: threads beside them only wait for each other. And sums are then taken in the same order on
+    every machine, so that the last digits of a verdict do not depend on its number of cores.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def parallel_map(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from adaptive_flot.discovery.discover import Discovery, discover
 from adaptive_flot.errors import ModelError
@@ -37,6 +38,20 @@ def test_the_extended_model_predicts_a_record_that_nobody_has_seen(draught: Disc
         return float(np.sqrt(np.mean((free - fresh.outputs)[50:] ** 2)))
 
     assert error(draught, True) < 0.15 * error(draught, False)
+
+
+def test_linear_algebra_takes_one_thread_and_gives_the_others_back() -> None:
+    """Sums in one order on every machine: seen by the progress callback, with two threads allowed outside."""
+
+    def threads(stage: str = "") -> None:
+        seen.append((stage, {d["num_threads"] for d in threadpool_info() if d["user_api"] == "blas"}))
+
+    seen: list[tuple[str, set[int]]] = []
+    with threadpool_limits(limits=2, user_api="blas"):
+        discover(heated_tank(), tank_record(Truth(exponent=0.0)), progress=threads)
+        assert len(seen) > 3 and all(count == {1} for _, count in seen)
+        threads()
+    assert seen[-1] == ("", {2})
 
 
 @pytest.mark.parametrize("seed", range(5))
