@@ -76,6 +76,17 @@ def test_rivals_judge_a_folder_and_no_failure_stops_the_rest(folder: Path, tmp_p
         run_method(tmp_path, "correlation", "mine", "another", jobs=1)
 
 
+def test_an_estimate_that_only_drifts_waits_for_no_responses(folder: Path, tmp_path: Path) -> None:
+    """It needs the fit alone, which those that ask for candidates then share."""
+    record = tmp_path / "records" / "short.csv"
+    record.parent.mkdir()
+    pd.read_csv(record_file(folder, "record_0000")).iloc[:1400].to_csv(record, index=False)
+    for name, kept in (("drift", ["short.fit.pickle"]), ("bic", ["short.fit.pickle", "short.responses.pickle"])):
+        judge(name, record, tmp_path / "v.json")
+        assert sorted(file.name for file in (tmp_path / "cache").iterdir()) == kept
+        assert isinstance(read_verdict(tmp_path / "v.json"), Verdict)
+
+
 def test_the_oracle_needs_the_answer(tmp_path: Path) -> None:
     """No rival gets it by accident."""
     assert RIVALS[-1] == "oracle"
@@ -104,7 +115,7 @@ def _toy(residual_of: str) -> Prepared:
     drivers = {"air_flow": air, "froth_depth": depth / depth.std()}
     time = np.arange(600.0, 600.0 + 5.0 * rows, 5.0)
     outputs = ("concentrate_grade", "level_m")
-    return Prepared(residual, slopes, responses, late, drivers, outputs, np.ones(2), time, 2600.0)
+    return Prepared(residual, slopes, drivers, outputs, np.ones(2), time, 2600.0, responses, late)
 
 
 def test_rivals_find_what_lies_in_their_own_family() -> None:

@@ -29,8 +29,10 @@ def judge(name: str, record: Path, out: Path, answer: Path | None = None) -> Non
         if answer is None:
             raise DataError("oracle: needs --answer, the file of the record's answer")
         verdict = oracle.judge(record, answer)
+    elif name == "drift":  # it asks for no candidates
+        verdict = drift.judge(base.fitted(record))
     else:
-        methods = {"correlation": correlation.judge, "bic": bic.judge, "drift": drift.judge, "spline": spline.judge}
+        methods = {"correlation": correlation.judge, "bic": bic.judge, "spline": spline.judge}
         verdict = methods[name](base.prepared(record))
     verdict["seconds"] = round(time.perf_counter() - begun, 3)
     write_text(out, json.dumps(verdict, indent=1) + "\n")

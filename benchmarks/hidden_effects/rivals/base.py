@@ -7,8 +7,10 @@ Rows are every fifth second; columns are stacked over the outputs, each over its
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
@@ -28,16 +30,15 @@ ONSETS = np.linspace(0.1, 0.75, 9)  # of steps in time, share of the record
 DRIVERS = ("air_flow", "feed_flow", "froth_depth", "grade", "solids", "valuable_solids")
 Pair = tuple[str, str]
 Mask = NDArray[np.bool_]
+Kept = TypeVar("Kept")
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """A record made ready: (M,) is rows times outputs, one output after the other."""
+class Fitted:
+    """A record and the nominal cell fitted to it: (M,) is rows times outputs, one output after the other."""
 
     residual: Array  # (M,)
     slopes: Array  # (M, 2): to ln n, ln C
-    responses: dict[str, Array]  # site -> (M,)
-    late: dict[str, Array]  # sensor -> (M,): one second late
     drivers: dict[str, Array]  # (rows,), standardised; those that stand still left out
     outputs: tuple[str, ...]
     noise: Array  # (outputs,)
@@ -49,15 +50,6 @@ class Prepared:
         low, high = BLOCKS[name]
         share = np.tile(self.time / self.seconds, len(self.outputs))
         return np.asarray(np.isfinite(self.residual) & (share >= low) & (share < high))
-
-    def candidates(self) -> tuple[Array, list[Pair]]:
-        """Every site times every driver, (M, K), and their names; time is a ramp and a step at each of `ONSETS`."""
-        count, share = len(self.outputs), self.time / self.seconds
-        steps = [("time", np.asarray(share >= onset, dtype=np.float64)) for onset in ONSETS]
-        curves = [("constant", np.ones(len(share))), ("time", share), *steps, *self.drivers.items()]
-        columns = [r * np.tile(curve, count) for r in self.responses.values() for _, curve in curves]
-        names = [(site, driver) for site in self.responses for driver, _ in curves]
-        return np.column_stack([*columns, *self.late.values()]), [*names, *((site, "lag") for site in self.late)]
 
     def error(self, explained: Array) -> dict[str, dict[str, float | str]]:
         """Error block of a verdict: residual before, and after what is explained (M,) is taken off; report block."""
@@ -73,6 +65,34 @@ class Prepared:
         return result
 
 
+@dataclass(frozen=True)
+class Prepared(Fitted):
+    """The same with what each site would change."""
+
+    responses: dict[str, Array]  # site -> (M,)
+    late: dict[str, Array]  # sensor -> (M,): one second late
+
+    def candidates(self) -> tuple[Array, list[Pair]]:
+        """Every site times every driver, (M, K), and their names; time is a ramp and a step at each of `ONSETS`."""
+        count, share = len(self.outputs), self.time / self.seconds
+        steps = [("time", np.asarray(share >= onset, dtype=np.float64)) for onset in ONSETS]
+        curves = [("constant", np.ones(len(share))), ("time", share), *steps, *self.drivers.items()]
+        columns = [r * np.tile(curve, count) for r in self.responses.values() for _, curve in curves]
+        names = [(site, driver) for site in self.responses for driver, _ in curves]
+        return np.column_stack([*columns, *self.late.values()]), [*names, *((site, "lag") for site in self.late)]
+
+
+@dataclass(frozen=True)
+class BaseRun:
+    """The run of the fitted nominal cell, from which the responses are taken."""
+
+    inputs: Array  # (N, 3)
+    start: list[float]
+    predicted: dict[str, Array]  # (N,) each
+    n: float
+    C: float
+
+
 def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2))) if len(x) else float("nan")
 
@@ -84,35 +104,48 @@ def noise_of(y: Array) -> float:
     return float(max(np.median(np.abs(d)) / 0.6745 / np.sqrt(2.0), 1e-3 * np.nanstd(y), 1e-12))
 
 
-def prepare(file: Path) -> Prepared:
-    """Fit the nominal cell to the first 60 % of a record and gather residual and candidates."""
+def fit(file: Path) -> tuple[Fitted, BaseRun]:
+    """Fit the nominal cell to the first 60 % of a record."""
     table = pd.read_csv(file)
     inputs = table[list(INPUTS)].to_numpy(dtype=np.float64)
     measured = {name: table[name].to_numpy(dtype=np.float64) for name in OUTPUTS if name in table}
     noise = {name: noise_of(y) for name, y in measured.items()}
     start = steady_state(inputs[0], World())
     count, names = len(table), tuple(measured)
-    fit = fit_nominal(inputs, measured, noise, start, slice(FIRST, int(0.6 * count)), (World.n, World.C), iterations=3)
-    base, rows = fit.predicted, np.arange(FIRST, count, EVERY)
-
-    def stack(columns: dict[str, Array]) -> Array:
-        return np.concatenate([columns[name][rows] / noise[name] for name in names])
-
-    slopes = sensitivity(np.log(np.array([fit.n, fit.C])), inputs, start, base, names)
-    zero = dict.fromkeys(names, np.zeros(count))
-    late = {SENSOR_OF[name]: stack(zero | {name: -np.gradient(base[name])}) for name in names}
-    sensors = {SENSOR_OF[name]: stack(zero | {name: np.full(count, noise[name])}) for name in names}
-    return Prepared(
-        residual=stack({name: measured[name] - base[name] for name in names}),
-        slopes=np.column_stack([stack(s) for s in slopes]),
-        responses={site: stack(r) for site, r in _responses(inputs, start, base, fit.n, fit.C).items()} | sensors,
-        late=late,
+    part = slice(FIRST, int(0.6 * count))
+    found = fit_nominal(inputs, measured, noise, start, part, (World.n, World.C), iterations=3)
+    base, rows = found.predicted, np.arange(FIRST, count, EVERY)
+    sigma = np.array([noise[name] for name in names])
+    slopes = sensitivity(np.log(np.array([found.n, found.C])), inputs, start, base, names)
+    fitted = Fitted(
+        residual=_stack({name: measured[name] - base[name] for name in names}, names, sigma, rows),
+        slopes=np.column_stack([_stack(s, names, sigma, rows) for s in slopes]),
         drivers={name: _standard(base[name][rows]) for name in DRIVERS if _moves(base[name][rows])},
         outputs=names,
-        noise=np.array([noise[name] for name in names]),
+        noise=sigma,
         time=rows.astype(np.float64),
         seconds=float(count),
     )
+    return fitted, BaseRun(inputs, start, base, found.n, found.C)
+
+
+def prepare(fitted: Fitted, run: BaseRun) -> Prepared:
+    """Add what each site would change: half of the time that the rivals take."""
+    rows, names, base = fitted.time.astype(int), fitted.outputs, run.predicted
+    zero = dict.fromkeys(names, np.zeros(len(run.inputs)))
+
+    def stack(columns: dict[str, Array]) -> Array:
+        return _stack(columns, names, fitted.noise, rows)
+
+    sigma = dict(zip(names, fitted.noise, strict=True))
+    late = {SENSOR_OF[name]: stack(zero | {name: -np.gradient(base[name])}) for name in names}
+    sensors = {SENSOR_OF[name]: stack(zero | {name: np.full(len(run.inputs), sigma[name])}) for name in names}
+    inside = {site: stack(r) for site, r in _responses(run.inputs, run.start, base, run.n, run.C).items()}
+    return Prepared(**vars(fitted), responses=inside | sensors, late=late)
+
+
+def _stack(columns: dict[str, Array], names: tuple[str, ...], noise: Array, rows: NDArray[np.int_]) -> Array:
+    return np.concatenate([columns[name][rows] / s for name, s in zip(names, noise, strict=True)])
 
 
 def _responses(inputs: Array, start: list[float], base: dict[str, Array], n: float, C: float
@@ -137,17 +170,25 @@ def _standard(x: Array) -> Array:
     return np.asarray((x - x.mean()) / x.std(), dtype=np.float64)
 
 
+def fitted(file: Path) -> Fitted:
+    """`fit`, kept beside the records (DIR/cache): five rivals, one fit."""
+    return _kept(file, "fit", lambda: fit(file))[0]
+
+
 def prepared(file: Path) -> Prepared:
-    """`prepare`, kept beside the records (DIR/cache): five rivals, one fit."""
-    cache = file.parent.parent / "cache" / f"{file.stem}.pickle"
+    """`prepare`, kept likewise: only those who ask for candidates wait for it."""
+    return _kept(file, "responses", lambda: prepare(*_kept(file, "fit", lambda: fit(file))))
+
+
+def _kept(file: Path, what: str, make: Callable[[], Kept]) -> Kept:
+    cache = file.parent.parent / "cache" / f"{file.stem}.{what}.pickle"
     if cache.is_file():
-        found = pickle.loads(cache.read_bytes())
-        assert isinstance(found, Prepared)
-        return found
-    ready = prepare(file)
+        known: Kept = pickle.loads(cache.read_bytes())
+        return known
+    made = make()
     with replace_path(cache) as temporary:
-        temporary.write_bytes(pickle.dumps(ready))
-    return ready
+        temporary.write_bytes(pickle.dumps(made))
+    return made
 
 
 def least_squares(columns: Array, y: Array, rows: Mask) -> Array:
@@ -155,7 +196,7 @@ def least_squares(columns: Array, y: Array, rows: Mask) -> Array:
     return np.asarray(np.linalg.lstsq(columns[rows], y[rows], rcond=None)[0], dtype=np.float64)
 
 
-def adapt(p: Prepared) -> Array:
+def adapt(p: Fitted) -> Array:
     """What new values of n and C (bounded) explain of the residual, fitted on the first block, (M,)."""
     shift = least_squares(p.slopes, p.residual, p.block("fit"))
     return np.asarray(p.slopes @ np.clip(shift, -REACH, REACH), dtype=np.float64)

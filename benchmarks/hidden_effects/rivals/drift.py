@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden_effects.base_fit import REACH
-from benchmarks.hidden_effects.rivals.base import Prepared
+from benchmarks.hidden_effects.rivals.base import Fitted
 from benchmarks.hidden_effects.simulate import Array
 
 WALK = np.array([2e-3, 8e-3])  # standard deviation of ln n and ln C a row (5 s)
@@ -19,7 +19,7 @@ EXPLAINED = 0.3  # share of the smoothed estimate's variance that a driver must 
 MOVED = 3.0  # standard deviations of the smoothed estimate by which it must move
 
 
-def smooth(p: Prepared) -> tuple[Array, Array]:
+def smooth(p: Fitted) -> tuple[Array, Array]:
     """Smoothed shifts of (ln n, ln C), (rows, 2), and their standard deviations."""
     rows, outputs = len(p.time), len(p.outputs)
     H = p.slopes.reshape(outputs, rows, 2)
@@ -45,7 +45,7 @@ def smooth(p: Prepared) -> tuple[Array, Array]:
     return states, np.sqrt(np.abs(np.diagonal(spread, axis1=1, axis2=2)))
 
 
-def judge(p: Prepared) -> dict[str, Any]:
+def judge(p: Fitted) -> dict[str, Any]:
     """Verdict: `named` (one of the two parameters and a driver) or `none`."""
     states, spread = smooth(p)
     part = p.time <= 0.6 * p.time[-1]
