@@ -13,6 +13,7 @@ from rich.table import Table
 from adaptive_flot.discovery.spline import drawn
 from adaptive_flot.greybox.form import number
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.report.series import cases
 from adaptive_flot.runner.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.inquiry import Inquiry
 from adaptive_flot.runner.prediction import one_move_errors, one_step_errors, rms
@@ -23,11 +24,6 @@ from benchmarks.freezing import spread
 
 SCENARIO, SEEDS, OUTPUT = "undeclared_effect", (1, 2, 3), "concentrate_grade"
 LABELS = ("n", "C")
-
-
-def late(scenario: Scenario, run: Run) -> pd.DataFrame:
-    """Rows that the report counts."""
-    return run.table[run.table["time_s"] > scenario.fits_after + 1e-9]
 
 
 def offset(table: pd.DataFrame, label: str) -> FloatArray:
@@ -47,7 +43,8 @@ def not_white(table: pd.DataFrame, after: float) -> str:
 
 def figures(scenario: Scenario, runs: list[Run]) -> dict[str, str]:
     """Figures of one estimator by name: median and range over the seeds; where a word says so, each seed's."""
-    tables = [late(scenario, run) for run in runs]
+    (case,) = cases([(scenario, runs)])
+    tables = [case.shown(run) for run in runs]
     ahead = [one_move_errors(t, run.plans)["error"].to_numpy(dtype=float) for t, run in zip(tables, runs, strict=True)]
     found = {
         "error one sample ahead, 1e-4": spread([1e4 * rms(one_step_errors(t, OUTPUT)) for t in tables], 1),

@@ -158,7 +158,7 @@ class Responses:
             S = self._A[i] @ S
             S[:, pushed] += self._G[i][:, source_of] * by_step[i]
         out[0] = out[1]
-        kept = np.flatnonzero(np.ones(len(courses), dtype=bool) if rows is None else rows)
+        kept = np.arange(len(courses)) if rows is None else np.flatnonzero(rows)
         found = np.empty((len(kept), m, r))
         for first in range(0, len(kept), FILLED_AT_ONCE):
             part, part_of = found[first : first + FILLED_AT_ONCE], kept[first : first + FILLED_AT_ONCE]
