@@ -64,9 +64,9 @@ def run(
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
     from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
-    from adaptive_flot.runner.results import run_summary, write_json, write_runs
-    from adaptive_flot.runner.scenario import load_scenario
-    from adaptive_flot.runner.study import run_scenario
+    from adaptive_flot.runner.commands.run import run_scenario
+    from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
+    from adaptive_flot.runner.scenario.scenario import load_scenario
 
     loaded = load_scenario(scenario)
     loaded = loaded.compiled() if _can_compile(compile_) else loaded
@@ -81,7 +81,7 @@ def run(
         write_json(target, summary)
     print_fits([(loaded, runs)])
     print_closed_loop(loaded, runs)
-    from adaptive_flot.report.html import write_run_report
+    from adaptive_flot.report.run.page import write_run_report
 
     write_run_report([(loaded, runs)], folder / "report.html", command=_command())
     typer.echo(f"Report: {folder / 'report.html'}")
@@ -96,9 +96,9 @@ def simulate(
     accurate: Annotated[bool, typer.Option("--accurate", help="IDAS on the DAE instead of the fast step.")] = False,
 ) -> None:
     """Simulate a table of inputs: every state and output column comes out."""
-    from adaptive_flot.greybox.tables import write_table
+    from adaptive_flot.greybox.data.tables import write_table
     from adaptive_flot.processes.registry import make_model
-    from adaptive_flot.runner.simulate import simulate_file
+    from adaptive_flot.runner.commands.simulate import simulate_file
 
     table = simulate_file(inputs, make_model(model, cell=cell, folder=inputs.parent), accurate=accurate)
     write_table(table, out)
@@ -132,9 +132,14 @@ def estimate(
     from adaptive_flot.console import print_estimate, progress_bar
     from adaptive_flot.errors import CellError
     from adaptive_flot.processes.registry import find_cell, make_model
-    from adaptive_flot.runner.estimate import estimate_record, read_blocks
-    from adaptive_flot.runner.results import write_json
-    from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, save_fitted_model, write_replays
+    from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
+    from adaptive_flot.runner.commands.estimate_files import (
+        estimate_summary,
+        save_fitted_cell,
+        save_fitted_model,
+        write_replays,
+    )
+    from adaptive_flot.runner.commands.run_files import write_json
 
     if save_cell is not None and model != "flotation":
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
@@ -154,7 +159,7 @@ def estimate(
     if save_model is not None:
         save_fitted_model(result, save_model, base=model, cell=cell, folder=data.parent)
     print_estimate(result)
-    from adaptive_flot.report.estimate import write_estimate_report
+    from adaptive_flot.report.estimate.page import write_estimate_report
 
     write_estimate_report(result, folder / "report.html", command=_command())
     typer.echo(f"Report: {folder / 'report.html'}")
@@ -182,10 +187,10 @@ def discover(
 ) -> None:
     """Find what physical effect a model lacks, from a measured record, and show the error before and after."""
     from adaptive_flot.console import print_discovery, stage_bar
-    from adaptive_flot.discovery.parallel import available_processes
+    from adaptive_flot.discovery.fitting.parallel import available_processes
     from adaptive_flot.processes.registry import make_model
-    from adaptive_flot.runner.discover import check_model_path, discover_file, read_limits, save_discovered
-    from adaptive_flot.runner.results import write_json
+    from adaptive_flot.runner.commands.discover import check_model_path, discover_file, read_limits, save_discovered
+    from adaptive_flot.runner.commands.run_files import write_json
 
     check_model_path(save_model)
     limits = read_limits(limit or ())
@@ -205,7 +210,7 @@ def discover(
     if not report:
         page.unlink(missing_ok=True)  # that of an earlier verdict
         return
-    from adaptive_flot.report.discovery import write_discovery_report
+    from adaptive_flot.report.discovery.page import write_discovery_report
 
     write_discovery_report(found, data.stem, page, command=_command())
     typer.echo(f"Report: {page}")
@@ -223,12 +228,12 @@ def compare(
     """Put controllers and estimators of one or several results side by side, scenario by scenario."""
     from adaptive_flot.console import print_comparison
     from adaptive_flot.files import write_text
-    from adaptive_flot.report import compare_tables
-    from adaptive_flot.report.compare import write_compare_report
-    from adaptive_flot.report.compare_findings import findings
-    from adaptive_flot.runner import comparison
-    from adaptive_flot.runner.results import write_json
-    from adaptive_flot.runner.runs_table import read_runs
+    from adaptive_flot.report.compare import tables as compare_tables
+    from adaptive_flot.report.compare.findings import findings
+    from adaptive_flot.report.compare.page import write_compare_report
+    from adaptive_flot.runner.commands import comparison
+    from adaptive_flot.runner.commands.run_files import write_json
+    from adaptive_flot.runner.commands.runs_table import read_runs
 
     found = comparison.compare(read_runs(results))
     tables = [compare_tables.compare_tables(c) for c in found]
@@ -288,7 +293,7 @@ def scenarios() -> None:
     """List the shipped scenarios with a line each."""
     import yaml
 
-    from adaptive_flot.runner.scenario import shipped_scenarios
+    from adaptive_flot.runner.scenario.scenario import shipped_scenarios
 
     shipped = shipped_scenarios()
     width = max(map(len, shipped), default=0)
@@ -309,7 +314,7 @@ def _can_compile(asked: bool) -> bool:
     """Whether to compile; where it is asked for and nothing can be compiled, one line says why."""
     if not asked:
         return False
-    from adaptive_flot.greybox.compiled import compiler_problem
+    from adaptive_flot.greybox.stepping.compiled import compiler_problem
 
     problem = compiler_problem()
     if problem is not None:

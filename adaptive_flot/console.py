@@ -14,14 +14,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.report import compare_tables
-from adaptive_flot.report import page as report
-from adaptive_flot.report.compare_findings import findings
-from adaptive_flot.report.unsolved import unsolved_table
-from adaptive_flot.runner.comparison import compare_runs
-from adaptive_flot.runner.estimate import RecordEstimate
-from adaptive_flot.runner.scenario import Scenario
-from adaptive_flot.runner.study import Run
+from adaptive_flot.report.compare import tables as compare_tables
+from adaptive_flot.report.compare.findings import findings
+from adaptive_flot.report.kit import page as report
+from adaptive_flot.report.run.unsolved import unsolved_table
+from adaptive_flot.runner.commands.comparison import compare_runs
+from adaptive_flot.runner.commands.estimate import RecordEstimate
+from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 PIPE_WIDTH = 140
 """Letters a line where standard output is no terminal."""

@@ -20,7 +20,7 @@ ESTIMATORS: Mapping[str, str] = {
     "mhe": "estimators.mhe:Mhe",
     "oracle": "estimators.oracle:Oracle",
     "rpem": "estimators.rpem:Rpem",
-    "rpem_full": "estimators.rpem_full:rpem_full",
+    "rpem_full": "estimators.rpem:rpem_full",
 }
 BATCH_ESTIMATORS: Mapping[str, str] = {"pem": "estimators.pem:Pem"}
 CONTROLLERS: Mapping[str, str] = {

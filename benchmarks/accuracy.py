@@ -28,11 +28,11 @@ from rich.progress import track
 from rich.table import Table
 from scipy.stats import chi2
 
-from adaptive_flot.greybox.tables import read_table, write_table
+from adaptive_flot.greybox.data.tables import read_table, write_table
 from adaptive_flot.metrics import normalised_error_squared
-from adaptive_flot.runner.limit import TrueRun
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 
 SCENARIOS = ("paper_scenario_1", "paper_scenario_2")
 BOUND = "bound"

@@ -22,12 +22,12 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from adaptive_flot.greybox.tables import write_table
-from adaptive_flot.runner.comparison import Comparison, Contender, compare
-from adaptive_flot.runner.results import run_summary
-from adaptive_flot.runner.runs_table import read_runs, run_rows
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.greybox.data.tables import write_table
+from adaptive_flot.runner.commands.comparison import Comparison, Contender, compare
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_files import run_summary
+from adaptive_flot.runner.commands.runs_table import read_runs, run_rows
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from benchmarks.speed import Figure
 
 SCENARIOS = (

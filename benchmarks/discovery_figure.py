@@ -15,14 +15,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from adaptive_flot.discovery.curve import effect_curves
 from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.discovery.parallel import available_processes
+from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.files import replace_path
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.report import style
-from adaptive_flot.runner.discover import discover_file
+from adaptive_flot.report.kit import style
+from adaptive_flot.runner.commands.discover import discover_file
 from benchmarks.hidden_effects.constants import CELL_HEIGHT
 from benchmarks.hidden_effects.curves import STATIC
 from benchmarks.hidden_effects.generate import record_file, write_record

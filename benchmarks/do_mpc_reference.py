@@ -15,10 +15,10 @@ import numpy as np
 
 from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.scenario import Scenario
-from controllers.economic_mpc import VALUE_SCALE
-from controllers.layout import LEVEL_SLACK_SCALE, MOVE_SCALE, MOVED
-from controllers.stage import SLACK_SCALE
+from adaptive_flot.runner.scenario.scenario import Scenario
+from controllers.economic_mpc.controller import VALUE_SCALE
+from controllers.economic_mpc.layout import LEVEL_SLACK_SCALE, MOVE_SCALE, MOVED
+from controllers.economic_mpc.stage import SLACK_SCALE
 
 HORIZON, MOVE_S, BACKOFF, MOVE_COST, PENALTY, TOLERANCE = 20, 30.0, 1e-3, 1e-3, 1e-3, 1e-5
 

@@ -2,9 +2,9 @@
 
 The plant of paper scenario 1 (ramps of C, then n; the grade alone measured) under other input sequences: the fits that
 two posterior Cramer-Rao bounds allow, with the grade alone and with more sensors, and those that the estimators reach.
-`told` knows when the parameters turn (`adaptive_flot.greybox.bound.course_of`); `walk` believes, as `ekf` does, that
-both walk all the time, by 6 % an hour. Medians over a few seeds; the sequences of the paper are not published, so that
-a published fit of C belongs to a row of this table that nobody knows.
+`told` knows when the parameters turn (`adaptive_flot.greybox.cramer_rao_bound.course_of`); `walk` believes, as `ekf`
+does, that both walk all the time, by 6 % an hour. Medians over a few seeds. The sequences of the paper are not
+published, so that a published fit of C belongs to a row of this table that nobody knows.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from adaptive_flot.greybox.bound import walk
+from adaptive_flot.greybox.cramer_rao_bound import walk
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.limit import MORE_SENSORS, TrueRun
-from adaptive_flot.runner.profiles import InputProfile
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun
+from adaptive_flot.runner.scenario.profiles import InputProfile
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 
 ESTIMATORS = ("ekf", "imm")
 SEEDS = 5

@@ -14,15 +14,15 @@ from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot import metrics
-from adaptive_flot.greybox.fastcall import FastCall
+from adaptive_flot.contracts import Decision, PlantRecord, Prior, Sample, Setup, Status, full_parameters
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Decision, PlantRecord, Prior, Sample, Setup, Status, full_parameters
-from adaptive_flot.runner.loop import Step
-from adaptive_flot.runner.prepared import Prepared
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.scenario_plant import simulate_plant
-from adaptive_flot.runner.starts import record_of
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.runner.loop.prepared import Prepared
+from adaptive_flot.runner.loop.starts import record_of
+from adaptive_flot.runner.plants.scenario_plant import simulate_plant
+from adaptive_flot.runner.scenario.scenario import load_scenario
 
 SCENARIOS = ("paper_scenario_1", "paper_scenario_2")
 SEEDS = tuple(range(101, 107))

@@ -1,8 +1,8 @@
 """What the first 600 s tell of a drift that comes later: `python -m benchmarks.likely_drift`.
 
-Most likely drift of the joint filter (`estimators/drift.py`) and the largest that is not rejected at 95 %, from the
-record before the estimators start and, in hindsight, from the whole run. In the paper's scenarios nothing drifts in the
-first 600 s, so that maximum likelihood there asks for a filter that follows nothing afterwards.
+Most likely drift of the joint filter (`estimators/shared/drift.py`) and the largest that is not rejected at 95 %, from
+the record before the estimators start and, in hindsight, from the whole run. In the paper's scenarios nothing drifts
+in the first 600 s, so that maximum likelihood there asks for a filter that follows nothing afterwards.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from adaptive_flot.contracts import Prior, full_parameters
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
-from adaptive_flot.protocols import Prior, full_parameters
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.scenario_plant import simulate_plant
-from estimators.drift import DriftFit, most_likely_drift
+from adaptive_flot.runner.plants.scenario_plant import simulate_plant
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from estimators.shared.drift import DriftFit, most_likely_drift
 
 SCENARIOS = ("paper_scenario_1", "random_walk")
 SEEDS = (1001,)

@@ -15,10 +15,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.discovery.parallel import available_processes
-from adaptive_flot.discovery.verdict import Verdict
+from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.discovery.verdict.verdict import Verdict
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.runner.discover import discover_file
+from adaptive_flot.runner.commands.discover import discover_file
 
 SHARED = Path(__file__).parents[1].parent / "shared"
 

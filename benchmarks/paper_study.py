@@ -14,14 +14,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from adaptive_flot.contracts import Prior, full_parameters
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Prior, full_parameters
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.scenario_file import Measurement, Plugin
-from adaptive_flot.runner.scenario_plant import simulate_plant
-from adaptive_flot.runner.study import run_scenario
-from estimators.rpem import Rpem
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.plants.scenario_plant import simulate_plant
+from adaptive_flot.runner.scenario.keys import Measurement, Plugin
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from estimators.rpem.estimator import Rpem
 
 SEEDS = tuple(range(1, 11))
 CURVATURE_STEP = 0.02

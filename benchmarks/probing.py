@@ -20,10 +20,10 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.runner.comparison import Spread
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.scenario_file import Case
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.runner.commands.comparison import Spread
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.scenario.keys import Case
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = "closed_loop_drift_down"
 SEEDS = 5

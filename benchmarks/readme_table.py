@@ -12,9 +12,9 @@ from pathlib import Path
 
 from adaptive_flot.errors import ResultError
 from adaptive_flot.files import write_text
-from adaptive_flot.report.compare_tables import markdown, overview_table
-from adaptive_flot.runner.comparison import compare
-from adaptive_flot.runner.runs_table import read_runs
+from adaptive_flot.report.compare.tables import markdown, overview_table
+from adaptive_flot.runner.commands.comparison import compare
+from adaptive_flot.runner.commands.runs_table import read_runs
 
 README = Path(__file__).parents[1] / "README.md"
 BEGIN = "<!-- comparison: begin, written by `python -m benchmarks.readme_table` -->"

@@ -18,9 +18,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.plugins import ESTIMATORS, load
-from adaptive_flot.protocols import Prior, Sample
-from adaptive_flot.runner.scenario import load_scenario
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from benchmarks.forgetting import record
 
 ONLINE = ("rpem", "rpem_full")

@@ -16,16 +16,16 @@ from typing import Protocol
 
 import numpy as np
 
+from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status
 from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import ControllerSetup, Estimate, Sample, Status
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from benchmarks.speed import Figure
-from controllers.economic_mpc import EconomicMpc
-from controllers.nlp_solvers import SOLVERS
+from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.nlp_solvers import SOLVERS
 
 MOVES, SHORT, MOVE_S = 80, 40, 30
 ASKED_MS = {"ipopt": 25.0, "fatrop": 12.0, "rti": 6.0}

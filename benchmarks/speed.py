@@ -16,15 +16,15 @@ from functools import partial
 
 import numpy as np
 
-from adaptive_flot.greybox.compiled import compiler_problem
+from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Prior, Sample
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.scenario_plant import simulate_plant
+from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.plants.scenario_plant import simulate_plant
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from benchmarks import scipy_reference
-from estimators.rpem import Rpem
+from estimators.rpem.estimator import Rpem
 
 REPEATS = 7
 SCIPY_UPDATES = 150

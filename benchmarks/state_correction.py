@@ -12,12 +12,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup
-from estimators.rpem_full import rpem_full
+from estimators.rpem.full import rpem_full
 
 SEEDS = tuple(range(1, 6))
 ROWS, STEP = 1200, slice(300, 700)

@@ -10,16 +10,16 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.discovery.spline import drawn
-from adaptive_flot.greybox.form import number
+from adaptive_flot.discovery.candidates.spline import drawn
+from adaptive_flot.greybox.forms.form import number
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.report.series import cases
-from adaptive_flot.runner.discovery_options import DiscoveryOptions
-from adaptive_flot.runner.inquiry import Inquiry
-from adaptive_flot.runner.prediction import one_move_errors, one_step_errors, rms
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
-from adaptive_flot.runner.watching import watch
+from adaptive_flot.report.run.series import cases
+from adaptive_flot.runner.adaptation.inquiry import Inquiry
+from adaptive_flot.runner.adaptation.whiteness_watch import watch
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
+from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from benchmarks.freezing import spread
 
 SCENARIO, SEEDS, OUTPUT = "undeclared_effect", (1, 2, 3), "concentrate_grade"

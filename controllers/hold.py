@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status
+from adaptive_flot.contracts import ControllerSetup, Decision, Estimate, Sample, Status
 
 
 @dataclass(frozen=True)

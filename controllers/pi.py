@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import control
 import numpy as np
 
+from adaptive_flot.contracts import ControllerSetup, Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.protocols import ControllerSetup, Decision, Estimate, Sample, Status
-from controllers.feed_forward import FeedForward
+from controllers.economic_mpc.feed_forward import FeedForward
 
 MOST_LAG_DEG = 80.0
 """Phase lag a PI controller gives at most in this design; with 90 degrees it would be a mere integrator."""

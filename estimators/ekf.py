@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError, near_match
-from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status
-from estimators.coordinates import Coordinates
-from estimators.joint_filter import filter_step, first_estimate, layout, parameters_of, process_noise
-from estimators.measured import driving_outputs
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import filter_step, first_estimate, layout, parameters_of, process_noise
+from estimators.shared.measured import driving_outputs
 
 Walk = Literal["random", "integrated"]
 Drift = float | Mapping[str, float]

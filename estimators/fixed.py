@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status, full_parameters
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status, full_parameters
+from adaptive_flot.greybox.stepping.stepper import Stepper
 
 
 @dataclass(frozen=True)

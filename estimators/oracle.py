@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup
 from estimators.fixed import Fixed, FixedState
 
 

@@ -13,13 +13,13 @@ from typing import Any, Literal, TypeVar, cast
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from adaptive_flot.batch import BatchFit, Identifiability, ParameterEstimate
+from adaptive_flot.contracts import Setup, Status, full_parameters
+from adaptive_flot.contracts.batch import BatchFit, Identifiability, ParameterEstimate
 from adaptive_flot.errors import DataError, ModelError, RangeError, near_match
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
-from adaptive_flot.protocols import Setup, Status, full_parameters
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 InitialState = Literal["steady", "estimated", "given"]
 WEIGHT_PASSES = 5

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import HealthCheck, settings
 
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
 from adaptive_flot.resources import cell_file
 from tests.edits import edit

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.discovery.verdict import Word
+from adaptive_flot.discovery.verdict.verdict import Word
 from adaptive_flot.economics import Prices
-from adaptive_flot.runner.scenario_file import EconomicsPart
+from adaptive_flot.runner.scenario.keys import EconomicsPart
 from tests.discovery.heated import Truth, tank_record
 
 DOCS = Path(__file__).parents[1] / "docs"

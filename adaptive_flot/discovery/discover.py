@@ -8,31 +8,39 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.attribute import Alternative
-from adaptive_flot.discovery.contest import contest
-from adaptive_flot.discovery.detect import detect
-from adaptive_flot.discovery.direction import against, listed
-from adaptive_flot.discovery.experiment import leading, plan_experiment
-from adaptive_flot.discovery.explained import nothing_explained
-from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.gate import Gate, gate
-from adaptive_flot.discovery.joint import search_jointly, wants_joint
-from adaptive_flot.discovery.locate import locate
-from adaptive_flot.discovery.pace import at_every_row
-from adaptive_flot.discovery.parallel import one_thread
-from adaptive_flot.discovery.prepare import prepare, shared
-from adaptive_flot.discovery.problem import CYCLE, WITHOUT_REPORT, Problem
-from adaptive_flot.discovery.search import Search, search
-from adaptive_flot.discovery.signals import input_range
-from adaptive_flot.discovery.verdict import LEAST_MARGIN, Judgement, NamedEffect, Verdict, disputed, held_up, judge
-from adaptive_flot.discovery.verify import changes, whiteness
-from adaptive_flot.discovery.wording import drift_words, reason_words
+from adaptive_flot.discovery.assessment.detect import detect
+from adaptive_flot.discovery.assessment.explained import nothing_explained
+from adaptive_flot.discovery.assessment.verification import changes, whiteness
+from adaptive_flot.discovery.candidates.direction import against, listed
+from adaptive_flot.discovery.fitting.base_fit import prepare, shared
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.node_spacing import at_every_row
+from adaptive_flot.discovery.fitting.parallel import one_thread
+from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
+from adaptive_flot.discovery.record.screening import Gate, gate
+from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.discovery.search.common_nuisance import contest
+from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
+from adaptive_flot.discovery.search.search import Search, search
+from adaptive_flot.discovery.test_design.experiment import leading, plan_experiment
+from adaptive_flot.discovery.test_design.signals import input_range
+from adaptive_flot.discovery.verdict.locate import locate
+from adaptive_flot.discovery.verdict.verdict import (
+    LEAST_MARGIN,
+    Judgement,
+    NamedEffect,
+    Verdict,
+    disputed,
+    held_up,
+    judge,
+)
+from adaptive_flot.discovery.verdict.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 
 @dataclass(frozen=True)

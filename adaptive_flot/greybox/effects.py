@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError, near_match
-from adaptive_flot.greybox.form import Coefficient, Form, Settings, wrong_setting
-from adaptive_flot.greybox.forms import FORMS
+from adaptive_flot.greybox.forms.catalogue import FORMS
+from adaptive_flot.greybox.forms.form import Coefficient, Form, Settings, wrong_setting
 from adaptive_flot.greybox.quantities import Parameter, Quantity
 
 Mode = Literal["factor", "offset"]

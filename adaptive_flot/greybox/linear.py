@@ -8,9 +8,9 @@ import casadi as ca
 import control
 import numpy as np
 
-from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.fastcall import FastCall
 
 
 def linearise(

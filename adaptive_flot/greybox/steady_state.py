@@ -11,9 +11,9 @@ import numpy as np
 from scipy.optimize import root
 
 from adaptive_flot.errors import RangeError
-from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CONVERGED = 1e-9
 """Largest rate that may be left, in a state's scale a second."""

@@ -13,10 +13,10 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.tables import numeric_column, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
-from adaptive_flot.greybox.tables import numeric_column, read_table
 
 BENCHMARK_COLUMNS = ("uEst", "uVal", "yEst", "yVal", "Ts")
 _DRY = 1e-6

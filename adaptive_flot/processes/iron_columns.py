@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.tables import numeric_column, read_table
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
-from adaptive_flot.greybox.tables import numeric_column, read_table
 
 HOUR = 3600.0
 HEMATITE = 159.69 / (2 * 55.845)

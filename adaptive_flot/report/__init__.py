@@ -1,1 +1,11 @@
-"""Self-contained HTML reports. matplotlib and jinja2 are imported here and nowhere else in the package."""
+"""Self-contained HTML reports. Matplotlib and jinja2 are imported here and nowhere else in the package.
+
+Map
+---
+kit/        What every page is made of: page, style, figures, strips.
+run/        The report of scenario runs.
+compare/    Runs side by side.
+discovery/  What a model lacks.
+estimate/   A measured record replayed through estimators.
+templates/  The pages (jinja2).
+"""

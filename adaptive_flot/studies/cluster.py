@@ -12,7 +12,7 @@ import dask
 from distributed import Client, LocalCluster
 
 from adaptive_flot.errors import StudyError
-from adaptive_flot.greybox.rows import core_count
+from adaptive_flot.greybox.stepping.rows import core_count
 
 SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1GB",

@@ -27,7 +27,7 @@ import pyarrow
 import pyarrow.parquet
 
 from adaptive_flot.errors import OutputError, StudyError
-from adaptive_flot.greybox.tables import write_table
+from adaptive_flot.greybox.data.tables import write_table
 
 RUNS, TIMINGS = "runs", "timings"
 MOST_PARTS = 200

@@ -13,8 +13,8 @@ from typing import Any
 
 from adaptive_flot.greybox.model import Model, Parameter, Quantity
 from adaptive_flot.plugins import module_file
-from adaptive_flot.runner.scenario import Scenario
-from adaptive_flot.runner.scenario_file import Plugin
+from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.studies.study_file import Arm, Study
 
 NOT_CONTENT = {"description", "seeds", "estimators", "controllers", "cases", "published", "model", "cell"}

@@ -13,9 +13,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from adaptive_flot.errors import StudyError, located, near_match
 from adaptive_flot.plugins import module_file
 from adaptive_flot.resources import scenario_folder
-from adaptive_flot.runner.prepared import controller_plugin, estimator_plugin
-from adaptive_flot.runner.scenario import Scenario, find_scenario, load_scenario
-from adaptive_flot.runner.scenario_file import Plugin
+from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
+from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.scenario import Scenario, find_scenario, load_scenario
 from adaptive_flot.yaml_problems import first_problem
 
 Seed = Annotated[int, Field(ge=0)]

@@ -16,7 +16,7 @@ import pandas as pd
 from distributed import Client, Future, KilledWorker, as_completed
 
 from adaptive_flot.errors import AdaptiveFlotError, StudyError, located
-from adaptive_flot.runner.prepared import Prepared
+from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.studies import worker
 from adaptive_flot.studies.cluster import connected
 from adaptive_flot.studies.folder import locked

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from adaptive_flot.batch import BatchFit
+from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.errors import PluginError, StudyError
-from adaptive_flot.runner.prepared import Prepared
-from adaptive_flot.runner.results import plain, run_summary
-from adaptive_flot.runner.runs_table import run_rows
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.scenario_file import Plugin
-from adaptive_flot.runner.study import initial_fit, run_one
+from adaptive_flot.runner.commands.run import initial_fit, run_one
+from adaptive_flot.runner.commands.run_files import plain, run_summary
+from adaptive_flot.runner.commands.runs_table import run_rows
+from adaptive_flot.runner.loop.prepared import Prepared
+from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from adaptive_flot.studies.grid import content_hash
 
 TIMES = ("seconds", "solve_median_s", "solve_p99_s")

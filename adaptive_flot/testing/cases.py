@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adaptive_flot.economics import Prices
-from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.processes import flotation
-from adaptive_flot.protocols import (
+from adaptive_flot.contracts import (
     AnyController,
     AnyEstimator,
     ControllerSetup,
@@ -26,6 +21,11 @@ from adaptive_flot.protocols import (
     Setup,
     Status,
 )
+from adaptive_flot.economics import Prices
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.processes import flotation
 
 ADAPTED = ("growth_exponent", "coalescence_rate")
 ROWS = 40

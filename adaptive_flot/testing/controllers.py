@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.protocols import Status
+from adaptive_flot.contracts import Status
 from adaptive_flot.testing.cases import ControllerCase, run_controller
 from adaptive_flot.testing.comparing import assert_frozen, same
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.late import taking_late_values
-from adaptive_flot.protocols import LateValue, Sample, Status
+from adaptive_flot.contracts import LateValue, Sample, Status
+from adaptive_flot.contracts.delayed_measurements import taking_late_values
 from adaptive_flot.testing.cases import EstimatorCase, run_estimator
 from adaptive_flot.testing.comparing import same
 

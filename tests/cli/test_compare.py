@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from adaptive_flot import console
-from adaptive_flot.runner.results import write_json
+from adaptive_flot.runner.commands.run_files import write_json
 from tests.cli.conftest import Call, WriteScenario
 from tests.runner.test_runs_table import closed_loop_summary
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.cli.conftest import Call, WriteScenario
 
 OWN = """

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.plugins import CONTROLLERS, ESTIMATORS, load
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup
 from adaptive_flot.testing import (
     CONTROLLER_CHECKS,
     ESTIMATOR_CHECKS,

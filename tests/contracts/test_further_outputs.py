@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Estimate, Sample
 from adaptive_flot.plugins import ESTIMATORS, load
-from adaptive_flot.protocols import Estimate, Sample
 from adaptive_flot.testing import EstimatorCase, estimator_case, run_estimator
 from adaptive_flot.testing.measurements import MEASUREMENT_CHECKS
 from tests.contracts.test_contracts import ESTIMATOR_CASES

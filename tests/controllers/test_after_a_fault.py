@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.protocols import Decision, Estimate, Sample, Status
+from adaptive_flot.contracts import Decision, Estimate, Sample, Status
 from adaptive_flot.testing import ControllerCase, controller_case
 from adaptive_flot.testing.comparing import same
-from controllers.economic_mpc import EconomicMpc, MpcState
+from controllers.economic_mpc.controller import EconomicMpc, MpcState
 
 STEPS = 10
 """Moves that fail; longer than the horizon, so that the plan runs out too."""

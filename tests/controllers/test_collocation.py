@@ -7,11 +7,11 @@ import pytest
 
 from adaptive_flot.economics import Prices, value_rates
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
-from controllers.collocation import Problem
-from controllers.layout import Bounds
-from controllers.nlp_solvers import SOLVERS, make_solver
-from controllers.stage import Arguments
-from controllers.verification import Verdict, Verifier
+from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.layout import Bounds
+from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
+from controllers.economic_mpc.stage import Arguments
+from controllers.economic_mpc.verification import Verdict, Verifier
 
 MOVE_S, HORIZON = 30.0, 8
 PRICES = 1000 * np.array([*Prices().values(), 1e-3, 1e-3])

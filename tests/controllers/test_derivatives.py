@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from adaptive_flot.greybox import Model
-from controllers.collocation import Problem
-from controllers.derivatives import Assembled
-from controllers.layout import DEGREE
+from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.derivatives import Assembled
+from controllers.economic_mpc.layout import DEGREE
 from tests.controllers.test_collocation import MOVE_S, arguments, cold
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import ControllerSetup, Decision, Status, full_parameters
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper
-from adaptive_flot.protocols import ControllerSetup, Decision, Status, full_parameters
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.economic_mpc import EconomicMpc, MpcState
-from controllers.verification import Solution, Verdict
+from controllers.economic_mpc.controller import EconomicMpc, MpcState
+from controllers.economic_mpc.verification import Solution, Verdict
 
 
 @pytest.fixture(scope="module")

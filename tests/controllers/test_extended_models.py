@@ -7,10 +7,10 @@ import pytest
 
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
 from adaptive_flot.greybox.effects import Effect
-from controllers.collocation import Problem
-from controllers.nlp_solvers import SOLVERS, make_solver
-from controllers.stage import Arguments
-from controllers.verification import Verdict
+from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
+from controllers.economic_mpc.stage import Arguments
+from controllers.economic_mpc.verification import Verdict
 from tests.controllers.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES
 
 NOW = 360.0

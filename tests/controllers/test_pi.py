@@ -8,11 +8,11 @@ import control
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper, steady_state
-from adaptive_flot.protocols import Sample, Status
 from adaptive_flot.testing import controller_case
-from controllers.feed_forward import FeedForward, inverse
+from controllers.economic_mpc.feed_forward import FeedForward, inverse
 from controllers.hold import Hold
 from controllers.pi import Pi
 

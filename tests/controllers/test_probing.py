@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Decision, Limits, Sample, Status
 from adaptive_flot.economics import value_rates
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper, steady_state
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Decision, Limits, Sample, Status
 from adaptive_flot.testing import ControllerCase, controller_case
 from adaptive_flot.testing.comparing import same
-from controllers.economic_mpc import EconomicMpc, MpcState
-from controllers.probing import ProbeState, Probing
-from controllers.verification import Solution, Verdict
+from controllers.economic_mpc.controller import EconomicMpc, MpcState
+from controllers.economic_mpc.probing import ProbeState, Probing
+from controllers.economic_mpc.verification import Solution, Verdict
 
 START = np.array([1.77e-3, 1.67e-4, 0.33])
 """Close to where the MPC ends up with nominal parameters: at the lowest level and the grade limit."""

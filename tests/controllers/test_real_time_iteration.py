@@ -11,11 +11,11 @@ import pytest
 from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox import FloatArray, Model, Stepper
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.collocation import Problem
-from controllers.economic_mpc import EconomicMpc
-from controllers.nlp_solvers import SOLVERS, make_solver
-from controllers.real_time_iteration import MOST_STEPS
-from controllers.verification import Solution, Verdict
+from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
+from controllers.economic_mpc.real_time_iteration import MOST_STEPS
+from controllers.economic_mpc.verification import Solution, Verdict
 from tests.controllers.test_collocation import BOUNDS, HORIZON, MOVE_S, arguments, cold
 
 

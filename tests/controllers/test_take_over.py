@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Estimate, LateValue, Status
 from adaptive_flot.greybox import Model, steady_state
-from adaptive_flot.protocols import Estimate, LateValue, Status
-from controllers.grade_bias import GradeBias
-from controllers.layout import Layout
-from controllers.widening import widened
+from controllers.economic_mpc.grade_bias import GradeBias
+from controllers.economic_mpc.layout import Layout
+from controllers.economic_mpc.softening import widened
 from tests.controllers.test_collocation import HELD
 from tests.controllers.test_extended_models import GROWTH, LATE_FEED
 

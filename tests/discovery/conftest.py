@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import Discovery, discover
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from tests.discovery.heated import Truth, heated_tank, moves, tank_record
 
 POWER = (500.0, 3000.0)

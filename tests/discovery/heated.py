@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 
 CAPACITY = 4.0e5  # J/K

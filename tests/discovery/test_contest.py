@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.contest import MOST_RIVALS, contest
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.problem import Problem, make_problem
-from adaptive_flot.discovery.search import Search, search
-from adaptive_flot.discovery.verdict import judge
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.search.common_nuisance import MOST_RIVALS, contest
+from adaptive_flot.discovery.search.search import Search, search
+from adaptive_flot.discovery.verdict.verdict import judge
 from tests.discovery.heated import heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from adaptive_flot.discovery.direction import against, nameable, trend
+from adaptive_flot.discovery.candidates.direction import against, nameable, trend
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.quantities import KnownEffect

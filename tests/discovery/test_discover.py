@@ -10,8 +10,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from adaptive_flot.discovery.discover import Discovery, discover
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.dataset import Dataset
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.heated import DT, Truth, heated_tank, moves, tank_record
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.catalogue import Candidate
-from adaptive_flot.discovery.events import event_scores, freer, slow, step_score
-from adaptive_flot.discovery.scoring import Score
+from adaptive_flot.discovery.candidates.catalogue import Candidate
+from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.candidates.step_events import event_scores, freer, slow, step_score
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.processes import flotation
 

@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from adaptive_flot.discovery.parallel import available_processes
+from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.runner.discover import discover_file
+from adaptive_flot.runner.commands.discover import discover_file
 
 EXAMPLE = "example_froth_recovery_step"
 

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from adaptive_flot.console import print_discovery
 from adaptive_flot.discovery.discover import Discovery, discover
-from adaptive_flot.discovery.experiment import plan_experiment
-from adaptive_flot.discovery.separation import Prediction, hold_time, separation
-from adaptive_flot.discovery.signals import candidate_tests, input_range
+from adaptive_flot.discovery.test_design.experiment import plan_experiment
+from adaptive_flot.discovery.test_design.separation import Prediction, hold_time, separation
+from adaptive_flot.discovery.test_design.signals import candidate_tests, input_range
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.report.discovery import discovery_report
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.report.discovery.page import discovery_report
 from tests.discovery.conftest import POWER
 from tests.discovery.heated import DT, heated_tank, tank_record
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.assessment.explained import LEAST_EXPLAINED, nothing_explained, regression_shares
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.explained import LEAST_EXPLAINED, nothing_explained, regression_shares
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.problem import make_problem
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.errors import DataError
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.processes.zinc_level import read_record
-from adaptive_flot.runner.discover import discover_file
+from adaptive_flot.runner.commands.discover import discover_file
 from tests.discovery.heated import changed, heated_tank, tank_record
 
 ZINC = "data/flotation-cell-zinc/flotation-cell.csv"

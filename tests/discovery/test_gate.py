@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.gate import gate
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.discovery.record.screening import gate
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Scope
 from tests.discovery.heated import Truth, changed, heated_tank, tank_record
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.gate import gate
-from adaptive_flot.discovery.joint import dominated
-from adaptive_flot.discovery.joint_fits import correlation_time, cross_validated
-from adaptive_flot.discovery.problem import Problem, make_problem
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.record.screening import gate
+from adaptive_flot.discovery.search.joint_fits import correlation_time, cross_validated
+from adaptive_flot.discovery.search.joint_search import dominated
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import cascaded_tanks
 
 MODEL = cascaded_tanks.make_model()

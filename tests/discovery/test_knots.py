@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from adaptive_flot.discovery.catalogue import FINE_TIME_KNOTS, TIME_KNOTS
-from adaptive_flot.discovery.events import freer
-from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.knots import MOST_KNOTS, is_even, trimmed
-from adaptive_flot.discovery.problem import make_problem
-from adaptive_flot.discovery.spline import knots_of, spline_values
+from adaptive_flot.discovery.candidates.catalogue import FINE_TIME_KNOTS, TIME_KNOTS
+from adaptive_flot.discovery.candidates.knots import MOST_KNOTS, is_even, trimmed
+from adaptive_flot.discovery.candidates.spline import knots_of, spline_values
+from adaptive_flot.discovery.candidates.step_events import freer
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from tests.discovery.heated import heated_tank, tank_record

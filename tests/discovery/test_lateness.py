@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.discovery.candidates.dynamics import dragged
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.lateness import dragged
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from tests.discovery.heated import Truth, heated_tank, moves, tank_record
 
 

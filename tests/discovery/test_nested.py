@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.attribute import Alternative, fit_variant
-from adaptive_flot.discovery.entries import ADDS, Run, constants, unbent
-from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.problem import Problem, make_problem
-from adaptive_flot.discovery.scoring import Score, Scorer
-from adaptive_flot.discovery.search import scorer_of
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.search.alternatives import Alternative, fit_variant
+from adaptive_flot.discovery.search.entrants import ADDS, Run, constants, unbent
+from adaptive_flot.discovery.search.search import scorer_of
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.heated import Truth, heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")

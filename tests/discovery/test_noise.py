@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.noise import (
+from adaptive_flot.discovery.record.noise import (
     MEMORY,
     Noise,
     _memory,

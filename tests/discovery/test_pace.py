@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.descent import is_smooth
-from adaptive_flot.discovery.fit import Fit, loss_of
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.pace import NOTICED, UNNOTICED, at_every_row, with_nodes
-from adaptive_flot.discovery.problem import Problem, make_problem
-from adaptive_flot.discovery.responses import Responses
+from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.fitting.descent import is_smooth
+from adaptive_flot.discovery.fitting.fit import Fit, loss_of
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.node_spacing import NOTICED, UNNOTICED, at_every_row, with_nodes
+from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.nodes import place_nodes
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.nodes import place_nodes
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.heated import Truth, heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")

@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.catalogue import Candidate, catalogue, finer
-from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.noise import Noise, with_rows_before
-from adaptive_flot.discovery.problem import Problem, make_problem
-from adaptive_flot.discovery.responses import Course, Responses
-from adaptive_flot.discovery.scoring import Scorer
-from adaptive_flot.discovery.spline import spline_values
+from adaptive_flot.discovery.candidates.catalogue import Candidate, catalogue, finer
+from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.score_test import Scorer
+from adaptive_flot.discovery.candidates.spline import spline_values
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.noise import Noise, with_rows_before
+from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.nodes import place_nodes
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.nodes import place_nodes
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from tests.discovery.heated import DT, EXPONENT, Truth, heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.attribute import SHORTLIST_EACH, shortlist
-from adaptive_flot.discovery.catalogue import Candidate
-from adaptive_flot.discovery.scoring import Score, Scorer
+from adaptive_flot.discovery.candidates.catalogue import Candidate
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.search.alternatives import SHORTLIST_EACH, shortlist
 from adaptive_flot.greybox.scope import Site
 from adaptive_flot.processes import flotation
 

@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.attribute import Alternative
-from adaptive_flot.discovery.descent import SHARES, Descent
-from adaptive_flot.discovery.fit import Fit
-from adaptive_flot.discovery.fitter import Fitter
-from adaptive_flot.discovery.problem import Problem, make_problem
-from adaptive_flot.discovery.simplify import simpler
-from adaptive_flot.discovery.unknowns import Unknowns
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.discovery.fitting.descent import SHARES, Descent
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.unknowns import Unknowns
+from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.discovery.search.simplify import simpler
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import flotation
 from tests.discovery.heated import DT, EXPONENT, NOISE, Truth, changed, heated_tank, tank_record
 

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.attribute import Alternative
-from adaptive_flot.discovery.curve import effect_curves
+from adaptive_flot.discovery.assessment.verification import Verification, changes, doubts, verify, whiteness
 from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.discovery.experiment import leading
-from adaptive_flot.discovery.fit import row_losses
-from adaptive_flot.discovery.search import Search
-from adaptive_flot.discovery.verdict import held_up, judge
-from adaptive_flot.discovery.verify import Verification, changes, doubts, verify, whiteness
-from adaptive_flot.discovery.wording import drift_words
+from adaptive_flot.discovery.fitting.fit import row_losses
+from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.discovery.search.search import Search
+from adaptive_flot.discovery.test_design.experiment import leading
+from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.discovery.verdict.verdict import held_up, judge
+from adaptive_flot.discovery.verdict.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import heated_tank
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import AnyEstimator, Estimate, Prior, Sample, Setup, full_parameters
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper, Trajectory
-from adaptive_flot.protocols import AnyEstimator, Estimate, Prior, Sample, Setup, full_parameters
+from adaptive_flot.greybox.stepping.stepper import Stepper, Trajectory
 
 NOISE_STD = 1e-3
 ROWS = 60

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup
+from adaptive_flot.greybox.stepping.stepper import Stepper
 
 
 def linear_plant() -> Model:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Prior, Sample, Setup
-from estimators.drift import SLOWEST, log_likelihood, most_likely_drift
+from estimators.shared.drift import SLOWEST, log_likelihood, most_likely_drift
 from tests.estimators import toys
 from tests.estimators.gaussian import affine_maps, linear_record
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.protocols import Status
-from estimators.coordinates import Coordinates
+from adaptive_flot.contracts import Status
 from estimators.ekf import Ekf
-from estimators.joint_filter import HOUR, layout, process_noise
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import HOUR, layout, process_noise
 from tests.estimators.gaussian import affine_maps, first_rows, linear_record, posterior, run_estimator
 
 

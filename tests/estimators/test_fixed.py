@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Status
+from adaptive_flot.contracts import Status
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.fixed import Fixed
 from tests.estimators.conftest import CellCase, full, replay
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status
-from estimators.information import Information
-from estimators.rpem import Rpem
+from estimators.rpem.estimator import Rpem
+from estimators.shared.information import Information
 from tests.estimators import toys
 from tests.estimators.conftest import CellCase, replay
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.batch import Identifiability
+from adaptive_flot.contracts.batch import Identifiability
 
 
 @pytest.mark.parametrize(

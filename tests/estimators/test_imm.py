@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Prior, Sample, Setup
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Prior, Sample, Setup
-from estimators.coordinates import Coordinates
+from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.ekf import Ekf
-from estimators.imm import Imm
-from estimators.imm_mixing import combine_function, mix_function
-from estimators.imm_modes import make_modes, stationary, transitions
-from estimators.joint_filter import layout
+from estimators.imm.estimator import Imm
+from estimators.imm.mixing import combine_function, mix_function
+from estimators.imm.modes import make_modes, stationary, transitions
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import layout
 from tests.estimators import toys
 from tests.estimators.gaussian import LinearRecord, linear_record, run_estimator
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.plugins import ESTIMATORS, load
-from adaptive_flot.protocols import Setup, Status
-from estimators.coordinates import Coordinates
 from estimators.ekf import Ekf
-from estimators.joint_filter import first_estimate, layout
 from estimators.pem import Pem
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import first_estimate, layout
 from tests.estimators import toys
 from tests.estimators.conftest import CellCase, replay
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Estimate, LateValue, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.delayed_measurements import LateValues, in_time
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.late import LateValues, in_time
-from adaptive_flot.protocols import Estimate, LateValue, Prior, Sample, Setup, Status
-from estimators.rpem import Rpem
+from estimators.rpem.estimator import Rpem
 from tests.estimators import toys
 
 ROWS = 40

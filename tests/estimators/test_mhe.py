@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError
-from adaptive_flot.protocols import Prior, Sample, Setup, Status
 from estimators.ekf import Ekf
-from estimators.mhe import Mhe
+from estimators.mhe.estimator import Mhe
 from estimators.pem import Pem
 from tests.estimators import toys
 from tests.estimators.conftest import CellCase, replay

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from adaptive_flot.contracts import Setup
 from adaptive_flot.errors import ModelError, PluginError
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
-from adaptive_flot.protocols import Setup
 
 WRONG_VALUES: list[tuple[str, dict[str, Any], str]] = [
     ("rpem", {"forgetting": 0.0}, "forgetting"),

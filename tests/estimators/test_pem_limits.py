@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.errors import DataError, RangeError
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.protocols import Setup, Status
 from estimators.pem import Pem
 from tests.estimators import toys
 from tests.estimators.conftest import ROWS, CellCase

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.batch import BatchFit
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.contracts import Setup, Status
+from adaptive_flot.contracts.batch import BatchFit
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.protocols import Setup, Status
 from estimators.pem import Pem
 from tests.estimators import toys
 

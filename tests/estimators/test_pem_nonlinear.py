@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import estimators.pem
-from adaptive_flot.batch import BatchFit
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.contracts import Setup, Status, full_parameters
+from adaptive_flot.contracts.batch import BatchFit
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.protocols import Setup, Status, full_parameters
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from estimators.pem import InitialState, Pem
 from tests.estimators import toys
 from tests.estimators.conftest import NOISE_STD, ROWS, CellCase

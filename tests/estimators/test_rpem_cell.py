@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import AnyEstimator, Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import Model, Parameter
-from adaptive_flot.protocols import AnyEstimator, Prior, Sample, Setup, Status
 from benchmarks import scipy_reference
 from estimators.fixed import Fixed
-from estimators.rpem import Rpem
+from estimators.rpem.estimator import Rpem
 from tests.estimators import toys
 from tests.estimators.conftest import NOISE_STD, CellCase, replay
 

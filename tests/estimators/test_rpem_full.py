@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, full_parameters
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, full_parameters
 from benchmarks.forgetting import Recursion, stabilised
-from estimators.rpem import Rpem, RpemState
-from estimators.rpem_full import rpem_full
-from estimators.rpem_update import alternative_covariance
+from estimators.rpem.estimator import Rpem, RpemState
+from estimators.rpem.full import rpem_full
+from estimators.rpem.update import alternative_covariance
 from tests.estimators import toys
 from tests.estimators.conftest import CellCase, replay
 

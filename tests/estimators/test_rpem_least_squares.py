@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status
-from estimators.rpem import Rpem
+from estimators.rpem.estimator import Rpem
 from tests.estimators import toys
 
 

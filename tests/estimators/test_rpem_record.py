@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup, Status
-from adaptive_flot.track import Track
-from estimators.rpem import Rpem
-from estimators.rpem_record import BLOCK_ROWS
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from estimators.rpem.estimator import Rpem
+from estimators.rpem.record import BLOCK_ROWS
 from tests.estimators.toys import decay, square
 
 ROWS = 2 * BLOCK_ROWS + 37  # whole blocks and a rest

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Estimate, LateValue, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.delayed_measurements import LateValues
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.late import LateValues
-from adaptive_flot.protocols import Estimate, LateValue, Prior, Sample, Setup, Status
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.ekf import Ekf
-from estimators.rpem import Rpem
-from estimators.rpem_full import rpem_full
-from estimators.state_correction import StateCorrection
+from estimators.rpem.estimator import Rpem
+from estimators.rpem.full import rpem_full
+from estimators.shared.state_correction import StateCorrection
 from tests.estimators.conftest import CellCase, replay
 
 MEASURED = {"level": 5e-4, "tails_flow": 5e-7}

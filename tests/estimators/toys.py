@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 
 def linear(q: int, m: int = 1, *, value: float = 0.0, **parameter: float) -> Model:

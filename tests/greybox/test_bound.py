@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox.bound import Course, bound, course_of, linearise, walk
+from adaptive_flot.contracts import Prior
+from adaptive_flot.greybox.cramer_rao_bound import Course, bound, course_of, linearise, walk
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import Prior
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from tests.estimators import toys
 from tests.estimators.gaussian import linear_record, posterior
 

@@ -13,16 +13,16 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox import compiled as module
-from adaptive_flot.greybox.compiled import CompileWarning, compile_function, compiled, compiler_problem
-from adaptive_flot.greybox.fastcall import FastCall
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping import compiled as module
+from adaptive_flot.greybox.stepping.compiled import CompileWarning, compile_function, compiled, compiler_problem
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.plugins import ESTIMATORS, load
-from adaptive_flot.protocols import Estimate, Prior, Sample, Setup
 from adaptive_flot.testing.cases import estimator_case, run_estimator
-from estimators.rpem import Rpem
+from estimators.rpem.estimator import Rpem
 
 NAMES = ("growth_exponent", "coalescence_rate")
 PROBLEM = compiler_problem()
@@ -162,7 +162,7 @@ RACER = """
 import sys, time
 from pathlib import Path
 import casadi as ca
-from adaptive_flot.greybox import compiled as module
+from adaptive_flot.greybox.stepping import compiled as module
 folder = Path(sys.argv[1])
 module.cache_folder = lambda: folder / "cache"
 x = ca.SX.sym("x", 3)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from adaptive_flot.errors import DataError, RangeError
-from adaptive_flot.greybox.dataset import Dataset, read_dataset
+from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
+from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.tables import write_table
 
 HEADER = "time_s,inflow_m3_s,level_m,outflow_m3_s"
 ROWS = ("0,0.1,1.0,0.1", "2,0.2,1.1,0.2", "4,0.3,1.2,0.3", "6,0.4,1.3,0.4")

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.fast_step import closed_phi
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.nodes import Nodes, place_nodes, substeps
-from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.fast_step import closed_phi
+from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import flotation
 from tests.discovery.heated import heated_tank, tank_record
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 ROWS = 40
 

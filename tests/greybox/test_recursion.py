@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.fastcall import FastCall
-from adaptive_flot.greybox.recursion import Recursion
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.recursion import Recursion
 
 ROWS = 30
 

@@ -9,10 +9,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox import compiled
-from adaptive_flot.greybox import rows as module
-from adaptive_flot.greybox.compiled import compiler_problem
-from adaptive_flot.greybox.rows import over_rows
+from adaptive_flot.greybox.stepping import compiled
+from adaptive_flot.greybox.stepping import rows as module
+from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.rows import over_rows
 
 
 def function() -> ca.Function:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.greybox.dataset import read_dataset
+from adaptive_flot.greybox.data.dataset import read_dataset
 from adaptive_flot.processes import flotation
 from benchmarks.hidden_effects.generate import record_file, write_record
 from benchmarks.hidden_effects.outcome import classify

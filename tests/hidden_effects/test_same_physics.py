@@ -13,7 +13,7 @@ import pytest
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation import make_model
 from benchmarks.hidden_effects.draw import draw_experiment
 from benchmarks.hidden_effects.experiment import Experiment, Run, run

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.record import RecordSimulator
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.metrics import rmse
 from adaptive_flot.processes.cascaded_tanks import make_model, read_benchmark
-from adaptive_flot.protocols import Setup, Status
 from estimators.pem import Pem
 
 CONSTANTS = ("upper_outflow", "lower_inflow", "lower_outflow", "pump_gain")

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.fastcall import FastCall
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation import make_model
 
 INPUTS = np.array([1.5e-3, 1.67e-4, 0.38])

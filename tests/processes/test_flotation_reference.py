@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.greybox.dataset import read_dataset
+from adaptive_flot.greybox.data.dataset import read_dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepper import Stepper, Trajectory
+from adaptive_flot.greybox.stepping.stepper import Stepper, Trajectory
 from benchmarks import scipy_reference as reference
 
 GIVEN = {"time_s", "air_flow_m3_s", "feed_flow_m3_s", "level_setpoint_m", "n", "C"}

@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.greybox.tables import read_table
-from adaptive_flot.report import closed_loop, series
-from adaptive_flot.report.figures import time_figure
-from adaptive_flot.report.html import run_report
-from adaptive_flot.report.plotdata import Role
-from adaptive_flot.report.series import Case
-from adaptive_flot.report.strips import Strip, spells, strip_figure
-from adaptive_flot.runner.results import write_runs
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.greybox.data.tables import read_table
+from adaptive_flot.report.kit.figures import time_figure
+from adaptive_flot.report.kit.plotdata import Role
+from adaptive_flot.report.kit.strips import Strip, spells, strip_figure
+from adaptive_flot.report.run import closed_loop, series
+from adaptive_flot.report.run.page import run_report
+from adaptive_flot.report.run.series import Case
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.commands.run_files import write_runs
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from tests.report.test_run_report import Links
 
 Result = tuple[Scenario, list[Run]]

@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.report.compare import compare_report
-from adaptive_flot.report.compare_findings import findings
-from adaptive_flot.report.compare_tables import compare_tables, markdown, overview_table, quantile_table
-from adaptive_flot.report.distributions import cumulative_figure
-from adaptive_flot.report.page import Table
-from adaptive_flot.report.plotdata import Role, Spread
-from adaptive_flot.runner.comparison import Comparison, compare
+from adaptive_flot.report.compare.findings import findings
+from adaptive_flot.report.compare.page import compare_report
+from adaptive_flot.report.compare.tables import compare_tables, markdown, overview_table, quantile_table
+from adaptive_flot.report.kit.distributions import cumulative_figure
+from adaptive_flot.report.kit.page import Table
+from adaptive_flot.report.kit.plotdata import Role, Spread
+from adaptive_flot.runner.commands.comparison import Comparison, compare
 from benchmarks.readme_table import BEGIN, END, README, put
 from tests.report.test_run_report import Links
 

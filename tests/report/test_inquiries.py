@@ -9,15 +9,15 @@ import pandas as pd
 import pytest
 import yaml
 
-from adaptive_flot.discovery.verdict import Verdict
+from adaptive_flot.discovery.verdict.verdict import Verdict
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.report.html import run_report
-from adaptive_flot.runner import supervisor
-from adaptive_flot.runner.extension import Extension, Finding
-from adaptive_flot.runner.prediction import one_move_errors, one_step_errors, rms
-from adaptive_flot.runner.results import plain, run_summary
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.report.run.page import run_report
+from adaptive_flot.runner.adaptation import supervisor
+from adaptive_flot.runner.adaptation.extension import Extension, Finding
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_files import plain, run_summary
+from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.runner.conftest import edited
 from tests.runner.test_discovery_in_the_loop import CLOSED, GROWTH, OPTIONS
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from adaptive_flot.metrics import rmse
-from adaptive_flot.report.limit import limit_part
-from adaptive_flot.report.page import Album
-from adaptive_flot.report.series import Case, cases
-from adaptive_flot.runner.limit import TrueRun
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.report.kit.page import Album
+from adaptive_flot.report.run.cramer_rao_limit import limit_part
+from adaptive_flot.report.run.series import Case, cases
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 
 
 def short(scenario: Scenario, **changes: object) -> Scenario:

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adaptive_flot.report import series
-from adaptive_flot.report.findings import below_published, candidates, findings, swing_share
-from adaptive_flot.report.html import run_report, write_run_report
-from adaptive_flot.report.page import Table
-from adaptive_flot.report.plotdata import Role
-from adaptive_flot.report.tables import fits_table, status_table
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.report.kit.page import Table
+from adaptive_flot.report.kit.plotdata import Role
+from adaptive_flot.report.run import series
+from adaptive_flot.report.run.findings import below_published, candidates, findings, swing_share
+from adaptive_flot.report.run.page import run_report, write_run_report
+from adaptive_flot.report.run.tables import fits_table, status_table
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 
 Result = tuple[Scenario, list[Run]]
 

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from tests.edits import edit
 
 DURATION, INITIAL = 120, 40

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.runner.estimate import Blocks
-from adaptive_flot.runner.simulate import simulate_record
+from adaptive_flot.runner.commands.estimate import Blocks
+from adaptive_flot.runner.commands.simulate import simulate_record
 
 NOISE: Mapping[str, float] = {"concentrate_grade": 1e-3, "level": 5e-4}
 TRUTH: Mapping[str, float] = {"n": 1.04, "C": 6.7e-4}

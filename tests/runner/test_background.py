@@ -10,7 +10,7 @@ import time
 import pytest
 
 from adaptive_flot.errors import AdaptiveFlotError, ModelError
-from adaptive_flot.runner.background import Background
+from adaptive_flot.runner.adaptation.background import Background
 
 
 def test_the_result_comes_from_another_process_and_may_close_over_anything() -> None:

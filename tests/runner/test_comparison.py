@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.errors import ResultError
-from adaptive_flot.runner.comparison import Comparison, Contender, Spread, compare
+from adaptive_flot.runner.commands.comparison import Comparison, Contender, Spread, compare
 
 
 def row(estimator: str, seed: int, value: float, controller: str = "mpc", **more: Any) -> dict[str, Any]:

@@ -12,21 +12,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adaptive_flot.contracts import Setup
 from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.discovery.gate import Gate
-from adaptive_flot.discovery.verdict import Verdict, Word
+from adaptive_flot.discovery.record.screening import Gate
+from adaptive_flot.discovery.verdict.verdict import Verdict, Word
 from adaptive_flot.errors import AdaptiveFlotError, ModelError
-from adaptive_flot.greybox.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.protocols import Setup
-from adaptive_flot.runner import extension, supervisor
-from adaptive_flot.runner.conditions import conditions
-from adaptive_flot.runner.extension import Extension, Finding, search_record
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
-from adaptive_flot.runner.watching import Alarm
+from adaptive_flot.runner.adaptation import extension, supervisor
+from adaptive_flot.runner.adaptation.extension import Extension, Finding, search_record
+from adaptive_flot.runner.adaptation.whiteness_watch import Alarm
+from adaptive_flot.runner.commands.fingerprint import conditions
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.runner.conftest import WriteScenario
 
 GROWTH = {

@@ -10,12 +10,12 @@ import pytest
 import yaml
 
 from adaptive_flot.errors import ScenarioError
-from adaptive_flot.runner.accounts import account
-from adaptive_flot.runner.disturbances import disturbances
-from adaptive_flot.runner.profiles import Factors, Steps
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.scenario_file import DisturbancePart
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.plants.disturbances import disturbances
+from adaptive_flot.runner.results.accounts import account
+from adaptive_flot.runner.scenario.keys import DisturbancePart
+from adaptive_flot.runner.scenario.profiles import Factors, Steps
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from tests.runner.conftest import WriteScenario
 
 FEED, GRADE = "feed_flow_m3_s", "feed_concentration.chalcopyrite"

@@ -11,17 +11,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adaptive_flot.contracts import full_parameters
 from adaptive_flot.errors import DataError, ModelError, PluginError
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.record import RecordSimulator
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes.flotation import make_model as make_cell
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.protocols import full_parameters
 from adaptive_flot.resources import cell_file
-from adaptive_flot.runner.estimate import Blocks, OutputError, RecordEstimate, estimate_record, read_blocks
-from adaptive_flot.runner.results import plain
-from adaptive_flot.runner.summaries import estimate_summary, save_fitted_cell, write_replays
+from adaptive_flot.runner.commands.estimate import Blocks, OutputError, RecordEstimate, estimate_record, read_blocks
+from adaptive_flot.runner.commands.estimate_files import estimate_summary, save_fitted_cell, write_replays
+from adaptive_flot.runner.commands.run_files import plain
 from tests.runner.records import NOISE, TRUTH, PlantRecord, plant_record
 
 CUT = 150

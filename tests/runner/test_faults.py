@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from adaptive_flot.contracts import Decision, Estimate, LateValue, PlantRecord, Sample, Status
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.protocols import Decision, Estimate, LateValue, PlantRecord, Sample, Status
-from adaptive_flot.runner.faults import ControllerFault, Fault
-from adaptive_flot.runner.faulty_controller import FaultyController
-from adaptive_flot.runner.faulty_plant import FaultyPlant
+from adaptive_flot.runner.plants.faulty_controller import FaultyController
+from adaptive_flot.runner.plants.faulty_plant import FaultyPlant
+from adaptive_flot.runner.scenario.faults import ControllerFault, Fault
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.economic_mpc import EconomicMpc
+from controllers.economic_mpc.controller import EconomicMpc
 from controllers.hold import Hold
 
 ROWS = 400

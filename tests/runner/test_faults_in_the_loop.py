@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 import yaml
 
+from adaptive_flot.contracts import Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import Decision, Estimate, Sample, Status
-from adaptive_flot.report.unsolved import unsolved_table
-from adaptive_flot.runner.injection import with_faults
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.scenario_plant import make_plant
-from adaptive_flot.runner.study import Run, run_scenario
-from controllers.economic_mpc import EconomicMpc, MpcState
+from adaptive_flot.report.run.unsolved import unsolved_table
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.plants.fault_injection import with_faults
+from adaptive_flot.runner.plants.scenario_plant import make_plant
+from adaptive_flot.runner.scenario.scenario import load_scenario
+from controllers.economic_mpc.controller import EconomicMpc, MpcState
 from controllers.hold import Hold
 from tests.runner.conftest import WriteScenario
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adaptive_flot.contracts import PlantRecord, Sample
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.processes import cascaded_tanks
-from adaptive_flot.protocols import PlantRecord, Sample
-from adaptive_flot.runner.frozen_values import FrozenValues
+from adaptive_flot.runner.plants.frozen_values import FrozenValues
 
 INPUTS = np.array([1.0])
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.protocols import Status
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.scenario_plant import simulate_plant
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.contracts import Status
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.plants.scenario_plant import simulate_plant
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.runner.conftest import DURATION, INITIAL, WriteScenario
 
 GRADE = "concentrate_grade"

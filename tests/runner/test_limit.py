@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.runner.limit import MORE_SENSORS, TrueRun, has_limit
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
+from adaptive_flot.runner.scenario.scenario import load_scenario
 
 
 def test_the_joint_filter_of_a_random_walk_is_within_1_3_of_the_bound() -> None:

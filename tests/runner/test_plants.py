@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox.dataset import Dataset
-from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.protocols import (
+from adaptive_flot.contracts import (
     ControllerSetup,
     Decision,
     Estimate,
@@ -16,8 +14,10 @@ from adaptive_flot.protocols import (
     Setup,
     Status,
 )
-from adaptive_flot.runner.loop import Step, run_loop
-from adaptive_flot.runner.plant import ReplayPlant, SimulatedPlant
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.runner.loop.loop import Step, run_loop
+from adaptive_flot.runner.plants.plant import ReplayPlant, SimulatedPlant
 from controllers.schedule import Schedule, ScheduleState
 from estimators.fixed import Fixed
 from tests.estimators import toys

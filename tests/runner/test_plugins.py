@@ -13,9 +13,9 @@ import pytest
 from adaptive_flot.errors import PluginError
 from adaptive_flot.plugins import ESTIMATORS, load
 from adaptive_flot.processes.registry import make_model
-from adaptive_flot.runner.estimate import estimate_record, read_blocks
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.estimators import toys
 from tests.runner.conftest import WriteScenario
 

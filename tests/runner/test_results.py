@@ -11,13 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adaptive_flot.contracts import Status
 from adaptive_flot.errors import DataError, OutputError
 from adaptive_flot.files import replace_file, replace_path, write_text
-from adaptive_flot.greybox.tables import read_table, write_table
-from adaptive_flot.protocols import Status
-from adaptive_flot.runner.results import plain, run_summary, write_json, write_runs
-from adaptive_flot.runner.scenario import Scenario
-from adaptive_flot.runner.study import Run
+from adaptive_flot.greybox.data.tables import read_table, write_table
+from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_files import plain, run_summary, write_json, write_runs
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 
 class Colour(Enum):

@@ -10,8 +10,8 @@ import pytest
 
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.runner.scenario import load_scenario, shipped_scenarios
-from adaptive_flot.runner.study import run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.scenario.scenario import load_scenario, shipped_scenarios
 from benchmarks import scipy_reference
 from tests.runner.conftest import WriteScenario
 

@@ -12,13 +12,13 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from adaptive_flot import plugins
+from adaptive_flot.contracts import ControllerSetup, Prior, Setup
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepper import Stepper
-from adaptive_flot.protocols import ControllerSetup, Prior, Setup
-from adaptive_flot.runner.scenario import Scenario, load_scenario
-from adaptive_flot.runner.scenario_plant import measurement_noise
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.plants.scenario_plant import measurement_noise
+from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from controllers.schedule import Schedule
 from estimators.fixed import Fixed, FixedState
 from tests.runner.conftest import DURATION, INITIAL, WriteScenario

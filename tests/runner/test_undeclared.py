@@ -13,9 +13,9 @@ from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.model_writer import save_model
-from adaptive_flot.runner.conditions import conditions
-from adaptive_flot.runner.scenario import load_scenario
-from adaptive_flot.runner.study import Run, run_scenario
+from adaptive_flot.runner.commands.fingerprint import conditions
+from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.runner.conftest import WriteScenario
 
 GROWTH = {

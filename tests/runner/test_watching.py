@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.watching import watch
+from adaptive_flot.runner.adaptation.whiteness_watch import watch
 
 WINDOW, WINDOWS, LEVEL = 200, 400, 0.05
 

@@ -1,0 +1,152 @@
+"""The contract of a controller: what it is built for, what it decides and what it expects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+from adaptive_flot.contracts.estimator import Estimate
+from adaptive_flot.contracts.sample import Sample
+from adaptive_flot.contracts.status import Status
+from adaptive_flot.economics import Prices
+from adaptive_flot.greybox.model import FloatArray, Model
+
+State = TypeVar("State")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a controller expects of the moves it looked ahead, H of them.
+
+    Attributes
+    ----------
+    time
+        End of each move [s] (H,).
+    inputs
+        Each moved input by name, in its unit: its value held during the move that ends at `time` (H,).
+    grade
+        Concentrate grade expected at `time` [-] (H,), with the controller's correction of the model.
+    """
+
+    time: FloatArray
+    inputs: Mapping[str, FloatArray]
+    grade: FloatArray
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Info record of one controller step.
+
+    Attributes
+    ----------
+    inputs
+        Inputs (nu,) to hold until the next decision.
+    status
+        What happened.
+    decided_by
+        Who took it: a controller, or the fallback that stepped in.
+    solve_seconds
+        Wall-clock time of the optimisation; NaN where none ran.
+    message
+        What was wrong, in words: the most violated constraints of a failed solve.
+    plan
+        What the optimisation that this decision comes from expects; None where none ran or none was valid.
+    faults
+        Names of the faults that were injected into this decision.
+    """
+
+    inputs: FloatArray
+    status: Status
+    decided_by: str
+    solve_seconds: float = float("nan")
+    message: str = ""
+    plan: Plan | None = None
+    faults: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where a cell may be run.
+
+    Attributes
+    ----------
+    grade
+        Lowest concentrate grade allowed [-].
+    level
+        Range of the pulp height [m] (2,).
+    inputs
+        Range of each moved input by name, in its unit.
+    moves
+        Largest move of each of them from one control move to the next.
+    """
+
+    grade: float
+    level: tuple[float, float]
+    inputs: Mapping[str, tuple[float, float]]
+    moves: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ControllerSetup:
+    """What a controller is built for.
+
+    Attributes
+    ----------
+    model
+        The grey-box model.
+    dt
+        Sampling interval [s].
+    schedule
+        Planned inputs (N, nu): what an open-loop run plays, and where a closed loop starts. What a closed loop does not
+        move is a disturbance: the plan holds its first value, and `Sample.inputs` what is known of it later.
+    parameters
+        Names of the adapted parameters, in the order of `Estimate.parameters`.
+    limits, prices
+        For controllers that need them; a scenario without economics has none.
+    """
+
+    model: Model
+    dt: float
+    schedule: FloatArray
+    parameters: tuple[str, ...] = ()
+    limits: Limits | None = None
+    prices: Prices | None = None
+
+
+class Controller(Protocol[State]):
+    """Chooses the inputs of the next interval. Made by `Name(setup, **options)`."""
+
+    def init(self, time: float) -> State:
+        """State before the first decision, at a time [s]."""
+        ...
+
+    def decide(self, state: State, sample: Sample | None, estimate: Estimate | None) -> tuple[State, Decision]:
+        """Inputs for the next interval, from the newest sample and estimate (None before the first)."""
+        ...
+
+
+@runtime_checkable
+class TakesOver(Protocol):
+    """A controller whose state depends on its model, and that can go on where one with a smaller model stood.
+
+    The model of a running loop may be extended (`Model.with_effects`): states and parameters are added behind those in
+    common. A controller without this method gets the state of the one before as it is.
+    """
+
+    def take_over(self, before: AnyController, state: Any, known: Sequence[Estimate], again: Sequence[Estimate]) -> Any:
+        """State of this controller that goes on from a state of the one before.
+
+        Parameters
+        ----------
+        before, state
+            A controller of the same class and options for the smaller model, and its state.
+        known
+            The last estimates that it was told, oldest first.
+        again
+            What an estimator with this controller's model makes of the same samples.
+        """
+        ...
+
+
+AnyController = Controller[Any]

@@ -1,0 +1,149 @@
+"""The contract of an estimator: what it is built for, where it starts, what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from adaptive_flot.contracts.sample import LateValue, Sample
+from adaptive_flot.contracts.status import Status
+from adaptive_flot.greybox.model import FloatArray, Model
+
+State = TypeVar("State")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an estimator is built for.
+
+    Attributes
+    ----------
+    model
+        The grey-box model; its parameter values are the nominal ones.
+    dt
+        Sampling interval [s].
+    parameters
+        Names of the q adapted parameters.
+    outputs
+        Names of the measured outputs that drive the adaptation.
+    truth
+        True parameters (N, np), row k for the interval that starts at k dt: for the oracle only, None for all others.
+    """
+
+    model: Model
+    dt: float
+    parameters: tuple[str, ...] = ("growth_exponent", "coalescence_rate")
+    outputs: tuple[str, ...] = ("concentrate_grade",)
+    truth: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Where an estimator starts.
+
+    Attributes
+    ----------
+    time
+        Time of the state [s].
+    state
+        Model state (nx,).
+    parameters
+        Adapted parameters (q,), each in its unit.
+    covariance
+        Their covariance (q, q).
+    noise_std
+        Standard deviation of the measurement noise of each driving output (m,).
+    joint_covariance
+        Covariance of state and parameters together (nx + q, nx + q); None: the state is taken as known.
+    """
+
+    time: float
+    state: FloatArray
+    parameters: FloatArray
+    covariance: FloatArray
+    noise_std: FloatArray
+    joint_covariance: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Info record of one estimator step.
+
+    Attributes
+    ----------
+    time
+        Time of the sample [s].
+    prediction
+        All outputs (ny,) predicted from the previous sample, before this one was used.
+    innovation
+        Measured minus predicted (ny,), NaN where missing.
+    innovation_std
+        Standard deviation the estimator expects of the innovation of each driving output (m,).
+    parameters
+        Adapted parameters after the sample (q,).
+    covariance
+        Their covariance (q, q), symmetric and positive semi-definite.
+    state
+        Model state (nx,) at the time of the sample.
+    status
+        What happened.
+    late
+        Innovations of the late values that were used: output, time taken, measured minus predicted then.
+    """
+
+    time: float
+    prediction: FloatArray
+    innovation: FloatArray
+    innovation_std: FloatArray
+    parameters: FloatArray
+    covariance: FloatArray
+    state: FloatArray
+    status: Status
+    late: tuple[LateValue, ...] = ()
+
+
+class Estimator(Protocol[State]):
+    """Tracks parameters (and the state) from one sample to the next.
+
+    Made by `Name(setup, **options)`. `setup` is kept as an attribute; nothing else may change after construction.
+
+    Delayed measurements: after one, the estimate is what the same value in time would have given. An estimator need
+    not see to that. The loop puts `adaptive_flot.contracts.delayed_measurements.LateValues` around it wherever a
+    measurement has a dead time. An estimator that keeps a window of samples anyway may take `Sample.late` itself; it
+    then has `takes_late_values = True`.
+
+    Whole records: an estimator may have `track(state, time, inputs, outputs) -> Track`
+    (`adaptive_flot/contracts/track.py`) that gives for N samples what N calls of `update` give. Replays of measured
+    records then use it.
+    """
+
+    setup: Setup
+
+    def init(self, prior: Prior) -> State:
+        """State before the first sample."""
+        ...
+
+    def update(self, state: State, sample: Sample) -> tuple[State, Estimate]:
+        """Take one sample, one interval after the last.
+
+        Missing outputs are NaN; a sample in which all driving outputs are missing gives a status, not an error.
+
+        Raises
+        ------
+        ModelError
+            A vector of the wrong length.
+        """
+        ...
+
+
+def full_parameters(
+    model: Model, names: Sequence[str], values: FloatArray, known: FloatArray | None = None
+) -> FloatArray:
+    """Parameter vector (np,) with some entries replaced: of `known` (`Sample.parameters`), else of the model."""
+    p = model.parameter_values if known is None else known.copy()
+    p[model.indices("parameters", names)] = values
+    return p
+
+
+AnyEstimator = Estimator[Any]

@@ -1,0 +1,189 @@
+"""Verify on rows to which nothing was fitted: the error must be smaller by more than chance, and nowhere larger."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import bootstrap
+from statsmodels.stats.diagnostic import acorr_ljungbox
+
+from adaptive_flot.discovery.fitting.fit import Fit, row_losses
+from adaptive_flot.discovery.record.noise import correlation_times
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.greybox.model import FloatArray
+
+BLOCK_ROWS = 20
+"""Rows of a block of the paired block bootstrap: longer than the noise remembers."""
+DOUBT_ROWS = 60
+"""Rows of a block in which two fits are compared: what both lack is slower than the noise."""
+SURE = 2.0
+"""Standard deviations by which an alternative must be worse to be told apart."""
+SHORTEST_BLOCK = 4
+MANY_BLOCKS = 8
+"""A share too short for so many blocks gets shorter ones."""
+DRAWS = 500
+WORSE = 0.02
+"""Share by which no output's error may grow."""
+LAGS = 20
+
+
+@dataclass(frozen=True)
+class OutputChange:
+    """Free-run error of one output on one share: before, after, its noise, and a 95 % interval of the reduction."""
+
+    output: str
+    unit: str
+    before: float
+    after: float
+    noise: float
+    reduction95: tuple[float, float]
+
+    def __str__(self) -> str:
+        low, high = (100 * r for r in self.reduction95)
+        return (
+            f"{self.output}: {self.before:.3g} -> {self.after:.3g} {self.unit} "
+            f"(noise {self.noise:.3g}; reduction {low:.0f} to {high:.0f} %)"
+        )
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Whether an alternative stands on rows to which it was not fitted.
+
+    Attributes
+    ----------
+    reduction, reduction95
+        Drop of the root mean square error over all outputs, in units of their noise, and its 95 % interval.
+    worse
+        Outputs whose error grew.
+    confirmed
+        Interval above zero and no output worse.
+    where
+        The rows it was measured on, in words.
+    """
+
+    reduction: float
+    reduction95: tuple[float, float]
+    worse: tuple[str, ...]
+    confirmed: bool
+    where: str = "on the confirm share"
+
+    def __str__(self) -> str:
+        low, high = (100 * r for r in self.reduction95)
+        word = "confirmed" if self.confirmed else "not confirmed"
+        return f"{word}: error {100 * self.reduction:.0f} % smaller ({low:.0f} to {high:.0f} %) {self.where}"
+
+
+def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
+    """Compare two fits of the estimation share on the confirm share, in units of the noise of the better one."""
+    rows = problem.rows("confirm")
+    size = problem.weights * after.noise.stationary_std()
+    old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
+    reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1))
+    worse = []
+    for j, c in enumerate(problem.columns):
+        ratio = float(np.sqrt(np.nanmean(new[:, j]) / np.maximum(np.nanmean(old[:, j]), 1e-300)))
+        if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j])[1][1] < 0:
+            worse.append(after.model.outputs[c].name)
+    return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)
+
+
+def doubts(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
+    """Standard deviation of the difference between each fit's minus two log-likelihood and that of the best.
+
+    By resampling blocks of rows with the fits as they are: Kishino & Hasegawa, J. Mol. Evol. 29 (1989) 170. A fit that
+    is worse by less than `SURE` of these would be the better one in some records like this.
+    """
+    rows = problem.rows("estimate")
+    length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, DOUBT_ROWS))
+    count = int(rows.sum()) // length
+    if count < MANY_BLOCKS:
+        return tuple(0.0 for _ in others)
+    own = row_losses(problem, best, rows)
+    found = []
+    for fit in others:
+        blocks = (row_losses(problem, fit, rows) - own)[: count * length].reshape(count, length).sum(axis=1)
+        found.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
+    return tuple(found)
+
+
+def together(problem: Problem, before: Fit, after: Fit) -> float:
+    """Innovations of a fit that tell one story, averaged over the outputs by what it gained in each on another fit.
+
+    A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
+    """
+    rows = problem.rows("estimate")
+    size = problem.weights * after.noise.stationary_std()
+    old, new = (np.nanmean(_squares(problem, fit, size, rows), axis=0) for fit in (before, after))
+    gained = np.maximum(np.nan_to_num(old - new), 0.0)
+    if not gained.sum() > 0:
+        return 1.0
+    innovations = np.clip(np.where(rows[:, None], after.innovations, np.nan), -problem.clip, problem.clip)
+    return float(gained @ correlation_times(innovations) / gained.sum())
+
+
+def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether what a freer form gains pays for its further coefficients, evidence counted once a story.
+
+    Where something else is still missing, neighbouring rows err alike, and a criterion that counts them all would take
+    any freedom it can get.
+    """
+    alike = together(problem, before, after)
+    further = len(after.names) - len(before.names)
+    stories = max(problem.count(problem.rows("estimate")) / alike, 2.0)
+    return (before.loss - after.loss) / alike > further * float(np.log(stories))
+
+
+def changes(problem: Problem, before: Fit, after: Fit, share: str) -> tuple[OutputChange, ...]:
+    """Free-run error of each measured output on one share of the record, before and after."""
+    rows = problem.rows(share)
+    ones = np.ones_like(problem.weights)
+    old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
+    noise = after.noise.stationary_std()
+    found = []
+    for j, c in enumerate(problem.columns):
+        q = after.model.outputs[c]
+        if not np.isfinite(old[:, j]).any():
+            continue
+        a, b = (float(np.sqrt(np.nanmean(s[:, j]))) for s in (old, new))
+        sigma = float(noise[j] * np.sqrt(np.mean(problem.weights[rows, j] ** 2)))
+        found.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j])[1]))
+    return tuple(found)
+
+
+def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> FloatArray:
+    squares: FloatArray = ((fit.residual(problem) / size) ** 2)[rows]
+    return squares
+
+
+def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, float]]:
+    """1 - RMS(new) / RMS(old) with a paired block-bootstrap interval (scipy, percentile)."""
+    ok = np.isfinite(old) & np.isfinite(new)
+    length = int(np.clip(ok.sum() // MANY_BLOCKS, SHORTEST_BLOCK, BLOCK_ROWS))
+    count = int(ok.sum()) // length
+    if count < 4 or not old[ok].sum() > 0:
+        return 0.0, (float("-inf"), float("inf"))
+    a, b = (s[ok][: count * length].reshape(count, -1).sum(axis=1) for s in (old, new))
+
+    def statistic(x: FloatArray, y: FloatArray, axis: int = -1) -> FloatArray:
+        value: FloatArray = 1 - np.sqrt(np.sum(y, axis=axis) / np.maximum(np.sum(x, axis=axis), 1e-300))
+        return value
+
+    found = bootstrap(
+        (a, b), statistic, paired=True, vectorized=True, n_resamples=DRAWS, method="percentile", rng=0
+    ).confidence_interval
+    return float(statistic(a, b)), (float(found.low), float(found.high))
+
+
+def whiteness(problem: Problem, fit: Fit, *, raw: bool) -> dict[str, float]:
+    """Ljung-Box p value of each measured output: of the weighted residual (`raw`) or of the whitened innovations."""
+    series = fit.residual(problem) / problem.weights if raw else fit.innovations
+    found = {}
+    for j, c in enumerate(problem.columns):
+        e = series[problem.rows(), j]
+        e = e[np.isfinite(e)]
+        if len(e) > 3 * LAGS:
+            found[fit.model.outputs[c].name] = float(acorr_ljungbox(e, lags=[LAGS])["lb_pvalue"].iloc[0])
+    return found

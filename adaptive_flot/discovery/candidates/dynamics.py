@@ -1,0 +1,114 @@
+"""Sensors that answer late, actuators that follow late, stick or reach a limit: what each does to the value there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.signal import lfilter
+
+from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.variant import Variant
+from adaptive_flot.discovery.record.screening import LEAST_RANGE
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.scope import Site
+
+LAGS_S = (5.0, 15.0, 45.0, 120.0)
+SECOND_LAG = 0.5
+"""The second of two lags in a row starts at this share of the first."""
+LEAST_FOLLOW_S = 2.0
+"""Time constant of a valve that has come loose; where rows are further apart, their distance."""
+DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
+LONGEST_DELAY = 0.2
+"""Longest dead time that is tried, as a share of the record."""
+LIMIT_QUANTILES = (0.6, 0.75, 0.9)
+"""An actuator is scored with a limit at these quantiles of what is asked of it."""
+LIMIT_WIDTH = 0.01
+"""Rounding of the limit, as a share of the range of what is asked."""
+BANDS = (0.3, 1.0)
+"""And as sticking in bands of so many standard deviations of what is asked of it."""
+
+
+def late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
+    """Variants of what answers late: lags or dead times of several lengths, for an actuator a wide dead band."""
+    if not _moves(responses.site_values[site.name]):
+        return
+    if driver == "delay":
+        yield from _delayed(site, responses)
+        return
+    v, scale = _asked(site, responses)
+    dt = responses.problem.record.dt
+    for constant in LAGS_S:
+        once = _first_order(v, float(np.exp(-dt / constant)))
+        effect = Effect(site.name, "lag", "lag", settings={"scale": scale})
+        start = (("time_constant", constant),)
+        yield Variant(effect, (Course(site.name, once - v, True),), ("amplitude",), start)
+        second = SECOND_LAG * constant
+        twice = _first_order(once, float(np.exp(-dt / second)))
+        effect = Effect(site.name, "lag", "lags", settings={"scale": scale})
+        yield Variant(
+            effect, (Course(site.name, twice - v, True),), ("amplitude",), (*start, ("time_constant_2", second))
+        )
+    if site.role == "actuator":
+        yield from _sticking(site, responses)
+
+
+def _moves(v: FloatArray) -> bool:
+    return float(np.ptp(v)) > LEAST_RANGE * float(np.median(np.abs(v)))
+
+
+def _asked(site: Site, responses: Responses) -> tuple[FloatArray, float]:
+    """What is asked of an actuator, or comes to a sensor (N,), and its typical size."""
+    return responses.site_values[site.name], responses.usual(site.name) or 1.0
+
+
+def _delayed(site: Site, responses: Responses) -> Iterator[Variant]:
+    v, scale = _asked(site, responses)
+    effect = Effect(site.name, "delay", "delay", settings={"scale": scale})
+    time = responses.problem.record.time
+    for dead_time in (d for d in DELAYS_S if d <= LONGEST_DELAY * (time[-1] - time[0])):
+        rows = max(1, round(dead_time / responses.problem.record.dt))
+        delayed = np.concatenate([np.full(rows, v[0]), v[:-rows]])
+        yield Variant(effect, (Course(site.name, delayed - v, True),), ("amplitude",), (("dead_time", dead_time),))
+
+
+def limited(site: Site, responses: Responses) -> Iterator[Variant]:
+    """What is asked of an actuator, cut at a limit."""
+    v = responses.site_values[site.name]
+    if not _moves(v):
+        return
+    spread = float(np.ptp(v))
+    effect = Effect(site.name, "saturation", "saturation", settings={"width": LIMIT_WIDTH * spread})
+    for share in LIMIT_QUANTILES:
+        limit = float(np.quantile(v, share))
+        if limit < float(np.max(v)):
+            course = Course(site.name, -np.maximum(v - limit, 0.0), True)
+            yield Variant(effect, (course,), ("amplitude",), (("limit", limit),))
+
+
+def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
+    """An actuator that follows only when the demand leaves a band around where it stands."""
+    v, scale = _asked(site, responses)
+    settings = {"scale": scale, "follow_s": max(LEAST_FOLLOW_S, responses.problem.record.dt)}
+    for share in BANDS:
+        band = share * float(np.std(v))
+        if band > 0:
+            course = Course(site.name, dragged(v, band) - v, True)
+            effect = Effect(site.name, "lag", "stiction", settings=settings)
+            yield Variant(effect, (course,), ("amplitude",), (("band", band),))
+
+
+def dragged(v: FloatArray, band: float) -> FloatArray:
+    """Position (N,) of what is dragged along behind a demand (N,) that moves freely inside a band around it."""
+    position = np.empty_like(v)
+    at = v[0]
+    for k, demand in enumerate(v):
+        at = min(max(at, demand - band), demand + band)
+        position[k] = at
+    return position
+
+
+def _first_order(v: FloatArray, keep: float) -> FloatArray:
+    filtered: FloatArray = lfilter([1 - keep], [1, -keep], v, zi=[keep * v[0]])[0]
+    return filtered

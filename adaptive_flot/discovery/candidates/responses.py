@@ -1,0 +1,205 @@
+"""How each output would answer to a small change at each site: the model linearised along a fitted free run.
+
+One pass gives the one-step Jacobians of every row; the answer to *any* time course of *any* site is then a product of
+small matrices. So a whole catalogue of effects is scored for the price of one sensitivity simulation. At amplitude zero
+this is exact: a driver's own feedback is of second order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.nodes import IntArray, NodeStepper, substeps
+from adaptive_flot.greybox.stepping.rows import over_rows
+from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
+
+ROWS_AT_ONCE = 500
+FILLED_AT_ONCE = 64
+"""Rows of answers that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
+LEAST_VALUE = 1e-6
+"""Share of its largest value below which a site is at zero."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """A time course at a site: change of the logarithm of its value, or of the value itself where `offset`, (N,)."""
+
+    site: str
+    values: FloatArray
+    offset: bool
+
+
+class Responses:
+    """Linear answers of the measured outputs along one fitted free run.
+
+    Attributes
+    ----------
+    sites
+        Names of the sites.
+    drivers
+        Series (N,) of each quantity that an effect may depend on.
+    site_values
+        Series (N,) of the value at each site (the first component), at the times of the rows.
+    nuisance
+        Answers (N, m, r) to the parameters that are free already and to the initial state.
+    """
+
+    def __init__(self, problem: Problem, fit: Fit) -> None:
+        self.problem, self.fit = problem, fit
+        model = fit.model
+        self.sites = tuple(s.name for s in model.sites)
+        self._offset = {s.name: s.mode == "offset" for s in model.sites}
+        has = {e.label for e in model.effects}
+        probes = [Effect(s, "constant", "shift") for s in self.sites]
+        extended = model.with_effects([e for e in probes if e.label not in has])
+        p0 = np.array([q.value for q in extended.parameters])
+        record, self._nodes = problem.record, problem.nodes
+        stepper = Stepper(extended, record.dt)
+        if self._nodes is None and stepper.substeps > MOST_UNROLLED:
+            self._nodes = substeps(record, stepper.substeps)
+        if self._nodes is not None:
+            stepper = NodeStepper(extended)
+        self._steps = record.inputs[1:] if self._nodes is None else self._nodes.inputs
+        run = stepper.simulate(fit.initial_state, self._steps, p0, float(record.time[0]))
+        self._at = np.vstack([fit.initial_state, run.states])
+        self.states = self._spread(self._at)
+        names = (*fit.names, *(e.parameter("amplitude") for e in probes))
+        self._jacobians(stepper, names, p0)
+        self._q = len(fit.names)
+        self._describe(extended, p0)
+        self.nuisance = self._nuisance()
+
+    def _jacobians(self, stepper: Stepper, names: tuple[str, ...], p: FloatArray) -> None:
+        function = stepper.one_step_jacobians(names)
+        nx, q, ny = len(self.fit.initial_state), len(names), len(stepper.model.outputs)
+        time = self.problem.record.time if self._nodes is None else self._nodes.times
+        n = len(self._steps)
+        self._A, self._G = np.empty((n, nx, nx)), np.empty((n, nx, q))
+        self._C, self._H = np.empty((n, ny, nx)), np.empty((n, ny, q))
+        mapped: dict[int, ca.Function] = {}
+        for start in range(0, n, ROWS_AT_ONCE):
+            rows = slice(start, min(start + ROWS_AT_ONCE, n))
+            count = rows.stop - rows.start
+            call = mapped.setdefault(count, over_rows(function, count))
+            found = call(self._at[rows].T, time[rows], self._steps[rows].T, p)
+            for target, value, height, width in (
+                (self._A, found[2], nx, nx),
+                (self._G, found[3], nx, q),
+                (self._C, found[4], ny, nx),
+                (self._H, found[5], ny, q),
+            ):
+                target[rows] = np.array(value).reshape(height, count, width).transpose(1, 0, 2)
+        columns = list(self.problem.columns)
+        self._C, self._H = self._C[:, columns], self._H[:, columns]
+        # what moves no state acts at once: such answers are worked out at all rows, between the nodes too
+        self._at_once = np.logical_not(np.any(self._G != 0, axis=(0, 1)))
+        self._direct = self._spread(np.concatenate([self._H[:1], self._H]))
+
+    def _spread(self, values: FloatArray, rows: IntArray | None = None) -> FloatArray:
+        """Values at all rows, or some of them, from values at the rows that were simulated."""
+        if self._nodes is None:
+            return values if rows is None else values[rows]
+        return self._nodes.spread(values, rows)
+
+    def _describe(self, model: Model, p: FloatArray) -> None:
+        """Series of drivers and of the values at the sites."""
+        record = self.problem.record
+        z_of, value_of = model.ode.map(len(record)), model.site_values.map(len(record))
+        arguments = record.time, self.states.T, record.inputs.T, p
+        _, _, s, z = z_of(*arguments)
+        values = np.array(value_of(*arguments, z))
+        signals = np.array(s)
+        table = {q.name: record.inputs[:, j] for j, q in enumerate(model.inputs)}
+        table |= {q.name: self.states[:, j] for j, q in enumerate(model.states)}
+        table |= {q.name: signals[j] for j, q in enumerate(model.signals)}
+        names = self.fit.model.drivers or (*self.fit.model.names("inputs"), *self.fit.model.names("states"))
+        own = tuple(f"{e.label}." for e in self.fit.model.effects)  # states of an effect drive nothing else
+        self.drivers = {name: table[name] for name in names if not name.startswith(own)}
+        self.site_values = {s.name: values[j] for j, s in enumerate(model.sites)}
+
+    def usual(self, site: str) -> float:
+        """Typical size of the value at a site: the median, or the mean of what is off most of the time."""
+        size = np.abs(self.site_values[site])
+        return float(np.median(size)) or float(np.mean(size))
+
+    def _nuisance(self) -> FloatArray:
+        directions = self.fit.directions
+        n, r = len(self.problem.record), directions.shape[1]
+        S = np.hstack([np.zeros((len(directions), self._q)), directions])
+        inputs = np.zeros((n, self._q + r))
+        inputs[:, : self._q] = 1.0
+        return self._propagate(S, list(range(self._q)), inputs)
+
+    def _propagate(
+        self, S: FloatArray, source: list[int], courses: FloatArray, rows: BoolArray | None = None
+    ) -> FloatArray:
+        """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N, r).
+
+        What the courses are in row k acts in the interval that ends there; in the first row the same as in the second.
+        """
+        m, r = len(self.problem.columns), S.shape[1]
+        where = np.array(source, dtype=np.intp)
+        at_once, slow = np.flatnonzero(self._at_once[where]), np.flatnonzero(~self._at_once[where])
+        # those that move a state, then those that only start somewhere: a block is quicker than picked columns
+        moving = np.concatenate([slow, np.arange(len(where), r)])
+        pushed, source_of = slice(0, len(slow)), where[slow]
+        by_step = (courses[1:] if self._nodes is None else self._nodes.means(courses))[:, slow]
+        S, out = S[:, moving], np.empty((len(self._steps) + 1, m, len(moving)))
+        for i in range(len(self._steps)):
+            np.matmul(self._C[i], S, out=out[i + 1])  # outputs at the end of the interval, by the state at its start
+            out[i + 1][:, pushed] += self._H[i][:, source_of] * by_step[i]
+            S = self._A[i] @ S
+            S[:, pushed] += self._G[i][:, source_of] * by_step[i]
+        out[0] = out[1]
+        kept = np.arange(len(courses)) if rows is None else np.flatnonzero(rows)
+        found = np.empty((len(kept), m, r))
+        for first in range(0, len(kept), FILLED_AT_ONCE):
+            part, part_of = found[first : first + FILLED_AT_ONCE], kept[first : first + FILLED_AT_ONCE]
+            part[:, :, moving] = self._spread(out, part_of)
+            part[:, :, at_once] = self._direct[part_of][:, :, where[at_once]] * courses[part_of][:, None, at_once]
+        return found
+
+    def of(self, courses: list[Course], rows: BoolArray | None = None) -> FloatArray:
+        """Answers (N, m, r) of the measured outputs to r courses; of the rows (N,) that are true only, if any given."""
+        source = [self._q + self.sites.index(c.site) for c in courses]
+        table = np.empty((len(self.problem.record), len(courses)))
+        for j, c in enumerate(courses):
+            v = c.values
+            default = self._offset[c.site]
+            if c.offset and not default:
+                v = v * self._inverse(c.site)
+            elif default and not c.offset:
+                v = v * self.site_values[c.site]
+            table[:, j] = v
+        table[0] = table[1]
+        return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table, rows)
+
+    def _inverse(self, site: str) -> FloatArray:
+        """One over the value at a site (N,), bounded: a pump that is off has no relative change."""
+        value = self.site_values[site]
+        least = LEAST_VALUE * float(np.max(np.abs(value), initial=0.0))
+        found: FloatArray = np.where(np.abs(value) > least, 1 / np.where(np.abs(value) > least, value, 1.0), 0.0)
+        return found
+
+    def adapted_sites(self) -> tuple[str, ...]:
+        """Sites whose constant change does what a change of an adapted parameter does, and nothing else.
+
+        A change in time at such a site is a drift of that parameter: what the adaptation is there for.
+        """
+        count = len(self.problem.adapted)
+        if not count:
+            return ()
+        answers = self.of([Course(s, np.ones(len(self.problem.record)), self._offset[s]) for s in self.sites])
+        scale = np.maximum(np.abs(answers).max(axis=(0, 2)), 1e-300)[None, :, None]
+        a = (answers / scale).reshape(-1, len(self.sites))
+        b = (self.nuisance[:, :, :count] / scale).reshape(-1, count)
+        a, b = (x / np.maximum(np.linalg.norm(x, axis=0), 1e-300) for x in (a, b))
+        alike = np.abs(a.T @ b).max(axis=1)
+        return tuple(s for s, c in zip(self.sites, alike, strict=True) if c > 1 - 1e-6)

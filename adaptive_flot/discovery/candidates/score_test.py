@@ -1,0 +1,241 @@
+"""Efficient scores: how much of the residual each candidate would explain, to first order, for one linearisation.
+
+The adapted parameters and the initial state are projected out first: what they can absorb is no evidence. The noise
+model is that of the residual after *everything in the catalogue at once* (a ridge fit), so that it is neither blind to
+coloured noise nor soaked up by the very effect that is looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.candidates.catalogue import ONSETS, Candidate, event
+from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.variant import Variant
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.noise import CLIP, Noise, noise_by_differences, with_rows_before, without_spikes
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.greybox.model import FloatArray
+
+REFINED = 33
+"""Onsets that are tried around one of the catalogue."""
+LENGTHS = (0.3, 0.55, 1.0, 1.8)
+"""Factors of a duration or time constant that are tried with each."""
+PRIOR_SHARE = 0.3
+"""Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
+DEPENDENT = 1e-12
+"""Share of the strongest combination of a variant's answers below which one is rounding, in squares."""
+AT_ONCE = 100
+"""Rows or columns of a catalogue's answers (150 MB) that are worked on in one go: fresh memory is slow."""
+ABSORBED = 1e-7
+"""Share of an answer that must be left after projection; less is rounding, in which anything can be found."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """First-order evidence for one candidate: its best variant.
+
+    Attributes
+    ----------
+    candidate, variant
+        What was scored.
+    gain
+        Drop of the whitened sum of squares (minus two log-likelihood) on the estimation rows.
+    penalised
+        The same less log(number of measurements) for each coefficient.
+    start
+        Values of the coefficients to start a fit from.
+    """
+
+    candidate: Candidate
+    variant: Variant
+    gain: float
+    penalised: float
+    start: dict[str, float]
+
+
+class Scorer:
+    """Whitened, projected answers of a whole catalogue along one fit."""
+
+    def __init__(self, problem: Problem, fit: Fit, responses: Responses, candidates: list[Candidate]) -> None:
+        self.problem, self.fit, self.candidates = problem, fit, candidates
+        self.drivers, self._responses = responses.drivers, responses
+        self.rows = problem.rows("estimate")
+        self._count = int(np.isfinite(problem.measured[self.rows]).sum())
+        variants = [v for c in candidates for v in c.variants]
+        courses = [course for v in variants for course in v.courses]
+        self._reached = with_rows_before(self.rows)
+        answers = self._answers(courses)
+        nuisance = (responses.nuisance / problem.weights[:, :, None])[self._reached]
+        residual = without_spikes(fit.residual(problem) / problem.weights)
+        self._size = np.array([self._prior(c.offset, responses, c.site) for c in courses])
+        self.noise = self._clean_noise(residual, answers, nuisance, variants)
+        e = self.noise.whiten(residual)
+        present = np.isfinite(e) & self.rows[:, None]
+        self._present = present[self._reached]
+        base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
+        self._base = base
+        columns = self._whitened(answers)
+        del answers  # each is 150 MB for a whole catalogue
+        columns *= self._size  # from here on in standard deviations of the prior
+        size = np.einsum("ij,ij->j", columns, columns)
+        along = base.T @ columns
+        for part in _parts(len(columns)):
+            columns[part] -= base[part] @ along
+        left = np.einsum("ij,ij->j", columns, columns)
+        columns[:, left < ABSORBED**2 * size] = 0.0  # what is left is rounding
+        self.residual = self._project(np.clip(e[present], -1e3, 1e3))
+        self._columns = columns
+        self._along = columns.T @ self.residual
+        self._slices: list[slice] = []
+        at = 0
+        for v in variants:
+            self._slices.append(slice(at, at + len(v.courses)))
+            at += len(v.courses)
+        self._grams = {s.start: columns[:, s].T @ columns[:, s] for s in self._slices}
+
+    def in_mode(self, site: str, mode: str | None, wanted: str | None) -> float:
+        """Factor that turns a small change at a site, given in one mode (None: the site's own), into another mode."""
+        own = next(s.mode for s in self.fit.model.sites if s.name == site)
+        usual = self._responses.usual(site)
+        given, found = (mode or own) == "offset", (wanted or own) == "offset"
+        return 1.0 if given == found else usual if found else 1 / max(usual, 1e-300)
+
+    def _answers(self, courses: list[Course]) -> FloatArray:
+        """Weighted answers to r courses on the rows of `_reached` (rows, m, r)."""
+        found = self._responses.of(courses, self._reached)
+        found /= self.problem.weights[self._reached][:, :, None]
+        return found
+
+    def _whitened(self, answers: FloatArray) -> FloatArray:
+        """Whitened answers (values present, r); answers (rows, m, r). A few at a time, as fresh memory is slow."""
+        found = np.empty((int(self._present.sum()), answers.shape[2]))
+        for part in _parts(answers.shape[2]):
+            found[:, part] = self.noise.whiten(answers[:, :, part])[self._present]
+        return found
+
+    @staticmethod
+    def _prior(offset: bool, responses: Responses, site: str) -> float:
+        return PRIOR_SHARE * (responses.usual(site) if offset else 1.0)
+
+    def _project(self, e: FloatArray) -> FloatArray:
+        projected: FloatArray = e - self._base @ (self._base.T @ e)
+        return projected
+
+    def _clean_noise(
+        self, residual: FloatArray, answers: FloatArray, nuisance: FloatArray, variants: list[Variant]
+    ) -> Noise:
+        """Noise left by a ridge fit of the constant, the slow and the power-law courses of all sites together."""
+        wanted, at = [], 0
+        for v in variants:
+            if v.effect.form in ("shift", "power") or (v.effect.form == "curve" and v.effect.driver == "time"):
+                wanted += list(range(at, at + len(v.courses)))
+            at += len(v.courses)
+        std = np.maximum(np.nan_to_num(noise_by_differences(residual)), self.problem.floor)
+        r = residual[self.rows] / std
+        present = np.isfinite(r)
+        inside = self.rows[self._reached]
+        X = answers[np.ix_(inside, np.arange(answers.shape[1]), np.array(wanted, dtype=np.intp))][present]
+        X *= self._size[wanted]
+        X /= np.broadcast_to(std, present.shape)[present][:, None]
+        Z = (nuisance[inside] / std[:, None])[present]
+        y = r[present]
+        base, _ = np.linalg.qr(Z)
+        X -= base @ (base.T @ X)
+        y = y - base @ (base.T @ y)
+        for _ in range(2):  # the second time without what stands out
+            limit = CLIP * 1.4826 * np.median(np.abs(y)) if _ else np.inf
+            keep = np.abs(y) <= max(limit, CLIP)
+            beta = np.linalg.solve(X[keep].T @ X[keep] + np.eye(X.shape[1]), X[keep].T @ y[keep])
+            left = y - X @ beta
+        full = np.full(residual.shape, np.nan)
+        table = np.full(r.shape, np.nan)
+        table[present] = left
+        full[self.rows] = table * std
+        return self.problem.noise(full, self.rows)
+
+    def scores(self) -> list[Score]:
+        """Scores of all candidates, best first."""
+        found, at = [], 0
+        for candidate in self.candidates:
+            best: Score | None = None
+            for variant in candidate.variants:
+                score = self._score(candidate, variant, self._slices[at])
+                at += 1
+                if best is None or score.penalised > best.penalised:
+                    best = score
+            assert best is not None  # a candidate has variants
+            found.append(best)
+        return sorted(found, key=lambda s: -s.penalised)
+
+    def variant_scores(self, candidate: Candidate) -> list[Score]:
+        """Scores of all variants of one candidate, best first."""
+        at = sum(len(c.variants) for c in self.candidates[: self.candidates.index(candidate)])
+        found = [self._score(candidate, v, self._slices[at + i]) for i, v in enumerate(candidate.variants)]
+        return sorted(found, key=lambda s: -s.penalised)
+
+    def _score(self, candidate: Candidate, variant: Variant, columns: slice) -> Score:
+        A, b = self._grams[columns.start], self._along[columns]
+        A = A + (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A))
+        beta = np.linalg.solve(A, b)
+        gain = float(b @ beta)
+        shapes = len(variant.start)
+        penalty = (len(variant.courses) + shapes) * float(np.log(self._count))
+        values = beta * self._size[columns]
+        start = {n: float(v) for n, v in zip(variant.coefficients, values, strict=True) if n}
+        return Score(candidate, variant, gain, gain - penalty, {**start, **dict(variant.start)})
+
+    def refined(self, score: Score) -> Score:
+        """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima."""
+        start = dict(score.variant.start)
+        if "onset" not in start:
+            return score
+        time = self.problem.record.time
+        reach = (time[-1] - time[0]) / (ONSETS + 1)
+        length = start.get("duration", start.get("time_constant", 0.0))
+        site, form = score.candidate.site, score.variant.effect.form
+        variants = [
+            event(site, form, time, float(onset), length * factor, site.mode == "offset")
+            for onset in start["onset"] + reach * np.linspace(-1, 1, REFINED)
+            for factor in (LENGTHS if length else (1.0,))
+            if time[0] < onset < time[-1]
+        ]
+        columns = self._whitened(self._answers([v.courses[0] for v in variants]))
+        columns -= self._base @ (self._base.T @ columns)
+        gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
+        best = int(np.argmax(gains))
+        if gains[best] <= score.gain:
+            return score
+        amplitude = float(columns[:, best] @ self.residual / np.sum(columns[:, best] ** 2))
+        found = variants[best]
+        penalised = score.penalised + float(gains[best]) - score.gain
+        values = {"amplitude": amplitude, **dict(found.start)}
+        return replace(score, variant=found, gain=float(gains[best]), penalised=penalised, start=values)
+
+    def null_gains(self, draws: int, seed: int) -> FloatArray:
+        """Largest penalised score (draws,) of the catalogue on white noise: the null law of the search.
+
+        Parametric bootstrap: the whitened residual is drawn as white Gaussian noise and projected like the real one.
+        """
+        rng = np.random.default_rng(seed)
+        along = self._columns.T @ rng.standard_normal((len(self._columns), draws))
+        best = np.full(draws, -np.inf)
+        at = 0
+        for candidate in self.candidates:
+            for variant in candidate.variants:
+                columns = self._slices[at]
+                at += 1
+                strength, turned = np.linalg.eigh(self._grams[columns.start])
+                good = strength > max(DEPENDENT * strength[-1], 1e-60)
+                gain = np.sum((turned[:, good].T @ along[columns]) ** 2 / strength[good, None], axis=0)
+                penalty = (len(variant.courses) + len(variant.start)) * np.log(self._count)
+                best = np.maximum(best, gain - penalty)
+        return best
+
+
+def _parts(count: int) -> Iterator[slice]:
+    """Slices of a range, each of at most `AT_ONCE`."""
+    return (slice(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE))

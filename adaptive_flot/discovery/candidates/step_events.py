@@ -1,0 +1,150 @@
+"""Events in time: a ramp, a washout or a step, started from what a free curve in time came to, and freer courses.
+
+The onset of an event has many local optima; a curve has none, as it is linear in its values. So the curve is fitted
+first, and the events start from the shapes that draw it best. Last, the best course gets more freedom: a curve more
+knots (a slow random drift), a ramp or washout a curve whose knots stand where things happen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.candidates.knots import MOST_KNOTS, is_even
+from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.candidates.spline import drawn, knots_of, through
+from adaptive_flot.discovery.candidates.variant import Variant
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
+
+POINTS = 300
+"""Times at which a curve is compared with an event."""
+ONSETS = 60
+DURATIONS = (0.03, 0.08, 0.15, 0.25, 0.4, 0.6)
+"""Durations of ramps and washouts that are tried, as shares of the record."""
+SLOW_S, SLOW_ROWS = 120.0, 50
+"""A change over at least this long, and so many rows, is a drift; of an adapted parameter, that is what adaptation is
+there to follow. Over fewer rows a record can not tell it from a step."""
+LARGE = 0.4
+"""Change of a logarithm (a factor of 1.5) beyond any drift that adaptation is known to follow: a quarter."""
+SUDDEN = 0.03
+"""Share of the record up to which a ramp or a washout may as well be a step."""
+AROUND = (-0.5, 0.0, 0.2, 0.45, 0.75, 1.1, 1.6, 2.5, 4.0)
+"""Knots around an event, in lengths of it since its onset."""
+KNOT_GAP = 0.01
+"""Least distance of these from the ends of the record, as a share of it."""
+
+
+def event_scores(score: Score, curve: Effect) -> list[Score]:
+    """Scores with a ramp and a washout that start from a fitted curve in time of the same name.
+
+    Parameters
+    ----------
+    score
+        The candidate's score.
+    curve
+        The fitted curve, with its coefficients.
+    """
+    knots = knots_of(curve)
+    t = np.linspace(knots[0], knots[-1], POINTS)
+    values = drawn(curve, t)
+    span = float(t[-1] - t[0])
+    found = []
+    for form, second in (("ramp", "duration"), ("washout", "time_constant")):
+        amplitude, onset, length = _best(form, t, values, span)
+        found.append(_event(score, form, amplitude, (("onset", onset), (second, length)), curve, {}))
+    return found
+
+
+def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
+    """The score with a step, where a fitted ramp or washout of the same name is over at once; None elsewhere.
+
+    `span` is the length of the record [s].
+    """
+    c = fitted.coefficients
+    length = {"ramp": c.get("duration"), "washout": c.get("time_constant")}.get(fitted.form)
+    if length is None or length > SUDDEN * span:
+        return None
+    shape = (("onset", c["onset"] + length / 2),)
+    return _event(score, "step", c["amplitude"], shape, fitted, {"width": max(2.0, span / 1000)})
+
+
+def _event(
+    score: Score,
+    form: str,
+    amplitude: float,
+    shape: tuple[tuple[str, float], ...],
+    like: Effect,
+    settings: dict[str, float],
+) -> Score:
+    effect = Effect(like.site, "time", form, settings=settings, mode=like.mode)
+    start = {"amplitude": amplitude, **dict(shape)}
+    return replace(score, variant=Variant(effect, (), ("amplitude",), shape), start=start)
+
+
+def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, float]] | None:
+    """A curve with more knots than a fitted curve, or around a fitted ramp or washout, and values to start from.
+
+    The record lasts from `low` to `high` [s]. None for a step, which has no shape, for a curve that has the knots, and
+    for a slow ramp, of which a curve with even knots is the freer form.
+    """
+    c = effect.coefficients
+    if effect.form == "step" or (effect.form == "ramp" and slow(effect)):
+        return None
+    if effect.form == "curve":
+        if len(knots_of(effect)) >= MOST_KNOTS:
+            return None
+        at = np.linspace(low, high, MOST_KNOTS)
+        values = drawn(effect, at)
+    else:
+        length = c["duration"] if effect.form == "ramp" else 2 * c["time_constant"]
+        around = c["onset"] + length * np.array(AROUND)
+        inside = around[(around > low + KNOT_GAP * (high - low)) & (around < high - KNOT_GAP * (high - low))]
+        at = np.concatenate([[low], inside, [high]])
+        since = np.maximum(at - c["onset"], 0)
+        ramp = effect.form == "ramp"
+        values = c["amplitude"] * (
+            np.minimum(since / c["duration"], 1) if ramp else 1 - np.exp(-since / c["time_constant"])
+        )
+    return through(effect, at, values)
+
+
+def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
+    """Whether a course in time is a drift, and not an event: a ramp that lasts, or a curve with even knots.
+
+    Such a curve is an event after all where it changes much, and half of that at once: in less than `shortest` [s].
+    """
+    if effect.form == "curve":
+        knots = knots_of(effect)
+        return is_even(knots) and not _jumps(effect, knots, shortest)
+    return effect.form == "ramp" and effect.coefficients["duration"] >= shortest
+
+
+def _jumps(effect: Effect, knots: list[float], shortest: float) -> bool:
+    """Whether a curve changes by a large factor, half of all it ever changes in a short time."""
+    t = np.linspace(knots[0], knots[-1], POINTS)
+    values = drawn(effect, t)
+    ahead = max(1, round(shortest / float(t[1] - t[0])))
+    whole = float(np.ptp(values))
+    return whole > LARGE and bool(np.max(np.abs(values[ahead:] - values[:-ahead]), initial=0.0) > whole / 2)
+
+
+def _best(form: str, t: FloatArray, values: FloatArray, span: float) -> tuple[float, float, float]:
+    """Amplitude, onset and duration whose event, up to a constant, is nearest to the values."""
+    best = (np.inf, 0.0, float(t[len(t) // 2]), 0.1 * span)
+    centred = values - values.mean()
+    for onset in np.linspace(t[0], t[-1], ONSETS + 2)[1:-1]:
+        for share in DURATIONS:
+            length = share * span
+            if form == "ramp":
+                course = np.clip((t - onset) / length, 0, 1)
+            else:
+                length /= 3  # a washout of this time constant is done after about that duration
+                course = 1 - np.exp(-np.maximum(t - onset, 0) / length)
+            course = course - course.mean()
+            amplitude = float(course @ centred / max(course @ course, 1e-300))
+            left = float(np.sum((centred - amplitude * course) ** 2))
+            if left < best[0]:
+                best = (left, amplitude, float(onset), length)
+    return best[1:]

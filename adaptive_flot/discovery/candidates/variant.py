@@ -1,0 +1,30 @@
+"""One way to score and fit a candidate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adaptive_flot.discovery.candidates.responses import Course
+from adaptive_flot.greybox.effects import Effect
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to score and fit a candidate.
+
+    Attributes
+    ----------
+    effect
+        The effect at amplitude zero, with its settings.
+    courses
+        Courses at the site (r of them) whose linear combination it is near amplitude zero.
+    coefficients
+        Coefficient that each course is the derivative of; "" where there is none (see `start`).
+    start
+        Further values to start a fit from (onset, time constant).
+    """
+
+    effect: Effect
+    courses: tuple[Course, ...]
+    coefficients: tuple[str, ...]
+    start: tuple[tuple[str, float], ...] = ()

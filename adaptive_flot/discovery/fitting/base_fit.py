@@ -1,0 +1,61 @@
+"""Before the search: the record in shares, and the fit of the model as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.node_spacing import placements, with_nodes
+from adaptive_flot.discovery.record.noise import proportional
+from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.record.screening import Gate
+from adaptive_flot.greybox.model import Model
+
+BURN_IN_ROWS = 30
+GUARD_ROWS = 5
+FEWEST_VALUES = 8
+"""An output with fewer measurements on any share is left out: it could not be fitted, confirmed or reported."""
+
+
+def shared(checked: Gate, model: Model, adapted: tuple[str, ...], cycle: Sequence[str]) -> tuple[Problem, Gate]:
+    """The record split into shares, and what the gate says with the outputs that one of them does not see."""
+    record = checked.record
+    burn_in = min(BURN_IN_ROWS, len(record) // 20)
+    problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS, cycle=cycle)
+    counts = np.array([np.isfinite(problem.measured[problem.rows(share)]).sum(axis=0) for share in cycle])
+    enough = counts.min(axis=0) >= FEWEST_VALUES
+    left = tuple(
+        f"{model.outputs[c].name}: too few values in a part of the record, left out"
+        for c, is_enough in zip(problem.columns, enough, strict=True)
+        if not is_enough
+    )
+    columns = tuple(np.array(problem.columns)[enough].tolist())
+    kept = replace(problem, columns=columns, weights=problem.weights[:, enough], floor=problem.floor[enough])
+    reasons = () if columns else ("no output is measured throughout the record",)
+    return kept, replace(checked, reasons=reasons, notes=checked.notes + left)
+
+
+def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
+    """Fit the model as it is, twice: the first residual shows how the noise grows.
+
+    Rows that make no difference are left out of the runs: first to the model as it came, then to the first fit.
+    """
+    start = Fitter(problem).fit(model, rounds=0)
+    if start is None:
+        return None
+    placed = placements(problem.record, model)
+    problem = with_nodes(problem, start, placed)
+    first = Fitter(problem).fit(model, like=start, rounds=1)
+    if first is None:
+        return None
+    seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
+    problem = with_nodes(problem.with_weights(proportional(seen, first.predicted)), first, placed)
+    fitter = Fitter(problem)
+    base = fitter.fit(first.model, like=first, rounds=2)
+    if base is None:
+        return None
+    return problem, fitter.settled(base)

@@ -1,0 +1,266 @@
+"""The search for one fit: each alternative has its own noise model, fitted in turn with its unknowns.
+
+Gauss-Newton with Marquardt damping on sensitivities of the whole record, for the criterion of `fit`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import cast
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit, loss_of
+from adaptive_flot.discovery.fitting.unknowns import Unknowns
+from adaptive_flot.discovery.record.noise import Noise, noise_by_differences
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e4
+SHAPE_DAMPING = 0.1
+"""First damping where an onset or a time constant is free: an undamped step throws it out of the record."""
+MOST_DIRECTIONS = 6
+"""Combinations of the initial state that are free: those that the record tells most about."""
+TELLING = 3.0
+"""A combination counts when a change by one scale moves the outputs by this many standard deviations in all."""
+TOLERANCE = 0.1
+"""A step that improves minus two log-likelihood by less ends the search: a fortieth of what any test asks for."""
+SLOW = 2e-3
+"""Or one that improves it by less than this share of what the search has gained so far."""
+FAR_OFF = 0.01
+"""A run is far off when no larger a share of the measurements is within what the first steps look at."""
+KEPT, SHAPE_KEPT = 0.5, 0.8
+"""Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
+constant change more."""
+
+SHARES = (1.0, 0.3, 0.1)
+"""Shares of the values of a first-order answer that are tried as the start."""
+ABRUPT = ("step", "lag", "lags", "delay", "stiction")
+"""Forms with events or fast states between the nodes of a record, which are simulated at every row."""
+
+
+def is_smooth(model: Model) -> bool:
+    """Whether a model's effects do nothing sudden between the nodes of a record."""
+    return not any(e.form in ABRUPT for e in model.effects)
+
+
+class Descent:
+    """One search: the fit of one model to the rows that are true (N,), for some unknowns."""
+
+    def __init__(self, problem: Problem, rows: BoolArray, model: Model, unknowns: Unknowns) -> None:
+        self.problem, self.rows, self.model, self.unknowns = problem, rows, model, unknowns
+        self.simulator = RecordSimulator(model, problem.record.dt, problem.nodes if is_smooth(model) else None)
+
+    def _predict(self, z: FloatArray) -> FloatArray:
+        p, x0 = self.unknowns.unpack(z)
+        return self.simulator.outputs(self.problem.record, x0, p)[:, self.problem.columns]
+
+    def _jacobian(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Predictions (N, m) and their derivatives (N, m, unknowns)."""
+        p, x0 = self.unknowns.unpack(z)
+        gradient = self.unknowns.initial_gradient()
+        y, dy, _ = self.simulator.sensitivities(self.problem.record, x0, p, self.unknowns.names, gradient)
+        columns = list(self.problem.columns)
+        dy[:, :, : self.unknowns.q] *= self.unknowns.scale
+        return y[:, columns], dy[:, columns, :]
+
+    def _objective(self, z: FloatArray, predicted: FloatArray, noise: Noise) -> float:
+        if not np.all(np.abs(predicted) < 1e100):
+            return np.inf
+        value = loss_of(self.problem, predicted, self.rows, noise)[0]
+        return value + float(np.sum(((z - self.unknowns.prior_centre) / self.unknowns.prior) ** 2))
+
+    # -- search --------------------------------------------------------------------------------------------------------
+
+    def shrink(self, names: Sequence[str]) -> None:
+        """Start from smaller values of these unknowns where these are nearer: a first-order answer may be far off."""
+        where = [self.unknowns.names.index(n) for n in names]
+        noise, starts = self._first_noise(), []
+        for share in SHARES:
+            z = self.unknowns.centre.copy()
+            z[where] *= share
+            z = np.clip(z, self.unknowns.lower, self.unknowns.upper)
+            starts.append((self._objective(z, self._predict(z), noise), z))
+        self.unknowns.centre = min(starts, key=lambda start: start[0])[1]
+
+    def run(self, rounds: int, steps: int, first: bool) -> Fit | None:
+        """Steps for as many noise models as `rounds`; `first` chooses the directions of the initial state itself."""
+        if first:
+            self.unknowns.turn(self._telling_directions())
+        z = self.unknowns.centre.copy()
+        predicted, slope = self._jacobian(z)
+        if not (np.isfinite(predicted).all() and _moderate(slope)):
+            return None
+        noise, exact = self._first_noise(predicted), True
+        for turn in range(rounds):
+            if not exact:
+                predicted, slope = self._derived(z, predicted, slope)
+            z, predicted, slope, exact = self._descend(z, predicted, slope, noise, steps)
+            if turn < rounds - 1:
+                before = noise
+                noise = loss_of(self.problem, predicted, self.rows)[1]
+                if turn and _alike(before, noise):
+                    break
+        return self._result(z, predicted, slope)
+
+    def _derived(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Predictions and exact derivatives at z, or what there is where these are beyond all bounds."""
+        there, fresh = self._jacobian(z)
+        return (there, fresh) if _moderate(fresh) else (predicted, slope)
+
+    def _telling_directions(self) -> FloatArray:
+        """Directions (nx, r) of the initial state, in scales of the states, that the record tells most about."""
+        scale = np.array([s.scale for s in self.model.states])
+        self.unknowns.turn(np.diag(scale))
+        _, slope = self._jacobian(self.unknowns.centre)
+        weighted = slope[:, :, self.unknowns.q :] / (self.problem.weights * self._white_std())[:, :, None]
+        rows = weighted[self.rows].reshape(-1, len(scale))
+        if not np.isfinite(rows).all():
+            return np.zeros((len(scale), 0))
+        strength, turned = np.linalg.eigh(rows.T @ rows)
+        telling = [i for i in np.argsort(-strength)[:MOST_DIRECTIONS] if strength[i] > TELLING**2]
+        return cast(FloatArray, scale[:, None] * turned[:, telling])
+
+    def _white_std(self) -> FloatArray:
+        """Noise by differencing: it needs no model."""
+        found = noise_by_differences(self.problem.measured / self.problem.weights)
+        return cast(FloatArray, np.maximum(np.nan_to_num(found), self.problem.floor))
+
+    def _first_noise(self, predicted: FloatArray | None = None) -> Noise:
+        """White, and large: the first steps must not be steered by what a wrong model leaves.
+
+        As large as the error itself where a prediction is so far off that next to nothing would count.
+        """
+        std = np.maximum(3 * self._white_std(), self.problem.floor)
+        if predicted is not None:
+            off = np.abs((self.problem.measured - predicted) / self.problem.weights)[self.rows]
+            seen = np.isfinite(off)
+            if np.sum(off[seen] <= (self.problem.clip * std * np.ones_like(off))[seen]) < FAR_OFF * seen.sum():
+                std = np.maximum(std, np.nan_to_num(np.nanmedian(off, axis=0)))
+        return Noise(std, np.zeros((len(self.problem.columns), 1)))
+
+    def _descend(
+        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise, steps: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+        """Steps for one noise model: what they come to, its predictions, their derivatives, and if these are exact.
+
+        Derivatives cost ten times what a prediction does. While a step gains about what it promised they are kept, and
+        corrected by what the step has shown (Broyden 1965, *Math. Comp.* 19:577); only exact ones may end the search.
+        """
+        value = first = self._objective(z, predicted, noise)
+        shaped = self.unknowns.shaped
+        damping, exact = SHAPE_DAMPING if shaped else FIRST_DAMPING, True
+        for _ in range(steps):
+            A, b = self._system(z, predicted, slope, noise)
+            found = self._tried(z, value, noise, self._step(z, A, b), damping)
+            if found is None and exact:
+                break
+            if found is not None:
+                trial, there, new, damping = found
+                moved, gained = trial - z, value - new
+                promised = float(2 * b @ moved - moved @ A @ moved)
+                kept = gained > (SHAPE_KEPT if shaped else KEPT) * promised
+                if kept:
+                    slope = _corrected(slope, moved, there - predicted, np.diag(A))
+                done = gained < max(TOLERANCE, SLOW * (first - new))
+                z, value, predicted = trial, new, there
+                enough, exact = done and exact, False
+                if enough:
+                    break
+                if kept and not done:
+                    continue
+            there, fresh = self._jacobian(z)
+            if not _moderate(fresh):
+                break
+            predicted, slope, exact = there, fresh, True
+        return z, predicted, slope, exact
+
+    def _tried(
+        self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
+    ) -> tuple[FloatArray, FloatArray, float, float] | None:
+        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next."""
+        while damping < MOST_DAMPING:
+            trial = np.clip(z + step_of(damping), self.unknowns.lower, self.unknowns.upper)
+            there = self._predict(trial)
+            new = self._objective(trial, there, noise)
+            if new < value:
+                return trial, there, new, max(damping / 10, LEAST_DAMPING)
+            damping *= 10
+        return None
+
+    def _system(
+        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
+    ) -> tuple[FloatArray, FloatArray]:
+        """Normal equations (A, b) of the whitened, clipped, regularised problem."""
+        rows, w = self.rows, self.problem.weights
+        e = noise.whiten((self.problem.measured - predicted) / w)[rows]
+        J = noise.whiten(slope / w[:, :, None])[rows]
+        present = np.isfinite(e)
+        inside = present & (np.abs(np.where(present, e, 0)) <= self.problem.clip)
+        e = np.where(inside, e, 0)[inside]
+        J = J[inside]
+        prior = 1 / self.unknowns.prior**2
+        A = J.T @ J + np.diag(prior)
+        b = J.T @ e - prior * (z - self.unknowns.prior_centre)
+        return A, b
+
+    def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
+        """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
+        size = np.diag(A) + 1e-12 * np.max(np.diag(A), initial=0.0)
+        at_lower = (z <= self.unknowns.lower) & (b < 0)
+        at_upper = (z >= self.unknowns.upper) & (b > 0)
+        move = ~(at_lower | at_upper)
+
+        def step(damping: float) -> FloatArray:
+            found = np.zeros(len(b))
+            if not A.any():
+                return found  # the record says nothing of any unknown
+            system = A[np.ix_(move, move)] + damping * np.diag(size[move])
+            found[move] = np.linalg.solve(system, b[move])
+            return found
+
+        return step
+
+    def _result(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> Fit | None:
+        if not np.isfinite(predicted).all():
+            return None
+        problem, rows = self.problem, self.rows
+        loss, noise = loss_of(problem, predicted, rows)
+        A, _ = self._system(z, predicted, slope, noise)
+        inverse = np.linalg.pinv(A, hermitian=True)[: self.unknowns.q, : self.unknowns.q]
+        covariance = cast(FloatArray, inverse * np.outer(self.unknowns.scale, self.unknowns.scale))
+        p, x0 = self.unknowns.unpack(z)
+        values = p[self.unknowns.where]
+        fitted = self.model.with_parameters(dict(zip(self.unknowns.names, map(float, values), strict=True)))
+        penalty = len(self.unknowns.names) * np.log(max(problem.count(rows), 2))
+        innovations = noise.whiten((problem.measured - predicted) / problem.weights)
+        return Fit(
+            fitted,
+            self.unknowns.names,
+            values,
+            covariance,
+            x0,
+            predicted,
+            innovations,
+            noise,
+            loss,
+            loss + float(penalty),
+            self.unknowns.directions,
+        )
+
+
+def _corrected(slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
+    """Derivatives (N, m, unknowns) that give the `change` (N, m) of the predictions along the step that made it."""
+    along = weight * moved
+    found: FloatArray = slope + (change - slope @ moved)[:, :, None] * (along / max(float(moved @ along), 1e-300))
+    return found
+
+
+def _moderate(slope: FloatArray) -> bool:
+    """Whether a derivative can be squared: a run near the edge of stability has larger ones."""
+    return bool(np.all(np.abs(slope) < 1e100))
+
+
+def _alike(a: Noise, b: Noise) -> bool:
+    return np.allclose(a.std, b.std, rtol=0.01) and np.allclose(a.lags, b.lags, atol=0.02)

@@ -1,0 +1,102 @@
+"""A fitted alternative, and the criterion it was fitted by.
+
+Output error (free run) with whitened, clipped innovations: Ljung, *System Identification*, 2nd ed., (7.12) with Huber's
+norm (15.9).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.contracts import full_parameters
+from adaptive_flot.discovery.record.noise import Noise
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.greybox.model import FloatArray, Model
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted alternative.
+
+    Attributes
+    ----------
+    model
+        The model with the fitted parameters.
+    names
+        Free parameters (q,), the adapted ones first.
+    values, covariance
+        Their values (q,) and covariance (q, q), each in its unit.
+    initial_state
+        State at the first row (nx,).
+    predicted
+        Free run (N, m) of the measured outputs.
+    innovations
+        Whitened innovations (N, m) in standard deviations, NaN where missing.
+    noise
+        Noise model of the residual.
+    loss
+        Minus two log-likelihood on the rows fitted (up to a constant of the record).
+    bic
+        `loss` + free parameters x log(number of measurements).
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    initial_state: FloatArray
+    predicted: FloatArray
+    innovations: FloatArray
+    noise: Noise
+    loss: float
+    bic: float
+    directions: FloatArray
+    """Free combinations of the initial state (nx, r): those the record can tell; the rest keeps its first guess."""
+
+    def residual(self, problem: Problem) -> FloatArray:
+        """Measured minus predicted (N, m)."""
+        r: FloatArray = problem.measured - self.predicted
+        return r
+
+    def __getstate__(self) -> dict[str, object]:
+        """A fit pickles without its model, whose equations do not pickle; `with_model` puts it back."""
+        return {**self.__dict__, "model": None}
+
+    def with_model(self, make: Callable[[], Model]) -> Fit:
+        """The fit with the model that was fitted, made anew where it came without from another process."""
+        if self.model is not None:
+            return self
+        return replace(self, model=make().with_parameters(dict(zip(self.names, map(float, self.values), strict=True))))
+
+    def std(self) -> FloatArray:
+        """Standard deviation of each free parameter (q,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def loss_of(
+    problem: Problem, predicted: FloatArray, rows: BoolArray, noise: Noise | None = None
+) -> tuple[float, Noise]:
+    """Minus two log-likelihood on some rows; with the noise model given, or fitted to these rows."""
+    weighted = (problem.measured - predicted) / problem.weights
+    noise = noise or problem.noise(weighted, rows)
+    e = noise.whiten(weighted)[rows]
+    present = np.isfinite(e)
+    squares = np.minimum(np.abs(np.where(present, e, 0)), problem.clip) ** 2
+    return float(np.sum(squares) + 2 * np.sum(np.log(noise.std) * present.sum(axis=0))), noise
+
+
+def row_losses(problem: Problem, fit: Fit, rows: BoolArray) -> FloatArray:
+    """What each of some rows adds to minus two log-likelihood (rows,), with the noise of the fit."""
+    e = fit.noise.whiten((problem.measured - fit.predicted) / problem.weights)[rows]
+    present = np.isfinite(e)
+    squares = np.minimum(np.abs(np.where(present, e, 0)), problem.clip) ** 2
+    found: FloatArray = np.sum(squares + 2 * np.log(fit.noise.std) * present, axis=1)
+    return found
+
+
+def parameters_of(fit: Fit) -> FloatArray:
+    """Full parameter vector (np,) of a fit."""
+    return full_parameters(fit.model, fit.names, fit.values)

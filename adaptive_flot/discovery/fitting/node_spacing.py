@@ -1,0 +1,75 @@
+"""How far apart a search may simulate a densely sampled record without anyone noticing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.descent import is_smooth
+from adaptive_flot.discovery.fitting.fit import Fit, loss_of
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.noise import noise_by_differences
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
+
+LONGEST = (6, 4, 3, 2)
+"""Most rows from node to node, or steps at every row in one, that are tried."""
+GROWTHS = (1.0, 0.5, 0.35, 0.25)
+"""Rows that nodes may be further apart for each row since the last move of an input: what a move sets off dies away."""
+UNNOTICED = 2.0
+"""Sum of the squared errors of the coarser run, in standard deviations of the noise, that makes no difference: it
+changes minus two log-likelihood by about as much, a fifth of what a name asks for."""
+NOTICED = 3.0
+"""Difference of minus two log-likelihood from which a run at every row is worth its price."""
+WORTHWHILE = 0.8
+"""Nodes as a share of the steps at every row above which there is nothing to save."""
+
+
+def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, float]]) -> Fit:
+    """The fit itself where a run at every row says the same of it; else one made at every row, from there.
+
+    The nodes were placed for the model as it is: an effect may have made it faster.
+    """
+    problem = fitter.problem
+    if problem.nodes is None or not is_smooth(fit.model):
+        return fit
+    every = replace(problem, nodes=None)
+    run = RecordSimulator(fit.model, problem.record.dt)
+    free = run.outputs(problem.record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
+    if np.isfinite(free).all() and abs(loss_of(problem, free, fitter.rows)[0] - fit.loss) < NOTICED:
+        return fit
+    return Fitter(every, fitter.share).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
+
+
+def placements(record: Dataset, model: Model) -> list[Nodes]:
+    """Nodes that are tried, the fewest first; of a coarsely sampled record longer steps, where a row asks for many."""
+    steps = Stepper(model, record.dt).substeps
+    if steps > MOST_UNROLLED:
+        return [substeps(record, count) for count in sorted({math.ceil(steps / longest) for longest in LONGEST})]
+    placed: list[Nodes] = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
+    fewest_first = sorted(placed, key=lambda nodes: len(nodes.rows))
+    return [nodes for nodes in fewest_first if len(nodes.rows) <= WORTHWHILE * len(record)]
+
+
+def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes] | None = None) -> Problem:
+    """The problem with the first `placements` at which a fit's run stays what it is at every row, if there are any."""
+    record, every = problem.record, replace(problem, nodes=None)
+    run = RecordSimulator(fit.model, record.dt)
+    exact = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
+    noise = noise_by_differences((problem.measured - exact) / problem.weights)
+    size = np.maximum(np.nan_to_num(noise), problem.floor) * problem.weights
+    for nodes in placements(record, fit.model) if placed is None else placed:
+        run = RecordSimulator(fit.model, record.dt, nodes)
+        free = run.outputs(record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
+        with np.errstate(over="ignore", invalid="ignore"):  # a longer step may run off
+            noticed = float(np.sum(((free - exact) / size) ** 2))
+        if noticed < UNNOTICED:
+            return replace(problem, nodes=nodes)
+    return every

@@ -1,0 +1,68 @@
+"""Independent fits on several processes, where the system can fork; else one after the other, with the same results."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from adaptive_flot.greybox.stepping.rows import core_count
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+_work: Callable[[Any], Any] | None = None
+
+
+def _call(item: Any) -> Any:
+    assert _work is not None  # set before the fork
+    return _work(item)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Linear algebra on one thread, in this process and those that it forks.
+
+    Cores are for processes: threads beside them only wait for each other. And sums are then taken in the same order on
+    every machine, so that the last digits of a verdict do not depend on its number of cores.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
+def parallel_map(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    processes: int,
+    done: Callable[[], None] = lambda: None,
+) -> list[Result]:
+    """`[function(item) for item in items]`; `done` is called after each.
+
+    The function may close over anything (a model's equations do not pickle): workers are forked with it. Items and
+    results must pickle.
+    """
+    global _work
+    if processes < 2 or len(items) < 2 or "fork" not in multiprocessing.get_all_start_methods():
+        found = []
+        for item in items:
+            found.append(function(item))
+            done()
+        return found
+    _work = function
+    try:
+        with ProcessPoolExecutor(min(processes, len(items)), multiprocessing.get_context("fork")) as pool:
+            results = []
+            for result in pool.map(_call, items):
+                results.append(result)
+                done()
+            return results
+    finally:
+        _work = None
+
+
+def available_processes() -> int:
+    """Cores this process may use."""
+    return core_count()

@@ -1,0 +1,143 @@
+"""What a fit is free to move: parameters, and those combinations of the initial state that the record can tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.steady_state import steady_state
+
+DIRECTION_PRIOR = 5.0
+"""Standard deviation of the weak prior of a direction of the initial state, in units of the states' scales."""
+PRIOR_SCALES = 20.0
+"""Standard deviation of the weak prior of an effect's coefficients, in units of their scale."""
+LAGGED_SCALES = 0.1
+"""How far a direction moves the states of a new effect, in their scales: their usual value is about one."""
+
+
+class Unknowns:
+    """Unknowns z: the q free parameters over their scale, then the r free directions of the initial state.
+
+    Attributes
+    ----------
+    names
+        Free parameters (q,), the adapted ones first.
+    shaped
+        Whether some of them shape an effect (an onset, a time constant): derivatives by these change from step to step.
+    lower, upper, centre
+        Range and start of z (q + r,).
+    prior, prior_centre
+        Standard deviation and centre of the weak prior of z (q + r,).
+    directions
+        Free combinations of the initial state (nx, r).
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        model: Model,
+        free: tuple[str, ...],
+        start: Mapping[str, float],
+        like: Fit | None,
+        bounds: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.problem, self.model = problem, model
+        self.names = (*problem.adapted, *(n for n in free if n not in problem.adapted))
+        self.where = model.indices("parameters", self.names)
+        parameters = [model.parameters[i] for i in self.where]
+        if like is not None:
+            start = {**{p.name: p.value for p in like.model.parameters}, **start}
+        self.base = np.array([start.get(p.name, p.value) for p in model.parameters])
+        self.x0 = self._first_state(like)
+        self.q = len(self.names)
+        self.scale = np.array([p.scale for p in parameters])
+        low = [max(p.lower, bounds.get(p.name, (-np.inf, np.inf))[0]) for p in parameters]
+        high = [min(p.upper, bounds.get(p.name, (-np.inf, np.inf))[1]) for p in parameters]
+        shapes = {e.parameter(c.name) for e in model.effects for c in e.terms if c.shape}
+        self.shaped = any(p.name in shapes for p in parameters)
+        unbound = [i < len(problem.adapted) or p.name in shapes for i, p in enumerate(parameters)]
+        self._range = np.array(low) / self.scale, np.array(high) / self.scale
+        self._prior = np.where(unbound, np.inf, PRIOR_SCALES)
+        self._prior_centre = np.array([p.value for p in parameters]) / self.scale
+        self.turn(self._first_directions(like))
+
+    def turn(self, directions: FloatArray) -> None:
+        """Make these directions (nx, r) of the initial state the free ones."""
+        r = directions.shape[1]
+        self.directions = directions
+        self.lower = np.concatenate([self._range[0], np.full(r, -np.inf)])
+        self.upper = np.concatenate([self._range[1], np.full(r, np.inf)])
+        self.prior = np.concatenate([self._prior, np.full(r, DIRECTION_PRIOR)])
+        self.prior_centre = np.concatenate([self._prior_centre, np.zeros(r)])
+        start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r)])
+        self.centre = np.clip(start, self.lower, self.upper)
+
+    def _first_state(self, like: Fit | None) -> FloatArray:
+        record, n = self.problem.record, len(self.model.states)
+        if like is not None:
+            return self._settled_filters(dict(zip(like.model.names("states"), like.initial_state, strict=True)))
+        if record.initial_state is not None and n == len(record.initial_state):
+            return record.initial_state
+        guess = np.array([self.model.initial_guess.get(s.name, s.scale) for s in self.model.states])
+        if not self.model.starts_steady:
+            return guess
+        try:
+            return steady_state(self.model, record.inputs[0], self.base).state
+        except RangeError:
+            return guess
+
+    def _first_directions(self, like: Fit | None) -> FloatArray:
+        """Free directions of the initial state (nx, r): those of a fit, in the states that the model has in common.
+
+        And two for the states that it has beside: a record may start while a slow sensor is still on its way.
+        """
+        if like is None:
+            return np.zeros((len(self.x0), 0))
+        rows = dict(zip(like.model.names("states"), like.directions, strict=True))
+        nothing = np.zeros(like.directions.shape[1])
+        states = self.model.states
+        known = np.array([rows.get(s.name, nothing) for s in states])
+        return np.hstack([known, _along([0.0 if s.name in rows else s.scale for s in states])])
+
+    def _settled_filters(self, known: Mapping[str, float]) -> FloatArray:
+        """Initial state with the states of new effects where they are at rest beside the known ones, by name."""
+        record, names = self.problem.record, self.model.names("states")
+        x = np.array([known.get(name, 1.0) for name in names])
+        new = [i for i, name in enumerate(names) if name not in known]
+        if not new:
+            return x
+        arguments = record.time[0], x, record.inputs[0], self.base
+        slope = np.array(self.model.ode.factory("slope", ["t", "x", "u", "p"], ["jac:xdot:x"])(*arguments))
+        rate = np.array(self.model.ode(*arguments)[0]).ravel()
+        if not (np.isfinite(slope).all() and np.isfinite(rate).all()):
+            return x  # the run from here will not be finite either, and is told so
+        x[new] -= np.linalg.lstsq(slope[np.ix_(new, new)], rate[new], rcond=None)[0]
+        return x
+
+    def unpack(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Parameters (np,) and initial state (nx,), kept inside the physical range of each state."""
+        p = self.base.copy()
+        p[self.where] = z[: self.q] * self.scale
+        x0 = self.x0 + self.directions @ z[self.q :]
+        lower = np.array([s.lower for s in self.model.states])
+        upper = np.array([s.upper for s in self.model.states])
+        return p, cast(FloatArray, np.clip(x0, lower, upper))
+
+    def initial_gradient(self) -> FloatArray:
+        """Derivative of the initial state by z (nx, q + r)."""
+        return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
+
+
+def _along(scales: Sequence[float]) -> FloatArray:
+    """Directions (nx, r <= 2) of the states whose scale is not zero, a chain of lags: all as one, and evenly spread."""
+    new = np.flatnonzero(scales)
+    found = np.zeros((len(scales), min(len(new), 2)))
+    for k in range(found.shape[1]):
+        found[new, k] = LAGGED_SCALES * np.array(scales)[new] * np.linspace(1, -1, len(new)) ** k
+    return found

@@ -1,0 +1,8 @@
+"""The record as discovery sees it.
+
+Map
+---
+screening.py  What in a record can not be used, said before anything is fitted.
+problem.py    Rows in splits, measured outputs, unknowns that are no effect.
+noise.py      What the noise of each output looks like.
+"""

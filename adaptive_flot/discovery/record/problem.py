@@ -1,0 +1,138 @@
+"""The record as discovery sees it: rows in three interleaved shares, measured outputs, unknowns that are no effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adaptive_flot.discovery.record.noise import CLIP, Noise, fit_noise, white_noise
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.nodes import Nodes
+
+BoolArray = NDArray[np.bool_]
+
+CYCLE = ("estimate", "estimate", "confirm", "estimate", "report")
+"""Shares of the record, in turn: 60 % to estimate, 20 % to confirm, 20 % to report. Blocks are interleaved in time, so
+that an event at any time has rows of each kind around it."""
+WITHOUT_REPORT = ("estimate", "estimate", "confirm", "estimate")
+"""The same where a record of its own reports."""
+CYCLES = 4
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A record prepared for fits.
+
+    Attributes
+    ----------
+    record
+        The whole record; inputs are never missing.
+    columns
+        Indices of the measured outputs (m,).
+    adapted
+        Names of the parameters that the estimator adapts; they are free in every alternative.
+    blocks
+        Name of the share of each row (N,): "estimate", "confirm", "report" or "" for rows that are left out.
+    weights
+        Relative size of the noise of each measured output (N, m).
+    floor
+        Smallest noise believed (m,).
+    whiten
+        Whether residuals are whitened and clipped. Not where model error outweighs the noise by far: there a noise
+        model would explain the error away, and its largest values are the physics that is looked for.
+    nodes
+        Rows that a search simulates, where that makes no difference to speak of; None for all.
+    """
+
+    record: Dataset
+    columns: tuple[int, ...]
+    adapted: tuple[str, ...]
+    blocks: NDArray[np.str_]
+    weights: FloatArray
+    floor: FloatArray
+    whiten: bool = True
+    nodes: Nodes | None = None
+
+    @property
+    def clip(self) -> float:
+        """Standard deviations up to which an innovation counts."""
+        return CLIP if self.whiten else float("inf")
+
+    def noise(self, weighted: FloatArray, rows: BoolArray) -> Noise:
+        """Noise model of a weighted residual (N, m) on some rows (N,)."""
+        return (fit_noise if self.whiten else white_noise)(weighted, rows, self.floor)
+
+    def count(self, rows: BoolArray) -> int:
+        """Number of measurements on some rows (N,)."""
+        return int(np.isfinite(self.measured[rows]).sum())
+
+    @property
+    def measured(self) -> FloatArray:
+        """Measured outputs (N, m), NaN where missing."""
+        y: FloatArray = self.record.outputs[:, self.columns]
+        return y
+
+    def rows(self, *shares: str) -> BoolArray:
+        """Mask (N,) of the rows in the named shares; all that are not left out when none is named."""
+        mask: BoolArray = np.isin(self.blocks, shares) if shares else self.blocks != ""
+        return mask
+
+    @property
+    def first_row(self) -> int:
+        """First row of any share; those before are left out, since the initial state is not known."""
+        return int(np.argmax(self.rows()))
+
+    def spans(self, share: str) -> tuple[tuple[float, float], ...]:
+        """First and last time [s] of each contiguous part of a share."""
+        inside = np.concatenate([[False], self.rows(share), [False]]).astype(int)
+        starts, stops = (np.flatnonzero(np.diff(inside) == sign) for sign in (1, -1))
+        time = self.record.time
+        return tuple((float(time[a]), float(time[b - 1])) for a, b in zip(starts, stops, strict=True))
+
+    def with_weights(self, weights: FloatArray) -> Problem:
+        """Return the same problem with the noise weights (N, m)."""
+        return replace(self, weights=weights)
+
+
+def make_problem(
+    record: Dataset,
+    model: Model,
+    adapted: tuple[str, ...],
+    *,
+    burn_in: int,
+    guard: int,
+    cycles: int = CYCLES,
+    cycle: Sequence[str] = CYCLE,
+) -> Problem:
+    """Split a record.
+
+    Parameters
+    ----------
+    record, model
+        The record and the model it belongs to.
+    adapted
+        Names of the adapted parameters.
+    burn_in
+        Rows at the start that no share gets, because the initial state is not known.
+    guard
+        Rows left out at each border between shares.
+    cycle
+        Shares of one cycle.
+    cycles
+        How often the pattern of shares repeats.
+    """
+    n = len(record)
+    columns = tuple(model.index("outputs", name) for name in record.measured(model))
+    blocks = np.full(n, "", dtype="<U8")
+    edges = np.linspace(burn_in, n, cycles * len(cycle) + 1).round().astype(int)
+    for k, (start, stop) in enumerate(pairwise(edges)):
+        share = cycle[k % len(cycle)]
+        same = k > 0 and cycle[(k - 1) % len(cycle)] == share
+        blocks[start + (0 if same or k == 0 else guard) : stop] = share
+    scale = np.array([model.outputs[c].scale for c in columns])
+    return Problem(record, columns, adapted, blocks, np.ones((n, len(columns))), 1e-7 * scale)

@@ -1,0 +1,149 @@
+"""The data gate: what in a record can not be used, said before anything is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from adaptive_flot.discovery.record.problem import BoolArray
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray, Model
+
+FEWEST_ROWS = 200
+FROZEN_ROWS = 30
+"""So many equal values in a row, in a signal that else changes from sample to sample, are a frozen sensor."""
+CLIPPED_SHARE = 0.03
+"""Share of a signal that sits exactly at its largest or smallest value from which it counts as clipped."""
+LEAST_MOVE = 5e-3
+"""Where no input spreads by this share of its mean, nothing moves."""
+LEAST_RANGE = 0.02
+"""One that spreads by less than this share of its mean tells nothing about a dependence."""
+OUTLIER_SHARE = 0.15
+"""Share of samples far outside from which a signal is an outlier storm."""
+NEIGHBOURS = 9
+QUARTER = 0.3186
+"""Quantile 0.25 of the size of a standard normal variable."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Result of the data gate.
+
+    Attributes
+    ----------
+    record
+        The record with unusable measurements set to NaN.
+    reasons
+        Why the record says too little; empty when it can be judged.
+    notes
+        What was left out, in words.
+    """
+
+    record: Dataset
+    reasons: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        state = "insufficient: " + "; ".join(self.reasons) if self.reasons else "usable"
+        return f"data gate: {state}" + "".join(f"\n  {n}" for n in self.notes)
+
+
+def gate(record: Dataset, model: Model) -> Gate:
+    """Check a record: length, gaps, frozen and clipped sensors, outliers, inputs that move."""
+    outputs = record.outputs.copy()
+    notes: list[str] = []
+    reasons: list[str] = []
+    for j, q in enumerate(model.outputs):
+        if np.isfinite(outputs[:, j]).any():
+            notes += _clean(outputs[:, j], q.name, q.name in model.edges)
+    measured = [q.name for j, q in enumerate(model.outputs) if np.isfinite(outputs[:, j]).any()]
+    usable = int(np.isfinite(outputs).any(axis=1).sum())
+    if not measured:
+        reasons.append("no output has a usable measurement")
+    elif usable < FEWEST_ROWS:
+        reasons.append(f"only {usable} usable samples; {FEWEST_ROWS} are needed")
+    moving = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if _moves(u, LEAST_MOVE)]
+    still = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if not _moves(u, LEAST_RANGE)]
+    if not moving:
+        reasons.append(f"no input moves ({', '.join(still)}): nothing that depends on them can be told from a constant")
+    elif still:
+        notes.append(f"{', '.join(still)} hardly moves: no dependence on it can be told")
+    if measured and not reasons and all(_flat(outputs[:, j]) for j in range(outputs.shape[1])):
+        reasons.append("every measured output is constant")
+    return Gate(replace(record, outputs=outputs), tuple(reasons), tuple(notes))
+
+
+def _moves(u: FloatArray, share: float) -> bool:
+    spread = float(np.quantile(u, 0.98) - np.quantile(u, 0.02))
+    return spread > share * max(float(np.mean(np.abs(u))), 1e-300)
+
+
+def _flat(y: FloatArray) -> bool:
+    seen = y[np.isfinite(y)]
+    return seen.size == 0 or float(np.ptp(seen)) == 0.0
+
+
+def _clean(y: FloatArray, name: str, edges: bool = False) -> list[str]:
+    """Set unusable samples of one output to NaN, in place; say what they were. `edges`: the process may stay at one."""
+    notes = []
+    present = np.flatnonzero(np.isfinite(y))
+    values = y[present]
+    if len(values) < FEWEST_ROWS or np.ptp(values) == 0:
+        return [f"{name} is constant: left out"] if len(values) and np.ptp(values) == 0 and _blank(y) else []
+    frozen = _frozen(values)
+    if edges:
+        frozen = np.logical_and(frozen, (values < values.max()) & (values > values.min()))
+    if frozen.any():
+        y[present[frozen]] = np.nan
+        notes.append(f"{name}: {int(frozen.sum())} samples of a frozen sensor left out")
+    values = y[np.isfinite(y)]
+    for edge, word in ((values.max(), "highest"), (values.min(), "lowest")):
+        at = np.isclose(y, edge, rtol=0, atol=1e-9 * float(np.ptp(values)))
+        if at.sum() > max(CLIPPED_SHARE * len(values), 5) and len(np.unique(values)) > 0.2 * len(values):
+            if edges:
+                notes.append(f"{name}: {int(at.sum())} samples at the {word} value kept, as the process may stay there")
+                continue
+            y[at] = np.nan
+            notes.append(f"{name}: {int(at.sum())} samples clipped at the {word} value left out")
+    values = y[np.isfinite(y)]
+    storm = _outliers(values)
+    if storm > OUTLIER_SHARE:
+        _blank(y)
+        notes.append(f"{name}: an outlier storm ({100 * storm:.0f} % of the samples), left out")
+    return notes
+
+
+def _outliers(values: FloatArray) -> float:
+    """Share of samples far from the median of their neighbours (Hampel's filter).
+
+    Far is more than eight times the noise and more than what the signal itself does: fits bear smaller ones. The noise
+    is judged by the quietest quarter of the deviations, since in a storm their median is wild.
+    """
+    middle = median_filter(values, NEIGHBOURS, mode="nearest")
+    away = np.abs(values - middle)
+    noise = float(np.quantile(away, 0.25)) / QUARTER
+    return float(np.mean(away > max(8 * noise, float(np.quantile(middle, 0.9) - np.quantile(middle, 0.1)))))
+
+
+def _blank(y: FloatArray) -> bool:
+    y[:] = np.nan
+    return True
+
+
+def _frozen(values: FloatArray) -> BoolArray:
+    """Mask of samples in long runs of one value, if most other samples differ from their neighbours."""
+    same = np.diff(values) == 0
+    mask = np.zeros(len(values), dtype=bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
+    runs = list(zip(edges[::2], edges[1::2], strict=True))
+    long = [(a, b) for a, b in runs if b - a >= FROZEN_ROWS]
+    elsewhere = same.copy()
+    for a, b in long:
+        elsewhere[a:b] = False
+    rest = len(same) - sum(b - a for a, b in long)
+    if rest > 0 and elsewhere.sum() / rest < 0.5:  # a quantised or held signal repeats itself all the time
+        for a, b in long:
+            mask[a + 1 : b + 1] = True
+    return mask

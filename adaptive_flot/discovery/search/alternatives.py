@@ -1,0 +1,220 @@
+"""Attribute: which candidates are worth a full fit, and that fit.
+
+A name is (site, driver); its forms compete inside it, so that no name wins or loses for the shape of one curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.candidates.catalogue import FINE_TIME_KNOTS
+from adaptive_flot.discovery.candidates.dynamics import LONGEST_DELAY
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, Effect
+from adaptive_flot.greybox.model import FloatArray, Model
+
+SHORTLIST = 12
+"""Candidates that are refitted in full."""
+SHORTLIST_EACH = 3
+"""Of which so many at one site: a first-order gain says more about the site than about the driver."""
+LEAST_SHARE = 0.3
+"""A candidate whose first-order gain is below this share of the best one's is not refitted."""
+MOST_CHANGE = float(np.log(10))
+"""A physical effect changes a quantity by a factor of ten at most; beyond it is another model, or none with a grip."""
+WORTH_A_RESTART = 10.0
+"""Gain of another start of a free course in time, which has most places to rest in, that is worth yet another."""
+SAME_DRIVER = 1e-6
+"""Drivers whose correlation differs from one by less say the same (level and froth depth)."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A model with one or more further effects, fitted.
+
+    Attributes
+    ----------
+    names
+        (site, driver) of each effect, in the order they were added.
+    known
+        Whether each of them may be called by name.
+    fit
+        Its fit.
+    gain
+        Drop of minus two log-likelihood against the base model.
+    delta_bic
+        Its criterion less that of the base model; negative is better.
+    doubt
+        How well the record tells it from the best one: standard deviation of what it is worse by.
+    told
+        Its criterion with what all lack granted to it, where that was worked out (see `contest`).
+    """
+
+    names: tuple[tuple[str, str], ...]
+    known: tuple[bool, ...]
+    fit: Fit
+    gain: float
+    delta_bic: float
+    doubt: float = 0.0
+    told: float | None = None
+
+    def worse_than(self, best: Alternative) -> float:
+        """By how much its criterion is worse than that of another, with what both lack granted to both if it was."""
+        if self.told is not None and best.told is not None:
+            return self.told - best.told
+        return self.fit.bic - best.fit.bic
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Its effects with fitted coefficients."""
+        return self.fit.model.fitted_effects()[-len(self.names) :] if self.names else ()
+
+
+def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
+    """Candidates worth a full fit, best first.
+
+    Left out is what adds nothing to a constant at its own site, and of two drivers that are one another's mirror (level
+    and froth depth) the one without a name; else the one that scores worse; else the later one in the model.
+    """
+    scores = scorer.scores()
+    best = scores[0].gain if scores else 0.0
+    constant = {s.candidate.site.name: s.penalised for s in scores if s.candidate.driver == "constant"}
+    kept: list[Score] = []
+    for score in scores:
+        c = score.candidate
+        if score.penalised <= 0 or score.gain < LEAST_SHARE * best:
+            continue
+        if c.driver != "constant" and score.penalised <= constant.get(c.site.name, -np.inf) + 5.0:
+            continue
+        twin = next((k for k in kept if _twins(k, score, scorer.drivers)), None)
+        if twin is not None:
+            if _preferred(score, twin, list(scorer.drivers)):
+                kept[kept.index(twin)] = score
+            continue
+        if sum(k.candidate.site.name == c.site.name for k in kept) < SHORTLIST_EACH:
+            kept.append(score)
+    return _spread(kept, count)
+
+
+def _spread(ranked: list[Score], count: int) -> list[Score]:
+    """So many of the ranked candidates: two thirds by rank, the rest of sites that are not among those, best first."""
+    chosen = ranked[: count - count // 3]
+    sites = {s.candidate.site.name for s in chosen}
+    further = ranked[len(chosen) :]
+    firsts: list[Score] = []
+    for s in further:
+        if s.candidate.site.name not in sites:
+            sites.add(s.candidate.site.name)
+            firsts.append(s)
+    names = {s.candidate.name for s in (*chosen, *firsts)}
+    others = [s for s in further if s.candidate.name not in names]
+    picked = {s.candidate.name for s in (*chosen, *firsts, *others)[:count]}
+    return [s for s in ranked if s.candidate.name in picked]
+
+
+def _twins(a: Score, b: Score, drivers: Mapping[str, FloatArray]) -> bool:
+    """Whether two candidates at one site explain exactly the same: their drivers are functions of one another."""
+    one, other = a.candidate, b.candidate
+    if one.site.name != other.site.name or one.driver not in drivers or other.driver not in drivers:
+        return False
+    return abs(float(np.corrcoef(drivers[one.driver], drivers[other.driver])[0, 1])) > 1 - SAME_DRIVER
+
+
+def _preferred(score: Score, twin: Score, order: list[str]) -> bool:
+    """Whether a mirror that scored no better is the one to keep. Where both score alike, rounding must not choose."""
+    own, other = score.candidate, twin.candidate
+    if own.known != other.known:
+        return own.known
+    alike = score.gain > (1 - SAME_DRIVER) * twin.gain
+    return alike and order.index(own.driver) < order.index(other.driver)
+
+
+def fit_variant(
+    fitter: Fitter, start: Fit, score: Score, steps: int, warm: Fit | None = None, drawn: bool = False
+) -> Fit | None:
+    """Full fit of one variant on top of `start`, from the score's values or, where these are too large, smaller ones.
+
+    `warm` is a fit with another form of the same effect: its adapted parameters and initial state are a better start.
+    Values that were `drawn` by a fit are taken as they are.
+    """
+    start = _warmed(start, warm) if warm else start
+    effect = score.variant.effect
+    held = fixed_coefficients(effect)
+    model = variant_model(start, score)
+    names = tuple(effect.parameter(c.name) for c in effect.terms if c.name not in held)
+    free = (*start.names, *names)
+    bounds = effect_bounds(fitter.problem, model, effect)
+    first = {effect.parameter(k): v for k, v in {**score.start, **held}.items()}
+    rounds = 1 if steps < MOST_STEPS else 2
+    shape = {effect.parameter(k) for k, _ in score.variant.start}
+    shrink = [] if warm else [n for n in names if n in first and n not in shape]
+    first = first if drawn else limited(model, effect, first)
+    found = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
+    in_time = effect.driver == "time" and effect.form == "curve" and len(names) <= FINE_TIME_KNOTS
+    if found is not None and steps == MOST_STEPS and in_time:
+        return fitter.settled(found, bounds, WORTH_A_RESTART)
+    return found
+
+
+def variant_model(start: Fit, score: Score) -> Model:
+    """The model of a fit with one variant on top, before it is fitted."""
+    effect = score.variant.effect
+    return start.model.with_effects([replace(effect, coefficients=fixed_coefficients(effect))])
+
+
+def _warmed(start: Fit, warm: Fit) -> Fit:
+    """The fit with the free parameters and the initial state that it has in common with another."""
+    values = dict(zip(warm.names, map(float, warm.values), strict=True))
+    common = start.model.with_parameters({n: values[n] for n in start.names})
+    return replace(start, model=common, initial_state=warm.initial_state[: len(start.initial_state)])
+
+
+def fixed_coefficients(effect: Effect) -> dict[str, float]:
+    """Coefficients that a search holds: the share of a lag, a dead time or a limit."""
+    return {"amplitude": 1.0} if effect.driver in DYNAMIC_DRIVERS else {}
+
+
+def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:
+    """Start values inside their ranges, and a change at a site of at most a factor of two and a half."""
+    found = {}
+    for c in effect.terms:
+        name = effect.parameter(c.name)
+        if name in start:
+            parameter = model.parameters[model.index("parameters", name)]
+            value = float(np.clip(start[name], parameter.lower, parameter.upper))
+            log_factor = _is_change(c.name) and effect.shape.static is not None
+            found[name] = float(np.clip(value, -0.9, 0.9)) if log_factor else value
+    return found
+
+
+def effect_bounds(problem: Problem, model: Model, effect: Effect) -> dict[str, tuple[float, float]]:
+    """Ranges of an effect's coefficients by full name: those of its shape, and of the change of a quantity."""
+    bounds = {effect.parameter(k): b for k, b in shape_bounds(problem).items()}
+    site = next(s for s in model.sites if s.name == effect.site)
+    if (effect.mode or site.mode) == "factor":
+        bounds |= {effect.parameter(c.name): (-MOST_CHANGE, MOST_CHANGE) for c in effect.terms if _is_change(c.name)}
+    return bounds
+
+
+def _is_change(coefficient: str) -> bool:
+    """Whether a coefficient is a change at the site itself."""
+    return coefficient.startswith(("amplitude", "value"))
+
+
+def shape_bounds(problem: Problem) -> dict[str, tuple[float, float]]:
+    """Ranges of shape coefficients that the record sets: an event inside it, a duration not longer than it."""
+    t = problem.record.time
+    span = float(t[-1] - t[0])
+    margin = 0.02 * span
+    return {
+        "onset": (float(t[0]) + margin, float(t[-1]) - margin),
+        "duration": (1.0, span),
+        "time_constant": (0.2 * problem.record.dt, span),
+        "time_constant_2": (0.2 * problem.record.dt, span),
+        "dead_time": (2.0 * problem.record.dt, LONGEST_DELAY * span),
+    }

@@ -1,0 +1,91 @@
+"""Contest: whether rivals stay apart from the best once what all of them lack is granted to each.
+
+What the best alternative leaves unexplained (a feed that wanders beside the effect that is looked for) makes every
+comparison uncertain by as much. With the same further effect granted to each, that falls away, and they can be told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from adaptive_flot.discovery.assessment.verification import doubts, verify
+from adaptive_flot.discovery.candidates.catalogue import finer
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
+from adaptive_flot.discovery.fitting.parallel import parallel_map
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.search.alternatives import Alternative, fit_variant, variant_model
+from adaptive_flot.discovery.search.search import Search, scorer_of, threshold_of, what_is_left
+
+MINOR = 0.5
+"""What is left must be less than this share of what the best has gained: else it is the matter, and not beside it."""
+MOST_RIVALS = 8
+
+
+def contest(problem: Problem, found: Search, near: Sequence[Alternative], processes: int = 1) -> Search:
+    """The search with its best and those that are `near` it compared anew, what the best lacks granted to each.
+
+    Unchanged when nothing of the kind is left, when too many are near, or when who wins does not stand on fresh rows.
+    """
+    best = found.alternatives[0]
+    if not 0 < len(near) <= MOST_RIVALS:
+        return found
+    score = _lacking(scorer_of(problem, best.fit)[0], best)
+    if score is None or score.gain > MINOR * best.gain:
+        return found
+    granted = score.candidate.name
+    fitter = Fitter(problem)
+    score = _shaped(fitter, best, score)
+    if score is None:
+        return found
+    taking = [best, *(a for a in near if granted not in a.names)]
+    fits = parallel_map(lambda k: fit_variant(fitter, taking[k].fit, score, MOST_STEPS), range(len(taking)), processes)
+    told = {a.names: fit for a, fit in zip(taking, fits, strict=True) if fit}
+    if len(told) < len(taking):
+        return found
+    # who is what was granted is held against the best with it: if that is much better, it alone is not the answer
+    told |= {a.names: a.fit for a in near if granted in a.names}
+    winner = min((best, *near), key=lambda a: told[a.names].bic)
+    checked = found.verification if winner is best else verify(problem, found.base, winner.fit)
+    if winner.names == (granted,) or checked is None or not checked.confirmed:
+        return found
+    doubt = doubts(problem, told[winner.names], list(told.values()))
+    after = {n: (fit.bic, d) for (n, fit), d in zip(told.items(), doubt, strict=True)}
+    changed = [
+        replace(a, told=after[a.names][0], doubt=after[a.names][1]) if a.names in after else a
+        for a in found.alternatives
+    ]
+    changed.sort(key=lambda a: (a.told is None, a.fit.bic if a.told is None else a.told))
+    scorer, _ = scorer_of(problem, told[winner.names].with_model(lambda: variant_model(winner.fit, score)))
+    left, threshold = what_is_left(scorer, threshold_of(scorer))
+    return replace(
+        found,
+        alternatives=tuple(changed),
+        verification=checked,
+        left=left,
+        left_threshold=threshold,
+        granted=granted,
+    )
+
+
+def _shaped(fitter: Fitter, best: Alternative, score: Score) -> Score | None:
+    """What is granted, as fine and as large as it comes beside the best; None when that can not be fitted."""
+    first = fit_variant(fitter, best.fit, score, MOST_STEPS)
+    if first is None:
+        return None
+    start = dict(first.model.fitted_effects()[-1].coefficients)
+    fine = finer(score.variant, start) if score.candidate.driver == "time" else None
+    return replace(score, variant=fine[0], start=fine[1]) if fine else replace(score, start=start)
+
+
+def _lacking(scorer: Scorer, best: Alternative) -> Score | None:
+    """The best-scored candidate that is not of the best's own names, as a curve, a power law or a constant."""
+    for score in scorer.scores():
+        if score.candidate.name in best.names:
+            continue
+        forms = {s.variant.effect.form: s for s in reversed(scorer.variant_scores(score.candidate))}
+        for form in ("curve", "power", "shift"):
+            if form in forms:
+                return forms[form]
+    return None

@@ -1,0 +1,205 @@
+"""Who enters a heat: forms, events, constants and freer courses, each from what earlier heats came to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.candidates.catalogue import FINE_TIME_KNOTS, finer
+from adaptive_flot.discovery.candidates.knots import trimmed
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.candidates.step_events import event_scores, freer, step_score
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
+
+FORMS_EACH = 3
+MOST_CONSTANTS = 4
+"""Alternatives whose sites are tried with a constant."""
+MOST_COURSES = 3
+"""Curves in time that are tried as events."""
+BENT = 0.3
+"""A dependence is surely not flat when to flatten it costs this share of all it gained."""
+NEARLY = 0.9
+"""First-order gain of the constant, as a share of that of a dependence at its site, from which it is tried anyway."""
+ADDS = 0.05
+"""A dependence that adds less than this share to the gain of the constant at its site is fitted again from there."""
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A linearisation, whose fit the searches start from, and the candidates that are worth one."""
+
+    scorer: Scorer
+    scores: list[Score]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A fit to be made in one lane, from scratch or from a fit of the same name."""
+
+    lane: int
+    score: Score
+    warm: Fit | None = None
+    drawn: bool = False
+    """Whether the start values draw a curve that was fitted, and are no first-order answer."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A fit in one lane."""
+
+    lane: int
+    score: Score
+    alternative: Alternative
+
+
+def first_forms(lane: Lane, score: Score) -> list[Score]:
+    """The forms of the first heat: the best one, and for what depends on time its curve too."""
+    if score.candidate.driver != "time":
+        return [score]
+    curves = [s for s in lane.scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"][:1]
+    return [score] if score.variant.effect.form == "curve" else [score, *curves]
+
+
+def forms(lane: Lane, run: Run) -> list[Job]:
+    """Best variant of each form (and mode) of a candidate that comes near the best, from where the first heat ended."""
+    name, fitted = run.score.candidate.name, run.alternative
+    score = next(s for s in lane.scores if s.candidate.name == name)
+    found: dict[tuple[str, str | None], Score] = {}
+    for s in lane.scorer.variant_scores(score.candidate):
+        key = s.variant.effect.form, s.variant.effect.mode
+        if key not in found and s.gain > 0.5 * score.gain:
+            found[key] = s
+    in_time = score.candidate.driver == "time"
+    kept = list(found.values())[:FORMS_EACH]
+    if in_time:  # the curve, which events start from
+        kept = [s for k, s in found.items() if k[0] == "curve"] or [score]
+    jobs = []
+    for s in kept:
+        same = s.variant.effect.form == "curve" and s.variant.effect == run.score.variant.effect
+        warm = None if in_time and not same else fitted.fit
+        fine = finer(s.variant, fitted.effects[-1].coefficients if same else s.start)
+        if fine:
+            jobs.append(Job(run.lane, replace(s, variant=fine[0], start=fine[1]), warm))
+        else:
+            jobs.append(Job(run.lane, s, warm))
+    return jobs
+
+
+def constants(scorer: Scorer, fitted: list[Alternative]) -> list[tuple[Score, Fit]]:
+    """The constant change at the sites of the best fits, from what a dependence on a driver or on time came to.
+
+    A dependence that turned out flat is that constant, which has the better name. And where the two are as good as the
+    same to first order, the constant must have been fitted too before the record can prefer the dependence.
+    """
+    scores = {s.candidate.name: s.gain for s in scorer.scores()}
+    at = {s.candidate.site.name: s for s in scorer.scores() if s.candidate.driver == "constant"}
+    found: dict[str, tuple[Score, Fit]] = {}
+    for a in fitted[:MOST_CONSTANTS]:
+        effect = a.effects[-1]
+        site, c = effect.site, effect.coefficients
+        values = [v for k, v in c.items() if k.startswith(("value", "amplitude"))]
+        if effect.driver in ("constant", *DYNAMIC_DRIVERS) or site not in at or site in found or not values:
+            continue
+        nearly = at[site].gain > NEARLY * scores.get((site, effect.driver), np.inf)
+        if not nearly and (effect.driver == "time" or _bend(a.fit, effect) > BENT * max(a.gain, 0.0)):
+            continue
+        shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
+        found[site] = replace(shift, start={"amplitude": float(np.mean(values))}), a.fit
+    return list(found.values())
+
+
+def unbent(constant: Run, fitted: list[Run], scorer: Scorer) -> list[Job]:
+    """Dependences that hardly gained more than a constant at the same site: fits to start from the constant.
+
+    The constant is a special case of each, so that one which ends no better may have come to rest elsewhere. `scorer`
+    tells the usual value at the site, by which an offset is a relative change.
+    """
+    effect, reached = constant.alternative.effects[-1], constant.alternative
+    if effect.driver != "constant":
+        return []
+    jobs = []
+    for run in fitted:
+        own = run.alternative.effects[-1]
+        if own.site != effect.site or own.driver in STATELESS_DRIVERS:
+            continue
+        if run.alternative.gain < (1 + ADDS) * reached.gain:
+            level = effect.coefficients["amplitude"] * scorer.in_mode(effect.site, effect.mode, own.mode)
+            start = {c.name: level if c.name.startswith(("value", "amplitude")) else 0.0 for c in own.terms}
+            jobs.append(Job(constant.lane, replace(run.score, start=start), reached.fit))
+    return jobs
+
+
+def _bend(fit: Fit, effect: Effect) -> float:
+    """How much minus two log-likelihood would rise if the dependence were flat, to second order (Wald's test)."""
+    names = [effect.parameter(c) for c in effect.coefficients if c.startswith("value") or c in ("exponent", "slope")]
+    where = [fit.names.index(n) for n in names if n in fit.names]
+    values, covariance = fit.values[where], fit.covariance[np.ix_(where, where)]
+    if effect.form == "curve":
+        difference = np.diff(np.eye(len(where)), axis=0)
+        values, covariance = difference @ values, difference @ covariance @ difference.T
+    return float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)
+
+
+def events(scores: list[Score], fitted: list[Alternative]) -> list[Score]:
+    """Events at the sites of fitted curves in time, started from the best curve of each."""
+    by_name = {s.candidate.name: s for s in scores}
+    found: dict[tuple[str, str], list[Score]] = {}
+    for a in fitted:
+        effect, name = a.effects[-1], a.names[-1]
+        wanted = effect.driver == "time" and effect.form == "curve" and name not in found
+        if wanted and len(found) < MOST_COURSES:
+            found[name] = event_scores(by_name[name], effect)
+    return [s for group in found.values() for s in group]
+
+
+def step(run: Run, span: float) -> list[Job]:
+    """A step where a fitted event is over at once; `span` is the length of the record [s]."""
+    score = step_score(run.score, run.alternative.effects[-1], span)
+    return [Job(run.lane, score)] if score else []
+
+
+def more_freedom(run: Run, low: float, high: float) -> list[Job]:
+    """The same course in time with more freedom, where a curve or a smooth event was the best of its name."""
+    effect = run.alternative.effects[-1]
+    found = freer(effect, low, high) if effect.driver == "time" else None
+    if found is None:
+        return []
+    variant, start = found
+    return [Job(run.lane, replace(run.score, variant=variant, start=start), run.alternative.fit, drawn=True)]
+
+
+def fewer_knots(runs: list[Run], price: float) -> list[Job]:
+    """For each name the curve that should come out best without the knots that it does not need, from its fit."""
+    found: dict[tuple[tuple[str, str], ...], tuple[float, Job]] = {}
+    for run in runs:
+        a = run.alternative
+        less = trimmed(a.fit, a.effects[-1], price)
+        if less is None:
+            continue
+        promised = a.fit.bic - less.gain
+        if a.names not in found or promised < found[a.names][0]:
+            score = replace(run.score, variant=less.variant, start=less.start)
+            found[a.names] = promised, Job(run.lane, score, a.fit, drawn=True)
+    return [job for _, job in found.values()]
+
+
+def from_scratch(jobs: list[Job]) -> list[Job]:
+    """The same curves from nothing: a rough one may have led the initial state astray, and each finer one with it."""
+    short = [job for job in jobs if len(job.score.start) <= FINE_TIME_KNOTS]
+    return [replace(j, score=replace(j.score, start=dict.fromkeys(j.score.start, 0.0)), warm=None) for j in short]
+
+
+def is_curve(run: Run) -> bool:
+    """Whether the form that was fitted is a free curve."""
+    return run.score.variant.effect.form == "curve"
+
+
+def best_of_each(found: list[Run]) -> list[Run]:
+    """The best fit of each name, best first."""
+    best: dict[tuple[tuple[str, str], ...], Run] = {}
+    for run in sorted(found, key=lambda run: run.alternative.fit.bic):
+        best.setdefault(run.alternative.names, run)
+    return list(best.values())

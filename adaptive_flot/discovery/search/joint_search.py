@@ -1,0 +1,137 @@
+"""Joint search: several effects at once, where the search of one effect after the other ends far above the noise.
+
+A model that lacks several effects, each of which hides the others, has many local fits; a record that is cheap to
+simulate allows to look for the best one from scattered starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.verification import verify
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.noise import noise_by_differences
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.search.joint_fits import (
+    LAST_STEPS,
+    JointFits,
+    correlation_time,
+    cross_validated,
+    discount,
+    discounted,
+)
+from adaptive_flot.discovery.search.search import (
+    LEAST_EVIDENCE,
+    Round,
+    Search,
+    scorer_of,
+    what_is_left,
+)
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+CHEAP = 30_000
+"""Steps of a record times squared states up to which hundreds of fits are a matter of a minute."""
+MOST_AT_ONCE = 4
+DOMINATES = 3.0
+"""Model error this many times as large as the noise is what a noise model would wrongly explain."""
+
+
+def wants_joint(problem: Problem, found: Search) -> bool:
+    """Whether fits are cheap and the error of the best alternative outweighs the noise by far."""
+    best = found.alternatives[0].fit if found.alternatives else found.base
+    steps = len(problem.record) * Stepper(best.model, problem.record.dt).substeps
+    cost = steps * len(best.initial_state) ** 2
+    return cost <= CHEAP and dominated(problem, best)
+
+
+def dominated(problem: Problem, fit: Fit) -> bool:
+    """Whether the error of a fit outweighs the noise by far; noise by differences, which needs no model."""
+    rows = problem.rows("estimate")
+    error = np.sqrt(np.nanmean(fit.residual(problem)[rows] ** 2, axis=0))
+    noise = np.nan_to_num(noise_by_differences(problem.measured))
+    return bool(np.any(error > DOMINATES * np.maximum(noise, problem.floor)))
+
+
+def search_jointly(
+    problem: Problem,
+    found: Search,
+    *,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> tuple[Problem, Search]:
+    """Search combinations of named effects.
+
+    Residuals are neither whitened nor clipped: the error of such a model outweighs the noise by far, a noise model
+    would explain it away, and its largest values are what is looked for. As neighbouring errors tell the same
+    story, evidence counts by the number of independent errors. All rows but the report share choose, since events are
+    few; the choice is confirmed by predictions of each block from fits that did not see it.
+
+    Parameters
+    ----------
+    problem, found
+        The record and what the search of one effect after the other found.
+    processes, progress
+        As for `search`.
+
+    Returns
+    -------
+    tuple of Problem and Search
+        The problem as it was searched, and what was found; both unchanged when no combination brings evidence.
+    """
+    chosen = np.where(problem.blocks == "confirm", "estimate", problem.blocks)
+    plain = replace(problem, whiten=False, blocks=chosen, weights=np.ones_like(problem.weights))
+    base = Fitter(plain).fit(found.base.model, like=found.base, rounds=2, steps=LAST_STEPS) or found.base
+    say = "fit several effects at once"
+    progress(say)
+    scorer, _ = scorer_of(plain, base)
+    rounds = [r for r in JointFits(plain, base, scorer, processes).rounds(MOST_AT_ONCE, lambda: progress(say)) if r]
+    if not rounds:
+        return problem, found
+    together = correlation_time(plain, min((r[0] for r in rounds), key=lambda a: a.fit.loss).fit)
+    base = discount(plain, base, together)
+    scores = tuple(scorer.scores())
+    tables = [Round(scores, LEAST_EVIDENCE, discounted(plain, base, r, together)) for r in rounds]
+    best: Round | None = None
+    for table in tables:
+        reference = best.alternatives[0].fit if best else base
+        if table.alternatives[0].fit.bic < reference.bic - LEAST_EVIDENCE:
+            best = table
+    if best is None or not _better(plain, base, best.alternatives[0].fit, found, together):
+        return problem, found
+    progress("confirm")
+    chosen_fit = best.alternatives[0].fit
+    seen = replace(plain, blocks=np.where(chosen == "estimate", "confirm", chosen))
+    checked = verify(seen, *(cross_validated(plain, fit, processes) for fit in (base, chosen_fit)))
+    checked = replace(checked, where="by cross-validation, on rows that also helped to choose the effects")
+    left = _left(plain, chosen_fit, together)
+    return plain, replace(
+        found,
+        base=base,
+        rounds=tuple(tables),
+        alternatives=best.alternatives,
+        verification=checked,
+        left=left,
+        left_threshold=LEAST_EVIDENCE,
+        together=1.0,
+    )
+
+
+def _better(problem: Problem, base: Fit, joint: Fit, found: Search, together: float) -> bool:
+    """Whether effects that were found at once beat what one after the other came to, fitted to the same rows."""
+    if not found.alternatives:
+        return True
+    one = found.alternatives[0].fit
+    again = Fitter(problem).fit(one.model, one.names, like=one, rounds=2, steps=LAST_STEPS)
+    return again is None or joint.bic < discount(problem, again, together).bic - LEAST_EVIDENCE
+
+
+def _left(problem: Problem, fit: Fit, together: float) -> float:
+    """First-order gain that one more effect would bring, in terms of what the fit leaves, by independent errors."""
+    scorer, _ = scorer_of(problem, fit)
+    gain, _ = what_is_left(scorer, LEAST_EVIDENCE)
+    share = min(gain / max(float(np.sum(scorer.residual**2)), 1e-300), 0.99)
+    return -problem.count(problem.rows("estimate")) * float(np.log(1 - share)) / together

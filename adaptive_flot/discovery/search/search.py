@@ -1,0 +1,274 @@
+"""The search: rounds of score, refit and compare, until nothing of substance is left to explain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.verification import Verification, doubts, together, verify
+from adaptive_flot.discovery.candidates.catalogue import catalogue
+from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.search.alternatives import SHORTLIST, Alternative, shortlist
+from adaptive_flot.discovery.search.entrants import Lane
+from adaptive_flot.discovery.search.simplify import simpler
+from adaptive_flot.discovery.search.successive_halving import refit
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
+from adaptive_flot.greybox.model import Model
+
+MOST_EFFECTS = 3
+NEAR = 0.25
+"""Share of its own value within which an adapted parameter counts as near: more than the drifts that are known."""
+NULL_DRAWS = 200
+NULL_QUANTILE = 0.99
+LEAST_EVIDENCE = 10.0
+"""Drop of the information criterion that an effect must bring."""
+SUBSTANCE = 0.1
+"""A further effect must remove at least this share of the excess error of the base model."""
+FLAT = 0.02
+"""A dependence must remove at least this share of the excess error beyond what the constant at its site removes."""
+SHORTLIST_NEAR, SHORTLIST_FURTHER = 9, 5
+"""Candidates that are refitted where two linearisations propose them, and as further effects."""
+BEAM = 2
+"""Alternatives of one round that the next extends."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round: what was scored on top of which alternative, what was fitted, and what it left.
+
+    Attributes
+    ----------
+    scores
+        First-order scores of the whole catalogue, best first.
+    threshold
+        Penalised score that noise alone passes once in a hundred records.
+    alternatives
+        Full fits, best first.
+    """
+
+    scores: tuple[Score, ...]
+    threshold: float
+    alternatives: tuple[Alternative, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """Everything a search found.
+
+    Attributes
+    ----------
+    base
+        Fit of the model as it is.
+    rounds
+        The rounds, in order.
+    alternatives
+        All full fits of the accepted number of effects, best first; empty when nothing was found.
+    verification
+        Of the best of them, on the confirm share.
+    left
+        First-order gain that the best alternative leaves on the table: what it still lacks.
+    left_threshold
+        The same quantity that noise alone would show once in a hundred records.
+    adapted_sites
+        Sites whose constant change is that of an adapted parameter.
+    together
+        Innovations of the best alternative that tell one story: evidence counts once for so many.
+    granted
+        Site and driver of what the leading alternatives were granted when they were compared, if anything.
+    slow_s
+        Seconds from which a change of an adapted parameter is a drift.
+    """
+
+    base: Fit
+    rounds: tuple[Round, ...]
+    alternatives: tuple[Alternative, ...]
+    verification: Verification | None
+    left: float
+    left_threshold: float
+    adapted_sites: tuple[str, ...]
+    together: float = 1.0
+    granted: tuple[str, str] | None = None
+    slow_s: float = SLOW_S
+
+
+def search(
+    problem: Problem,
+    base: Fit,
+    nominal: Model,
+    *,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Search:
+    """Search effects on top of a base fit.
+
+    Parameters
+    ----------
+    problem, base
+        The record and the fit of the model as it is, on the estimation share.
+    nominal
+        The model with the parameter values it came with.
+    processes
+        Fits that run at once.
+    progress
+        Called with a word for each stage.
+    """
+    fitter = Fitter(problem)
+    progress("score")
+    scorer, sites = scorer_of(problem, base)
+    near = _near(fitter, base, nominal)
+    scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
+    rounds = [_round(problem, fitter, base, scorers, [None], processes, progress)]
+    accepted: list[Round] = []
+    best: Alternative | None = None
+    left = what_is_left(scorer, rounds[0].threshold)
+    while better(problem, base, best, rounds[-1]):
+        accepted.append(rounds[-1])
+        best = rounds[-1].alternatives[0]
+        progress("what is left")
+        scorer, _ = scorer_of(problem, best.fit)
+        left = what_is_left(scorer, threshold_of(scorer))
+        if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left):
+            break
+        beam = _beam(rounds[-1], best, BEAM)
+        rounds.append(_round(problem, fitter, base, [scorer], beam, processes, progress))
+    slow_s = max(SLOW_S, SLOW_ROWS * problem.record.dt)
+    return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites, slow_s=slow_s), accepted)
+
+
+def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
+    """A fit whose adapted parameters stay near the model's own, where those of the base fit have run away.
+
+    A missing effect can drive them far off; the answers along such a run say little about the effects of the plant.
+    """
+    names = fitter.problem.adapted
+    own = {n: nominal.parameters[nominal.index("parameters", n)].value for n in names}
+    far = [abs(v / own[n] - 1) > NEAR for n, v in zip(names, base.values, strict=False) if own[n]]
+    if not any(far) or not nominal.starts_steady:
+        return None
+    bounds = {n: (v - NEAR * abs(v), v + NEAR * abs(v)) for n, v in own.items() if v}
+    return fitter.fit(nominal, bounds=bounds, rounds=2)
+
+
+def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:
+    """Keep the largest model that stands on the confirm share; failing that, the first, with what it left."""
+    for r in reversed(accepted):
+        verification = verify(problem, found.base, r.alternatives[0].fit)
+        if verification.confirmed or r is accepted[0]:
+            last = r is accepted[-1]
+            left = found.left if last else max(found.left, r.alternatives[0].fit.bic - _best_bic(accepted))
+            best = r.alternatives[0].fit
+            alike = together(problem, found.base, best)
+            doubt = doubts(problem, best, [a.fit for a in r.alternatives])
+            told = tuple(replace(a, doubt=d) for a, d in zip(r.alternatives, doubt, strict=True))
+            return replace(found, alternatives=told, verification=verification, left=left, together=alike)
+    return found
+
+
+def _best_bic(rounds: list[Round]) -> float:
+    return min(a.fit.bic for r in rounds for a in r.alternatives)
+
+
+def scorer_of(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
+    """Scores along a fit, and the sites whose constant change is that of an adapted parameter."""
+    responses = Responses(problem, fit)
+    return Scorer(problem, fit, responses, catalogue(fit.model, responses)), responses.adapted_sites()
+
+
+def threshold_of(scorer: Scorer) -> float:
+    """Penalised score that noise alone passes once in a hundred records."""
+    return max(LEAST_EVIDENCE, float(np.quantile(scorer.null_gains(NULL_DRAWS, seed=0), NULL_QUANTILE)))
+
+
+def what_is_left(scorer: Scorer, threshold: float) -> tuple[float, float]:
+    """First-order gain of the best candidate that is left, and the threshold it is held against."""
+    scores = scorer.scores()
+    return (scores[0].gain if scores else 0.0), threshold
+
+
+def _round(
+    problem: Problem,
+    fitter: Fitter,
+    base: Fit,
+    scorers: list[Scorer],
+    beam: list[Alternative | None],
+    processes: int,
+    progress: Callable[[str], None],
+) -> Round:
+    threshold = max(map(threshold_of, scorers))
+    scores = tuple(scorers[0].scores())
+    found: list[Alternative] = []
+    for k, before in enumerate(beam):
+        if before is not None and k:
+            scorers = [scorer_of(problem, before.fit)[0]]
+        lanes = []
+        most = SHORTLIST_FURTHER if before else SHORTLIST if len(scorers) == 1 else SHORTLIST_NEAR
+        for scorer in scorers:
+            wanted = shortlist(scorer, most)
+            # a further effect must have a name: a pair of curves without one would explain anything
+            wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
+            lanes.append(Lane(scorer, wanted))
+        progress("fit")
+        found += refit(fitter, base, lanes, before, processes, lambda: progress("fit"))
+    if found and beam[0] is not None:
+        found += simpler(fitter, base, min(found, key=lambda a: a.fit.bic))
+    unique: dict[frozenset[tuple[str, str]], Alternative] = {}
+    for a in sorted(found, key=lambda a: a.fit.bic):
+        unique.setdefault(frozenset(a.names), a)
+    return Round(scores, threshold, _without_flat(problem, base, list(unique.values())))
+
+
+def _without_flat(problem: Problem, base: Fit, found: list[Alternative]) -> tuple[Alternative, ...]:
+    """Leave out dependences that turned out flat: those that add next to nothing to a constant at the same site."""
+    by_names = {frozenset(a.names): a for a in found}
+
+    def flat(a: Alternative) -> bool:
+        for k, (site, driver) in enumerate(a.names):
+            constant = by_names.get(frozenset((*a.names[:k], (site, "constant"), *a.names[k + 1 :])))
+            if driver in DYNAMIC_DRIVERS or driver == "constant" or constant is None:
+                continue
+            if _excess(problem, constant.fit, a.fit) < FLAT * _excess(problem, base, a.fit):
+                return True
+        return False
+
+    return tuple(a for a in found if not flat(a))
+
+
+def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None]:
+    others = [a for a in last.alternatives if a is not best and all(a.known)]
+    return [best, *others[: width - 1]]
+
+
+def better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:
+    """Whether the best alternative of a round brings evidence and, as a further effect, substance."""
+    if not found.alternatives:
+        return False
+    best, reference = found.alternatives[0], before.fit if before else base
+    if not best.fit.bic <= reference.bic - found.threshold:
+        return False
+    return before is None or _excess(problem, reference, best.fit) > SUBSTANCE * _excess(problem, base, best.fit)
+
+
+def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
+    """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit."""
+    rows = problem.rows("estimate")
+    size = problem.weights * better.noise.stationary_std()
+    old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2) for f in (fit, better))
+    return float(old - new)
+
+
+def _worth_extending(problem: Problem, base: Fit, best: Alternative, left: tuple[float, float]) -> bool:
+    """Whether what is left is a substantial share of what there was, judged by first-order gains on one noise."""
+    gain, threshold = left
+    if gain < threshold:
+        return False
+    size = problem.weights * best.fit.noise.std
+    rows = problem.rows("estimate")
+    removed = np.nansum(((base.residual(problem) / size) ** 2 - (best.fit.residual(problem) / size) ** 2)[rows])
+    return gain > SUBSTANCE / 2 * float(removed)

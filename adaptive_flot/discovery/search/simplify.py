@@ -1,0 +1,55 @@
+"""A dependence that a second effect has made flat: tried again as the constant that it came to.
+
+The first effect of several is chosen while the others are missing, and bends to make up for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.search.alternatives import Alternative, effect_bounds, fixed_coefficients, limited
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
+
+
+def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
+    """The alternative with one dependence on a signal, in turn each, replaced by a constant at the same site.
+
+    Left out is what would name a constant twice, and what can not be simulated.
+    """
+    found = []
+    for k, effect in enumerate(a.effects):
+        constant = (effect.site, "constant")
+        if effect.driver in STATELESS_DRIVERS or constant in a.names or effect.shape.static is None:
+            continue
+        others = [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k]
+        shift = Effect(effect.site, "constant", "shift", mode=effect.mode)
+        fit = _refitted(fitter, base, a, [*others[:k], shift, *others[k:]], _middle(effect))
+        if fit is not None:
+            names = (*a.names[:k], constant, *a.names[k + 1 :])
+            known = (*a.known[:k], True, *a.known[k + 1 :])
+            found.append(Alternative(names, known, fit, base.loss - fit.loss, fit.bic - base.bic))
+    return found
+
+
+def _middle(effect: Effect) -> float:
+    """The constant that a dependence comes to: the mean of its values, or its amplitude."""
+    values = [v for k, v in effect.coefficients.items() if k.startswith(("value", "amplitude"))]
+    return float(np.mean(values)) if values else 0.0
+
+
+def _refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], middle: float) -> Fit | None:
+    held = [fixed_coefficients(e) for e in effects]
+    model = base.model.with_effects([replace(e, coefficients=h) for e, h in zip(effects, held, strict=True)])
+    free = [*base.names]
+    start: dict[str, float] = {}
+    bounds: dict[str, tuple[float, float]] = {}
+    for effect, fixed in zip(effects, held, strict=True):
+        free += [effect.parameter(c.name) for c in effect.terms if c.name not in fixed]
+        bounds |= effect_bounds(fitter.problem, model, effect)
+        if effect.driver == "constant" and effect.parameter("amplitude") not in a.fit.names:
+            start |= limited(model, effect, {effect.parameter("amplitude"): middle})
+    return fitter.fit(model, tuple(free), start, a.fit, bounds, rounds=2)

@@ -1,0 +1,153 @@
+"""The curve of a fitted effect over its driver, with the band that the covariance of the fit gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+POINTS = 161
+BAND = 1.96
+FREE = 3.0
+"""Where the curve at its middle is so many times as uncertain as its shape, only the shape is shown."""
+
+
+@dataclass(frozen=True)
+class EffectCurve:
+    """What an effect does to the value at its site, over its driver.
+
+    Attributes
+    ----------
+    effect
+        The fitted effect.
+    driver_unit, unit
+        Units of the driver and of the change; "-" for a factor.
+    relative
+        Whether `change` is a factor on the value, else what is added to it.
+    driver
+        Values of the driver (K,), over what the record covers.
+    change, low, high
+        The change and its 95 % band (K,), linearised in the coefficients.
+    seen
+        Values of the driver on the rows from the first that any share has.
+    anchor
+        Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
+        adapted parameters; None where it can.
+    """
+
+    effect: Effect
+    driver_unit: str
+    unit: str
+    relative: bool
+    driver: FloatArray
+    change: FloatArray
+    low: FloatArray
+    high: FloatArray
+    seen: FloatArray
+    anchor: float | None = None
+
+
+def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, ...]:
+    """Curves of the last `count` effects of a fit; those without a driver (constant, lag, dead time) have none."""
+    effects = fit.model.fitted_effects()
+    wanted = [e for e in effects[len(effects) - count :] if e.driver not in ("constant", "lag", "delay", "saturation")]
+    if not wanted:
+        return ()
+    series, values = _series(problem, fit)
+    first = max(problem.first_row - 1, 0)  # the series begin at the second row
+    return tuple(_curve(fit, e, series[e.driver][first:], values[e.site]) for e in wanted)
+
+
+def _series(problem: Problem, fit: Fit) -> tuple[dict[str, FloatArray], dict[str, float]]:
+    """Series of every driver along the fitted free run, and the median value at every site."""
+    model, record, p = fit.model, problem.record, parameters_of(fit)
+    start = float(record.time[0])
+    run = Stepper(model, record.dt).simulate(fit.initial_state, record.inputs[1:], p, start)
+    table = {q.name: record.inputs[1:, j] for j, q in enumerate(model.inputs)}
+    table |= {q.name: run.states[:, j] for j, q in enumerate(model.states)}
+    table |= {q.name: run.signals[:, j] for j, q in enumerate(model.signals)}
+    table["time"] = run.time
+    rows = slice(None, None, max(1, len(run.time) // 200))
+    z = [np.array(model.ode(t, x, u, p)[3]) for t, x, u in _thinned(run.time, run.states, record.inputs[1:], rows)]
+    at = [
+        np.array(model.site_values(t, x, u, p, zk)).ravel()
+        for (t, x, u), zk in zip(_thinned(run.time, run.states, record.inputs[1:], rows), z, strict=True)
+    ]
+    return table, dict(zip((s.name for s in model.sites), np.median(at, axis=0).tolist(), strict=True))
+
+
+def _thinned(
+    time: FloatArray, states: FloatArray, inputs: FloatArray, rows: slice
+) -> list[tuple[float, FloatArray, FloatArray]]:
+    return list(zip(time[rows].tolist(), states[rows], inputs[rows], strict=True))
+
+
+def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCurve:
+    model = fit.model
+    site = next(s for s in model.sites if s.name == effect.site)
+    units = {q.name: q.unit for q in (*model.inputs, *model.states, *model.signals)} | {"time": "s"}
+    relative = effect.shape.static is not None and (effect.mode or site.mode) == "factor"
+    x = np.linspace(float(np.min(seen)), float(np.max(seen)), POINTS)
+    g, slope = _law(effect, value)
+    names = [effect.parameter(c.name) for c in effect.terms]
+    c = np.array([effect.coefficients[t.name] for t in effect.terms])
+    middle = np.array([float(g(v, c)) for v in x])
+    gradient = np.array([np.array(slope(v, c)).ravel() for v in x])
+    covariance, anchor = _covariance(fit, names), None
+    std = _spread(gradient, covariance)
+    if effect.shape.static is not None:
+        typical = float(np.median(seen))
+        there = np.array(slope(typical, c)).ravel()
+        shape_only = _spread(gradient - there, covariance)
+        if _spread(there[None], covariance)[0] > FREE * np.max(shape_only):
+            anchor, std, middle = typical, shape_only, middle - float(g(typical, c))
+    shown = np.exp if relative else np.asarray
+    low, change, high = (shown(middle + k * BAND * std) for k in (-1, 0, 1))
+    unit = "-" if relative else (site.unit or "")
+    return EffectCurve(effect, units.get(effect.driver, ""), unit, relative, x, change, low, high, seen, anchor)
+
+
+def _spread(gradient: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Standard deviation (K,) of values with the derivatives (K, q)."""
+    found: FloatArray = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0))
+    return found
+
+
+def _covariance(fit: Fit, names: Sequence[str]) -> FloatArray:
+    """Covariance of some parameters; zero where one was held."""
+    found = np.zeros((len(names), len(names)))
+    free = [i for i, n in enumerate(names) if n in fit.names]
+    where = [fit.names.index(names[i]) for i in free]
+    found[np.ix_(free, free)] = fit.covariance[np.ix_(where, where)]
+    return found
+
+
+def _law(effect: Effect, value: float) -> tuple[ca.Function, ca.Function]:
+    """The change g(driver, coefficients) of an effect without states at a typical value of its site, and its slope."""
+    x, c = ca.SX.sym("x"), ca.SX.sym("c", len(effect.terms))
+    coefficients = {t.name: c[i] for i, t in enumerate(effect.terms)}
+    shape, settings = effect.shape, effect.full_settings
+    if shape.static is not None:
+        g = ca.SX(shape.static(x, coefficients, settings))
+    else:
+        assert shape.direct is not None  # a form has one law or the other
+        g = shape.direct(_Stateless(), ca.SX(value), x, coefficients, settings) - value
+    return ca.Function("g", [x, c], [g]), ca.Function("slope", [x, c], [ca.gradient(g, c)])
+
+
+class _Stateless:
+    """Scope of a direct law that owns no state."""
+
+    def own_state(self, name: str) -> ca.SX:
+        raise NotImplementedError(f"a form with the state {name!r} has no curve")
+
+    def own_derivative(self, name: str, value: ca.SX, decay: ca.SX | None = None) -> None:
+        raise NotImplementedError(f"a form with the state {name!r} has no curve")

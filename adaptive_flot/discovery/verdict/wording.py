@@ -1,0 +1,70 @@
+"""The verdict in plain words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.search.search import Search
+from adaptive_flot.discovery.verdict.verdict import Judgement, NamedEffect
+
+
+def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
+    """What drifts and by how much, for each effect of a drift."""
+    assert judgement.best is not None  # drift is a kind of alternative
+    said = []
+    for effect in after.model.fitted_effects()[-len(judgement.best.names) :]:
+        values = [v for k, v in effect.coefficients.items() if k.startswith(("amplitude", "value"))]
+        change = values[0] if len(values) == 1 else _largest_move(values)
+        site = next(s for s in after.model.sites if s.name == effect.site)
+        offset = (effect.mode or site.mode) == "offset"
+        size = f"{change:+.3g} {site.unit or ''}".rstrip() if offset else f"{100 * (np.exp(change) - 1):+.0f} %"
+        said.append(f"{effect.site} changes by about {size} ({effect.form} in time)")
+    return tuple(said)
+
+
+def _largest_move(values: list[float]) -> float:
+    """Difference of the extremes of a course, negative where the larger comes first."""
+    high, low = int(np.argmax(values)), int(np.argmin(values))
+    return (values[high] - values[low]) * (1 if high > low else -1)
+
+
+def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
+    """The verdict in one paragraph."""
+    if judgement.word == "none" and drift:
+        return (
+            "The model lacks no effect that this record shows: a drift of its adapted parameters explains the residual "
+            f"({'; '.join(drift)}), and tracking them is the estimator's work."
+        )
+    if judgement.word == "none":
+        return (
+            "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
+            "noise would, or what it removes does not stand on rows that did not choose it."
+        )
+    evidence = f"{found.verification}" if found.verification else ""
+    said = "; and ".join(f"{e.effect.site} depends on {e.effect.driver} ({e.meaning})" for e in effects)
+    if judgement.word == "named":
+        return f"The model lacks this: {said}. {evidence}."
+    if judgement.word == "class":
+        return f"{_class_words(judgement)} {evidence}."
+    if judgement.word == "unnamed":
+        return f"The model lacks something without a known name: {said}. {evidence}."
+    close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
+    return (
+        "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
+        f"none explains it well ({close}). {evidence}."
+    )
+
+
+def _class_words(judgement: Judgement) -> str:
+    assert judgement.best is not None  # a class has a best member
+    sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
+    if all(len(a.names) == 1 for a in sets):
+        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
+        return f"The model lacks one of these, which this record can not tell apart: {members}."
+    sure = [n for n in judgement.best.names if all(n in a.names for a in sets)]
+    rest = "; ".join(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in sure) for a in sets)
+    first = "The model lacks several effects. "
+    if sure:
+        first += f"Certain: {', '.join(f'{s} by {d}' for s, d in sure)}. "
+    return f"{first}This record can not tell these apart, of which the first is kept: {rest}."

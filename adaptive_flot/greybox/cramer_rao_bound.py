@@ -1,0 +1,154 @@
+"""Posterior Cramer-Rao bound of states and drifting parameters along a known trajectory.
+
+z = (x, theta, d): nx model states, q parameters, and how much each parameter moves an interval. At the start of
+interval k the moves are renewed where the parameters change their course, and added::
+
+    d_k = keep_k d_(k-1) + v_k, v_k ~ N(0, V_k)     theta_k = theta_(k-1) + d_k     x_(k+1) = f(x_k, theta_k)
+    y_(k+1) = g(x_k, theta_k) + e,  e ~ N(0, R)
+
+A random walk renews every move, a ramp only at its two ends. The bound of the error covariance of any estimator is that
+of this model linearised at the true trajectory: the recursion of Tichavsky, Muravchik & Nehorai, *Posterior
+Cramer-Rao bounds for discrete-time nonlinear filtering*, IEEE Trans. Signal Processing 46 (1998), equation 21, which is
+here taken in its covariance form (by the matrix inversion lemma), since the states have no noise of their own and their
+information is infinite. Its expectation over trajectories is replaced by the trajectory at hand; average the
+covariances of several runs where that matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.rows import over_rows
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+CHUNK = 500
+"""Intervals that are linearised in one call."""
+SAME_MOVE = 1e-6
+"""Moves that differ by less, as a share of the largest, are one ramp."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Derivatives of N intervals for states and parameters at their start: `F` (N, nx, nx + q), `H` (N, ny, nx + q)."""
+
+    F: FloatArray
+    H: FloatArray
+
+
+@dataclass(frozen=True)
+class Course:
+    """How parameters may move: whether each goes on as before (N, q) and the variance of a new move (N, q)."""
+
+    keep: FloatArray
+    variance: FloatArray
+
+
+def linearise(
+    stepper: Stepper, wrt: Sequence[str], x0: FloatArray, inputs: FloatArray, parameters: FloatArray, t0: float = 0.0
+) -> Linearisation:
+    """Linearise N intervals of a trajectory, exactly for the step itself.
+
+    Parameters
+    ----------
+    stepper
+        The fast step of the model.
+    wrt
+        Names of the q parameters.
+    x0
+        State at t0 [s] (nx,).
+    inputs, parameters
+        True inputs (N, nu) and parameters (N, np) of each interval.
+    t0
+        Time at the start [s].
+    """
+    run = stepper.simulate(x0, inputs, parameters, t0)
+    before = np.vstack([x0, run.states[:-1]])
+    model, dt, rows = stepper.model, stepper.dt, len(inputs)
+    key = ("bound", dt, stepper.substeps, tuple(wrt))
+    if key not in model.kept:
+        model.kept[key] = over_rows(stepper.one_step_jacobians(wrt), CHUNK)
+    nx, ny, q = len(model.states), len(model.outputs), len(wrt)
+    F, H = np.empty((rows, nx, nx + q)), np.empty((rows, ny, nx + q))
+    time = t0 + dt * np.arange(rows)
+    for first in range(0, rows, CHUNK):
+        part = np.minimum(np.arange(first, first + CHUNK), rows - 1)  # the last call repeats its last row
+        found = model.kept[key](before[part].T, time[part], inputs[part].T, parameters[part].T)
+        blocks = [_rows(np.array(found[i]), CHUNK)[: rows - first] for i in range(2, 6)]
+        F[first : first + CHUNK] = np.concatenate(blocks[:2], axis=2)
+        H[first : first + CHUNK] = np.concatenate(blocks[2:], axis=2)
+    return Linearisation(F, H)
+
+
+def _rows(side_by_side: FloatArray, count: int) -> FloatArray:
+    """Split matrices (a, count b) into (count, a, b)."""
+    return side_by_side.reshape(len(side_by_side), count, -1).transpose(1, 0, 2)
+
+
+def course_of(theta: FloatArray) -> Course:
+    """Course of known true parameters (N, q): what one knows who is told when each of them turns, but not where to.
+
+    Wherever a parameter's move from one interval to the next changes, the new move is unknown, with the root mean
+    square of the moves that this parameter takes up in the whole record; a rest is known to be one.
+    """
+    moves = np.diff(theta, axis=0, prepend=theta[:1])
+    largest = np.abs(moves).max(axis=0)
+    turns = np.abs(np.diff(moves, axis=0, prepend=0.0)) > SAME_MOVE * largest
+    started = turns & (np.abs(moves) > SAME_MOVE * largest)
+    count = np.maximum(started.sum(axis=0), 1)
+    variance = np.where(started, (np.where(started, moves, 0.0) ** 2).sum(axis=0) / count, 0.0)
+    return Course((~turns).astype(float), variance)
+
+
+def walk(rows: int, std: FloatArray) -> Course:
+    """Course of parameters that do a random walk: std of each one's move an interval (q,)."""
+    return Course(np.zeros((rows, std.size)), np.tile(std**2, (rows, 1)))
+
+
+def bound(linear: Linearisation, course: Course, noise_std: FloatArray, start: FloatArray) -> FloatArray:
+    """Smallest error covariance of states and parameters at the end of each interval (N, nx + q, nx + q).
+
+    Parameters
+    ----------
+    linear
+        The linearised trajectory.
+    course
+        How the parameters may move.
+    noise_std
+        Standard deviation of the noise of each output at the end of each interval (N, ny); NaN where not measured.
+    start
+        Covariance of states and parameters before the first interval (nx + q, nx + q).
+    """
+    rows, nx, size = linear.F.shape
+    q = size - nx
+    P = np.zeros((size + q, size + q))
+    P[:size, :size] = start
+    found = np.empty((rows, size, size))
+    moves = slice(size, size + q)
+    for k in range(rows):
+        # the moves are renewed and added to the parameters
+        keep = course.keep[k]
+        P[moves, :] *= keep[:, None]
+        P[:, moves] *= keep
+        P[np.arange(size, size + q), np.arange(size, size + q)] += course.variance[k]
+        P[nx:size, :] += P[moves, :]
+        P[:, nx:size] += P[:, moves]
+        for j in np.flatnonzero(np.isfinite(noise_std[k])):
+            h = np.concatenate([linear.H[k, j], np.zeros(q)])
+            spread = P @ h
+            P -= np.outer(spread, spread) / (h @ spread + noise_std[k, j] ** 2)
+        P[:nx, :] = linear.F[k] @ P[:size, :]
+        P[:, :nx] = P[:, :size] @ linear.F[k].T
+        P = (P + P.T) / 2
+        found[k] = P[:size, :size]
+    return found
+
+
+def model_scale(model: Model, wrt: Sequence[str]) -> FloatArray:
+    """Scale of each named parameter (q,): the standard deviation with which nothing is known of it."""
+    return np.array(
+        [model.parameters[i].prior_std or model.parameters[i].scale for i in model.indices("parameters", wrt)]
+    )

@@ -1,0 +1,188 @@
+"""Measured records: columns mapped to the names of a model, checked once, missing measurements as NaN.
+
+Row k holds the inputs held during the interval that ends at `time[k]` and the outputs measured at that time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from adaptive_flot.errors import DataError, near_match
+from adaptive_flot.greybox.data.tables import line, numeric_column, read_table
+from adaptive_flot.greybox.model import FloatArray, Model
+
+TIME_COLUMN = "time_s"
+UNIFORMITY = 1e-3
+"""Largest difference between two sampling intervals, as a share of the interval, that still counts as uniform."""
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A record of N samples for one model.
+
+    Attributes
+    ----------
+    name
+        What the record is called in messages and reports.
+    time
+        Time of each row [s] (N,), increasing by `dt`.
+    dt
+        Sampling interval [s].
+    inputs
+        (N, nu) in the model's order and units; never NaN.
+    outputs
+        (N, ny) in the model's order and units; NaN where missing.
+    parameters
+        Parameter values a row (N,) by full parameter name, where the table has them.
+    initial_state
+        State at the first row (nx,), where the table has all states in it.
+    """
+
+    name: str
+    time: FloatArray
+    dt: float
+    inputs: FloatArray
+    outputs: FloatArray
+    parameters: Mapping[str, FloatArray] = field(default_factory=dict)
+    initial_state: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def rows(self, start: int, stop: int | None = None) -> Dataset:
+        """Part of the record; the initial state belongs to the first row and stays only with it."""
+        cut = slice(start, stop)
+        return replace(
+            self,
+            time=self.time[cut],
+            inputs=self.inputs[cut],
+            outputs=self.outputs[cut],
+            parameters={k: v[cut] for k, v in self.parameters.items()},
+            initial_state=self.initial_state if start == 0 else None,
+        )
+
+    def measured(self, model: Model) -> tuple[str, ...]:
+        """Names of the outputs that have at least one measurement."""
+        return tuple(q.name for q, y in zip(model.outputs, self.outputs.T, strict=True) if np.isfinite(y).any())
+
+
+def read_dataset(path: Path | str, model: Model, *, required_outputs: Sequence[str] = ()) -> Dataset:
+    """Read a table whose columns carry the model's column names (see `Quantity.column`) and `time_s`.
+
+    Parameters
+    ----------
+    path
+        CSV or Parquet file.
+    model
+        Names, units and ranges. Inputs are needed; outputs and parameters are used where present.
+    required_outputs
+        Outputs that must have a column.
+
+    Raises
+    ------
+    DataError
+        Missing column, wrong unit suffix, text in a number, NaN in an input, time that does not increase uniformly.
+    RangeError
+        An input outside the model's physical range.
+    """
+    file = Path(path)
+    table = read_table(file)
+    columns = [str(c) for c in table.columns]
+    time = numeric_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
+    dt = _interval(table, time, file)
+
+    inputs = np.column_stack([_input(table, columns, q.name, q.column, q.unit, file) for q in model.inputs])
+    model.check_inputs(inputs, time, where=str(file))
+    outputs = np.full((len(table), len(model.outputs)), np.nan)
+    for j, q in enumerate(model.outputs):
+        if q.column in columns:
+            outputs[:, j] = numeric_column(table, q.column, file)
+        elif q.name in required_outputs or _other_unit(columns, q.name, q.column) is not None:
+            _find(columns, q.name, q.column, q.unit, file)
+
+    parameters = {
+        p.name: numeric_column(table, label, file)
+        for p in model.parameters
+        for label in (p.symbol, p.name)
+        if label in columns
+    }
+    for name, values in parameters.items():
+        if np.isnan(values).any():
+            empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
+            raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
+    return Dataset(file.stem, time, dt, inputs, outputs, parameters, _first_state(table, columns, model, file))
+
+
+def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path) -> str:
+    if column in columns:
+        return column
+    other = _other_unit(columns, name, column)
+    if other is not None:
+        raise DataError(
+            f"{file}: column {other!r} has the wrong unit suffix; convert it to {unit} and name it {column!r}"
+        )
+    if f"{column}_measured" in columns:
+        raise DataError(f"{file}: column {column!r} is missing; of a time series of `run`, rename '{column}_measured'")
+    raise DataError(f"{file}: column {column!r} is missing; add it ({near_match(column, columns)})")
+
+
+def _other_unit(columns: Sequence[str], name: str, column: str) -> str | None:
+    suffixed = [c for c in columns if c == name or (c.startswith(name + "_") and _looks_like_unit(c[len(name) + 1 :]))]
+    return suffixed[0] if suffixed and column not in columns else None
+
+
+def _looks_like_unit(suffix: str) -> bool:
+    units = {"s", "ms", "min", "h", "d", "m", "mm", "cm", "km", "m3", "l", "L", "ml", "kg", "g", "t", "pct", "percent"}
+    units |= {"V", "mV", "C", "K", "lpm", "cfm", "ft", "in", "gpm", "ppm", "frac"}
+    return bool(suffix) and all(part in units for part in suffix.split("_"))
+
+
+def _input(table: pd.DataFrame, columns: Sequence[str], name: str, column: str, unit: str, file: Path) -> FloatArray:
+    values = numeric_column(table, _find(columns, name, column, unit, file), file)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise DataError(
+            f"{file}: input {column!r} has no value in line {line(table, int(bad[0]))} ({bad.size} in all); "
+            "inputs can not be missing: fill in the value that was applied, or cut the record there"
+        )
+    return values
+
+
+def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
+    if len(time) < 2:
+        raise DataError(f"{file}: {len(time)} row; a record needs at least 2")
+    bad = np.flatnonzero(~np.isfinite(time))
+    if bad.size:
+        raise DataError(
+            f"{file}: {TIME_COLUMN!r} is empty in line {line(table, int(bad[0]))}; give the time of every row"
+        )
+    steps = np.diff(time)
+    back = np.flatnonzero(steps <= 0)
+    if back.size:
+        k = int(back[0]) + 1
+        raise DataError(
+            f"{file}: time does not increase in line {line(table, k)} ({time[k - 1]:g} s, then {time[k]:g} s); "
+            "sort the rows and remove repeated ones"
+        )
+    dt = float(np.median(steps))
+    uneven = np.flatnonzero(np.abs(steps - dt) > UNIFORMITY * dt)
+    if uneven.size:
+        k = int(uneven[0]) + 1
+        raise DataError(
+            f"{file}: time is not uniform: {steps[k - 1]:g} s before line {line(table, k)}, {dt:g} s elsewhere; "
+            "resample the record or cut it at the gap"
+        )
+    return float((time[-1] - time[0]) / (len(time) - 1))
+
+
+def _first_state(table: pd.DataFrame, columns: Sequence[str], model: Model, file: Path) -> FloatArray | None:
+    wanted = [q.column for q in model.states]
+    if not all(c in columns for c in wanted):
+        return None
+    first = np.array([numeric_column(table, c, file)[0] for c in wanted])
+    return first if np.isfinite(first).all() else None

@@ -1,0 +1,119 @@
+"""Forms with states of their own: the value comes late (lags, dead time, a valve that sticks)."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from adaptive_flot.greybox.forms.form import (
+    SHARE,
+    Coefficient,
+    Coefs,
+    Form,
+    Settings,
+    SiteScope,
+    fixed,
+    number,
+    softplus,
+)
+
+
+def _lag(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del driver
+    scale, tau = number(s, "scale"), c["time_constant"]
+    x = m.own_state("lagged")
+    m.own_derivative("lagged", (value / scale - x) / tau, decay=-1 / tau)
+    return value + c["amplitude"] * (x * scale - value)
+
+
+def _lags(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del driver
+    scale = number(s, "scale")
+    x = value / scale
+    for name, tau in (("lagged_1", c["time_constant"]), ("lagged_2", c["time_constant_2"])):
+        state = m.own_state(name)
+        m.own_derivative(name, (x - state) / tau, decay=-1 / tau)
+        x = state
+    return value + c["amplitude"] * (x * scale - value)
+
+
+def _delay(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del driver
+    scale, stages = number(s, "scale"), int(number(s, "stages"))
+    tau = c["dead_time"] / stages
+    x = value / scale
+    for k in range(stages):
+        name = f"stage_{k + 1}"
+        state = m.own_state(name)
+        m.own_derivative(name, (x - state) / tau, decay=-1 / tau)
+        x = state
+    return value + c["amplitude"] * (x * scale - value)
+
+
+BAND_CORNER = 0.05
+"""Corners of a dead band are rounded over this share of it: past sharp ones an optimiser finds no way (ipopt and fatrop
+give up on the air valve). Half way out of the band the position then creeps by 1e-6 of the band a second."""
+
+
+def _stiction(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del driver
+    scale, follow = number(s, "scale"), number(s, "follow_s")
+    x = m.own_state("position")
+    error = value / scale - x
+    band = c["band"] / scale
+    width = BAND_CORNER * (band + 1e-9)
+    moved = softplus(error - band, width) - softplus(-error - band, width)
+    m.own_derivative("position", moved / follow)
+    return value + c["amplitude"] * (x * scale - value)
+
+
+def _delay_states(settings: Settings) -> tuple[str, ...]:
+    return tuple(f"stage_{k + 1}" for k in range(int(number(settings, "stages"))))
+
+
+LAGGING_FORMS: tuple[Form, ...] = (
+    Form(
+        "lag",
+        "first-order lag",
+        fixed(SHARE, Coefficient("time_constant", 30.0, 1.0, scale=10.0, unit="s", shape=True)),
+        ("lag",),
+        {"scale": None},
+        {"scale": "value"},
+        direct=_lag,
+        states=lambda settings: ("lagged",),
+    ),
+    Form(
+        "lags",
+        "two first-order lags in a row",
+        fixed(
+            SHARE,
+            Coefficient("time_constant", 20.0, 1.0, scale=10.0, unit="s", shape=True),
+            Coefficient("time_constant_2", 10.0, 1.0, scale=10.0, unit="s", shape=True),
+        ),
+        ("lag",),
+        {"scale": None},
+        {"scale": "value"},
+        direct=_lags,
+        states=lambda settings: ("lagged_1", "lagged_2"),
+    ),
+    Form(
+        "delay",
+        "dead time, as a chain of equal lags",
+        fixed(SHARE, Coefficient("dead_time", 30.0, 2.0, scale=10.0, unit="s", shape=True)),
+        ("delay",),
+        {"scale": None, "stages": 12.0},
+        {"scale": "value"},
+        direct=_delay,
+        states=_delay_states,
+    ),
+    Form(
+        "stiction",
+        "the value follows only when the demand leaves a band",
+        fixed(SHARE, Coefficient("band", 0.0, 0.0, unit="value", shape=True)),
+        ("lag",),
+        {"scale": None, "follow_s": 2.0},
+        {"scale": "value", "follow_s": "s"},
+        direct=_stiction,
+        states=lambda settings: ("position",),
+    ),
+)
+"""Each is switched on by a share of one; its times are shapes."""

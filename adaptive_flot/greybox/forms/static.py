@@ -1,0 +1,156 @@
+"""Static forms: a number g(driver), nothing of the past."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.greybox.forms.form import Coefficient, Coefs, Form, Settings, fixed, number, numbers, softplus
+from adaptive_flot.greybox.quantities import FloatArray
+
+LEAST_SHARE = 1e-6
+"""A driver of a power law is taken as at least this share of its reference: keeps the logarithm finite."""
+
+
+def _shift(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del driver, s
+    return c["amplitude"]
+
+
+def _power(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    reference = number(s, "reference")
+    return c["amplitude"] + c["exponent"] * ca.log(ca.fmax(driver / reference, LEAST_SHARE))
+
+
+def _linear(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    reference = number(s, "reference")
+    return c["amplitude"] + c["slope"] * (driver / reference - 1)
+
+
+def _step(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    # a logistic function, written so that it and its slope stay finite far from the onset
+    return c["amplitude"] * (1 + ca.tanh((driver - c["onset"]) / (2 * number(s, "width")))) / 2
+
+
+def _ramp(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del s
+    span = ca.fmax(c["duration"], 1e-9)
+    return c["amplitude"] * ca.fmin(ca.fmax((driver - c["onset"]) / span, 0), 1)
+
+
+def _washout(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del s
+    since = ca.fmax(driver - c["onset"], 0)
+    return c["amplitude"] * (1 - ca.exp(-since / c["time_constant"]))
+
+
+def _curve(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    knots = numbers(s, "knots")
+    basis = ca.vertcat(*spline_basis(driver, knots))
+    values = ca.vertcat(*(c[f"value_{k + 1}"] for k in range(len(knots))))
+    g: ca.SX = ca.dot(values, basis)
+    return g
+
+
+def spline_basis(x: ca.SX, knots: FloatArray) -> list[ca.SX]:
+    """Cardinal natural cubic splines: entry k is 1 at knot k and 0 at the others, straight lines outside.
+
+    Hastie, Tibshirani & Friedman, *The Elements of Statistical Learning*, 2nd ed., (5.4) and (5.5). The driver is
+    scaled to the span of the knots first.
+    """
+    low, span = knots[0], knots[-1] - knots[0]
+    s = (x - low) / span
+    at = (knots - low) / span
+
+    def raw(v: ca.SX | float) -> list[ca.SX]:
+        def d(k: int) -> ca.SX:
+            cubic: ca.SX = (ca.fmax(v - at[k], 0) ** 3 - ca.fmax(v - at[-1], 0) ** 3) / (at[-1] - at[k])
+            return cubic
+
+        return [ca.SX(1), ca.SX(v), *(d(k) - d(len(at) - 2) for k in range(len(at) - 2))]
+
+    values = np.array([[float(b) for b in raw(float(a))] for a in at])
+    inverse: FloatArray = np.linalg.inv(values)
+    terms = raw(s)
+    return [
+        sum((terms[i] * inverse[i, k] for i in range(1, len(at))), terms[0] * inverse[0, k]) for k in range(len(at))
+    ]
+
+
+def _hinge(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    reference = number(s, "reference")
+    return c["slope"] * softplus((driver - c["threshold"]) / reference, number(s, "width"))
+
+
+def _curve_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
+    return tuple(Coefficient(f"value_{k + 1}", unit="g") for k in range(len(numbers(settings, "knots"))))
+
+
+_AMPLITUDE = Coefficient("amplitude", unit="g")
+_ONSET = Coefficient("onset", 0.0, scale=60.0, unit="s", shape=True)
+
+STATIC_FORMS: tuple[Form, ...] = (
+    Form("shift", "constant factor or offset", fixed(_AMPLITUDE), ("constant",), {}, static=_shift),
+    Form(
+        "power",
+        "power law in the driver, with a free constant",
+        fixed(_AMPLITUDE, Coefficient("exponent", 0.0, -10.0, 10.0, unit="g")),
+        ("signal",),
+        {"reference": None},
+        {"reference": "driver"},
+        static=_power,
+    ),
+    Form(
+        "linear",
+        "straight line in the driver, with a free constant",
+        fixed(_AMPLITUDE, Coefficient("slope", unit="g")),
+        ("signal",),
+        {"reference": None},
+        {"reference": "driver"},
+        static=_linear,
+    ),
+    Form(
+        "curve",
+        "natural cubic spline of free shape",
+        _curve_coefficients,
+        ("signal", "time"),
+        {"knots": None},
+        {"knots": "driver"},
+        static=_curve,
+    ),
+    Form(
+        "hinge",
+        "nothing below a threshold of the driver, a straight line above",
+        fixed(Coefficient("slope", unit="g"), Coefficient("threshold", 0.0, unit="driver", shape=True)),
+        ("signal",),
+        {"reference": None, "width": 0.02},
+        {"reference": "driver"},
+        static=_hinge,
+    ),
+    Form(
+        "step",
+        "a step at an onset",
+        fixed(_AMPLITUDE, _ONSET),
+        ("time",),
+        {"width": 2.0},
+        {"width": "s"},
+        static=_step,
+    ),
+    Form(
+        "ramp",
+        "a ramp from an onset, then constant",
+        fixed(_AMPLITUDE, _ONSET, Coefficient("duration", 600.0, 1.0, scale=100.0, unit="s", shape=True)),
+        ("time",),
+        {},
+        static=_ramp,
+    ),
+    Form(
+        "washout",
+        "an exponential approach from an onset, as a reagent that is washed out",
+        fixed(_AMPLITUDE, _ONSET, Coefficient("time_constant", 300.0, 1.0, scale=100.0, unit="s", shape=True)),
+        ("time",),
+        {},
+        static=_washout,
+    ),
+)
+"""Constants, curves of a signal, and what happens at a time."""

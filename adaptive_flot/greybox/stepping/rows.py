@@ -1,0 +1,26 @@
+"""A function for many independent rows in one call, on the cores of this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+
+import casadi as ca
+
+from adaptive_flot.greybox.stepping.compiled import compiled
+
+
+def core_count() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def over_rows(function: ca.Function, rows: int, *, as_machine_code: bool = False) -> ca.Function:
+    """`function` with `rows` columns side by side in each argument and result; a single column serves all rows.
+
+    The rows go to one thread a core; in a process that is one of several (a worker of a study, a fit of a search) to
+    one only, since the others have the cores. The results are the same to the bit, whatever the number of threads.
+    """
+    one = compiled(function) if as_machine_code else function
+    threads = 1 if multiprocessing.parent_process() is not None else core_count()
+    return one.map(rows, "thread", min(threads, rows)) if min(threads, rows) > 1 else one.map(rows)

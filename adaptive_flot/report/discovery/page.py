@@ -1,0 +1,178 @@
+"""The report of `discover`: verdict, residual, evidence, the effect found, and the error before and after."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.files import write_text
+from adaptive_flot.report.discovery import tables
+from adaptive_flot.report.discovery.figures import curve_figure, heat_map
+from adaptive_flot.report.discovery.test_design import experiment_chapter
+from adaptive_flot.report.kit import figures
+from adaptive_flot.report.kit.page import Album, Page, Picture, made_by, render
+from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Trace
+
+MOST_RESIDUALS = 3
+"""Outputs whose residuals are drawn: those whose error fell most, in units of their noise."""
+TITLES = {
+    "none": "no effect is missing",
+    "named": "a missing effect, by name",
+    "class": "one of a few effects is missing",
+    "unnamed": "a missing effect without a name",
+    "insufficient": "the record does not say enough",
+    "abstain": "something is missing, but not told what",
+}
+
+
+def write_discovery_report(found: Discovery, name: str, path: Path | str, command: str = "") -> None:
+    """Write the report as a single HTML file without external parts.
+
+    Parameters
+    ----------
+    found
+        What `discover` returned.
+    name
+        What the record is called.
+    path
+        File to write, whole or not at all.
+    command
+        Command line that made it, for the footer.
+    """
+    write_text(Path(path), discovery_report(found, name, command))
+
+
+def discovery_report(found: Discovery, name: str, command: str = "") -> str:
+    """Return the page that `write_discovery_report` writes."""
+    album = Album()
+    content: dict[str, object] = {
+        "word": found.verdict.word,
+        "reason": found.verdict.reason,
+        "facts": [],
+        "coefficients": None,
+    }
+    content |= {"curve": None, "errors": None, "experiment": None, "absorbed": None, "data": _data(found)}
+    contents = [("verdict", "Verdict")]
+    searched = found.search is not None  # nothing is searched in a record whose inputs explain nothing
+    if searched and found.problem is not None and found.before is not None and found.after is not None:
+        content |= _evidence(found, found.problem, found.before, found.after, album)
+        contents += [("errors", "Error before and after"), ("residual", "Residual"), ("evidence", "Evidence")]
+        contents += [("experiment", "Which input moves would tell")] if content["experiment"] else []
+        contents += [("absorbed", "Absorbed")] if content["absorbed"] else []
+    made = made_by(command, [("Model", found.model.name), ("Time", f"{found.verdict.seconds:.1f} s")])
+    lead = f"Record: {name}, {len(found.gate.record)} rows, one every {found.gate.record.dt:g} s."
+    title = f"Discovery report: {TITLES[found.verdict.word]}"
+    page = Page(title, lead, [*contents, ("data", "Data gate")], made)
+    return render("discovery.html", page, **content)
+
+
+def _evidence(found: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> dict[str, object]:
+    verdict = found.verdict
+    curve = _curve_picture(found, problem, after, album)
+    columns = _telling(found, problem)
+    planned = verdict.experiment
+    return {
+        "facts": _facts(found),
+        "coefficients": tables.coefficient_table(found) if verdict.effects else None,
+        "curve": curve,
+        "errors": tables.error_table(found),
+        "before_after": [_before_after(found, problem, before, after, album)],
+        "tests": tables.test_table(found),
+        "symptoms": tables.symptom_table(found),
+        "places": tables.place_table(found),
+        "residuals": [_residuals(found, problem, j, album) for j in columns],
+        "map": _map(found, album),
+        "alternatives": tables.alternative_table(found) if tables.ranked_alternatives(found) else None,
+        "open": tables.not_told_apart(found),
+        "experiment": experiment_chapter(planned, found.model, problem.columns, album) if planned else None,
+        "absorbed": tables.absorbed_table(found) if verdict.absorbed and found.before is not found.after else None,
+    }
+
+
+def _facts(found: Discovery) -> list[str]:
+    said = [f"{tables.effect_text([(e.effect.site, e.effect.driver)])}: {e.meaning}." for e in found.verdict.effects]
+    said += [f"Drift of an adapted parameter: {d}." for d in found.verdict.drift]
+    if found.search is not None and found.search.verification is not None:
+        said.append(f"On rows that did not choose it: {found.search.verification}.")
+    return said
+
+
+def _data(found: Discovery) -> list[str]:
+    said = [f"Insufficient: {r}." for r in found.gate.reasons] + [f"{n}." for n in found.gate.notes]
+    return said or ["Every measured output and every input can be used."]
+
+
+def _curve_picture(found: Discovery, problem: Problem, after: Fit, album: Album) -> Picture | None:
+    best = found.judgement.best if found.judgement else None
+    curves = effect_curves(problem, after, len(best.names)) if best else ()
+    if not curves:
+        return None
+    told = "the effect" if found.verdict.effects else "the best alternative, which the verdict does not tell"
+    caption = (
+        f"{tables.effect_text([(c.effect.site, c.effect.driver) for c in curves])}: {told}, over what the record "
+        "covers, with the 95 % band from the covariance of the fit. Below: how often the record was there."
+    )
+    if any(c.anchor is not None for c in curves):
+        caption += (
+            " Shown relative to the middle of the record, which is all it tells: a constant change at this site is "
+            "one of the adapted parameters."
+        )
+    return album.add(curve_figure(curves), caption, "Curve of the effect over its driver")
+
+
+def _before_after(found: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
+    shown, panels = slice(problem.first_row, None), []
+    time = problem.record.time[shown]
+    for j, c in enumerate(problem.columns):
+        q = found.model.outputs[c]
+        traces = [Trace("before", time, before.residual(problem)[shown, j], Role.CONSTANT)]
+        if after is not before:
+            traces.append(Trace("after", time, after.residual(problem)[shown, j], Role.ESTIMATE))
+        panels.append(Panel(f"{tables.words(q.name)}: residual", q.unit, tuple(traces), height=0.8))
+    caption = (
+        "Measured minus free run, without and with the effect, but for the first rows, which are left out because the "
+        "initial state is not known."
+    )
+    return album.add(figures.time_figure(panels), caption, "Residual of each output over time, before and after")
+
+
+def _telling(found: Discovery, problem: Problem) -> list[int]:
+    """Places of the outputs whose error fell most, in units of their noise."""
+    fell = {c.output: (c.before - c.after) / max(c.noise, 1e-300) for c in found.verdict.error}
+    names = [found.model.outputs[c].name for c in problem.columns]
+    ranked = sorted(range(len(names)), key=lambda j: -fell.get(names[j], 0.0))
+    return ranked[:MOST_RESIDUALS]
+
+
+def _residuals(found: Discovery, problem: Problem, j: int, album: Album) -> Picture:
+    q = found.model.outputs[problem.columns[j]]
+    assert found.before is not None and found.after is not None  # called with a search at hand
+    shown = slice(problem.first_row, None)
+    std = found.after.noise.stationary_std()[j] * problem.weights[shown, j]
+    rows = []
+    fits = [("before", found.before), ("after", found.after)] if found.after is not found.before else []
+    for k, (label, fit) in enumerate(fits or [("model as it is", found.before)]):
+        p = found.verdict.tests.get(f"ljung_box_{'after' if label == 'after' else 'before'}_{q.name}", float("nan"))
+        role = Role.CONSTANT if k == 0 else Role.ESTIMATE
+        rows.append(Residuals(label, role, 0, problem.record.time[shown], fit.residual(problem)[shown, j] / std, p))
+    caption = (
+        f"{tables.words(q.name)}: free-run residual over the standard deviation of the noise, its autocorrelation with "
+        "the band of white noise, and its histogram."
+    )
+    return album.add(figures.residual_figure(rows), caption, f"Residual of {tables.words(q.name)}")
+
+
+def _map(found: Discovery, album: Album) -> Picture:
+    assert found.search is not None  # called with a search at hand
+    best = found.judgement.best if found.judgement else None
+    names = best.names if best else ()
+    caption = (
+        "What each site (row) with each driver (column) would explain of the residual of the model as it is, to first "
+        "order, after everything that the adapted parameters and the initial state can absorb; as a share of the best. "
+        "White: the record tells nothing about it. Dot: known by name."
+        + (" Frame: the best alternative after full fits." if names else "")
+    )
+    return album.add(heat_map(found.search.rounds[0].scores, names), caption, "Map of what would explain the residual")

@@ -1,0 +1,176 @@
+"""Tables and sentences of the discovery report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.verification import SURE
+from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.report.kit.figures import p_text
+from adaptive_flot.report.kit.page import Table, number
+from adaptive_flot.report.kit.style import exponent, unit_text
+
+MOST_ROWS = 10
+
+
+def words(name: str) -> str:
+    """Return a name as the page shows it."""
+    return name.replace("_", " ")
+
+
+def effect_text(names: Sequence[tuple[str, str]]) -> str:
+    """Sites and drivers in words.
+
+    >>> effect_text([("bubble_size", "air_flow"), ("feed_grade", "time")])
+    'bubble size by air flow, and feed grade by time'
+    """
+    return ", and ".join(f"{words(site)} by {words(driver)}" for site, driver in names)
+
+
+def error_table(found: Discovery) -> Table:
+    """Free-run error of each output before and after."""
+    rows = []
+    for c in found.verdict.error:
+        power = exponent(np.array([c.before, c.after]))
+        values = (number(v * 10.0**-power, ".4g") for v in (c.before, c.after, c.noise))
+        low, high = (number(100 * r, ".0f") for r in c.reduction95)
+        rows.append((words(c.output), unit_text(c.unit, power), *values, f"{low} to {high}"))
+    caption = (
+        f"Root mean square error of the free run on the {found.verdict.block} share, which neither chose "
+        "nor fitted anything. Noise: what no model can remove, as fitted. Reduction: 95 % interval of a paired block "
+        "bootstrap."
+    )
+    return Table(caption, ("Output", "Unit", "Before", "After", "Noise", "Reduction [%]"), tuple(rows), words=2)
+
+
+def coefficient_table(found: Discovery) -> Table:
+    """Coefficients of the effects that the verdict tells, with their intervals."""
+    rows = []
+    for named in found.verdict.effects:
+        units = found.model.effect_units(named.effect)
+        for name, value in named.effect.coefficients.items():
+            low, high = named.interval95.get(name, (np.nan, np.nan))
+            interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"
+            site = effect_text([(named.effect.site, named.effect.driver)])
+            unit = unit_text(units.get(name) or "-")
+            rows.append((site, named.effect.form, words(name), unit, number(value, ".4g"), interval))
+    caption = (
+        "Coefficients of the effect, fitted on the estimation and confirm shares. A factor form multiplies its site by "
+        "exp(g); coefficients of g are logarithms of that factor."
+    )
+    return Table(caption, ("Effect", "Form", "Coefficient", "Unit", "Value", "95 % interval"), tuple(rows), words=4)
+
+
+def alternative_table(found: Discovery) -> Table:
+    """Ranked alternatives with their evidence, each refitted in full."""
+    ranked = ranked_alternatives(found)[:MOST_ROWS]
+    rows = []
+    for k, a in enumerate(ranked):
+        forms = ", and ".join(_form(e) for e in a.effects)
+        worse = number(a.worse_than(ranked[0]), ".1f") + (f" ± {number(a.doubt, '.0f')}" if a.doubt else "")
+        values = (worse, number(a.delta_bic, ".1f"))
+        rows.append((str(k + 1), effect_text(a.names), forms, "yes" if all(a.known) else "no", *values))
+    caption = (
+        "Alternatives, each refitted with the adapted parameters, the initial state and a noise model of its own. "
+        "Δ BIC: how much worse its information criterion is than that of the best one (± its standard deviation, from "
+        "resampled blocks of rows), and its difference to the model without an effect (negative is better). Known: "
+        "whether the model's catalogue has a name for it."
+    )
+    header = ("Rank", "Effect", "Form", "Known", "Δ BIC to best", "Δ BIC to no effect")
+    return Table(caption, header, tuple(rows), words=4)
+
+
+def ranked_alternatives(found: Discovery) -> tuple[Alternative, ...]:
+    """Alternatives of the accepted number of effects; where none was accepted, those of the first round."""
+    if found.search is None:
+        return ()
+    return found.search.alternatives or found.search.rounds[0].alternatives
+
+
+def _form(effect: Effect) -> str:
+    return f"{effect.form} ({effect.mode})" if effect.mode else effect.form
+
+
+def test_table(found: Discovery) -> Table:
+    """Ljung-Box p value of each output, before and after."""
+    tests = found.verdict.tests
+    names = [q.name for q in found.model.outputs if f"ljung_box_before_{q.name}" in tests]
+    shown = [[p_text(tests.get(f"ljung_box_{when}_{n}", np.nan)) for when in ("before", "after")] for n in names]
+    rows = [(words(n), *(p.removeprefix("= ") for p in pair)) for n, pair in zip(names, shown, strict=True)]
+    caption = "p value of the Ljung–Box test (20 lags) of the free-run residual; small: something is left."
+    return Table(caption, ("Output", "p before", "p after"), tuple(rows))
+
+
+def symptom_table(found: Discovery) -> Table | None:
+    """What the residual of the model as it is shows, output by output."""
+    if found.verdict.detection is None:
+        return None
+    rows = []
+    for s in found.verdict.detection.symptoms:
+        follows = ", ".join(map(words, s.follows)) or "none"
+        onset = "-" if s.onset_s is None else number(s.onset_s, ".0f")
+        rows.append((words(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
+    caption = (
+        "Residual of the model as it is. Size: root mean square over the noise seen from row to row. Follows: inputs "
+        "whose past the whitened residual depends on. Change: when its mean changes most (moving sums). Missing: "
+        "whether any test rejects. All by Holm's procedure at 5 % over the tests of all outputs. These tests say that "
+        "something is missing; they choose nothing."
+    )
+    header = ("Output", "Size", "Follows", "Change [s]", "Missing")
+    return Table(caption, header, tuple(rows), words=3)
+
+
+def place_table(found: Discovery) -> Table | None:
+    """Kinds of places and causes by what the best candidate of each would explain."""
+    if found.verdict.location is None:
+        return None
+    rows = [
+        (group, p.kind, effect_text([(p.site, p.driver)]), number(100 * p.share, ".0f"))
+        for group, places in (("where", found.verdict.location.places), ("when", found.verdict.location.causes))
+        for p in places
+    ]
+    caption = (
+        "Where and when the missing effect acts: the best candidate of each kind, and what it would explain to first "
+        "order as a share of the best of all."
+    )
+    return Table(caption, ("Question", "Kind", "Best candidate", "Share [%]"), tuple(rows), words=3)
+
+
+def absorbed_table(found: Discovery) -> Table:
+    """Adapted parameters with and without the effect: what they had absorbed."""
+    rows = []
+    for label, share in found.verdict.absorbed.items():
+        after = found.verdict.parameters[label]
+        unit = next((p.unit for p in found.model.parameters if label in (p.symbol, p.name)), "-")
+        power = exponent(np.array([after]))
+        values = (number(v * 10.0**-power, ".4g") for v in (after * (1 + share), after))
+        rows.append((label, unit_text(unit, power), *values, number(100 * share, "+.2f")))
+    caption = (
+        "Adapted parameters fitted without and with the effect. The difference is what they had absorbed: the plain "
+        "fit bends them to mimic the effect."
+    )
+    return Table(caption, ("Parameter", "Unit", "Without", "With", "Absorbed [%]"), tuple(rows), words=2)
+
+
+def not_told_apart(found: Discovery) -> list[str]:
+    """Sentences on what this record leaves open."""
+    judged = found.judgement
+    if judged is None or judged.best is None:
+        return ["There is no alternative to tell apart."]
+    best = judged.best
+    said = []
+    for a in judged.rivals:
+        if judged.near(a):
+            least = max(judged.margin, SURE * a.doubt)
+            said.append(
+                f"{effect_text(a.names)} explains the record about as well as {effect_text(best.names)}: its criterion "
+                f"differs by {number(a.worse_than(best), '.1f')}, and {least:.0f} is the least that tells them "
+                "apart."
+            )
+    if not said and found.verdict.experiment is not None:
+        said = ["Nothing comes as near as that to the best alternative; the test below is for those next to it."]
+    return said or ["Nothing comes near the best alternative."]

@@ -1,0 +1,1 @@
+"""The report of `estimate`: a measured record replayed through estimators (`page.py`)."""

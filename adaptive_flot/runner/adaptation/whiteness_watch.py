@@ -1,0 +1,60 @@
+"""Watch innovations: are they still white? Tests on one window after the other, with a known rate of false alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import ttest_1samp
+from statsmodels.stats.diagnostic import acorr_ljungbox
+from statsmodels.stats.multitest import multipletests
+
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.runner.scenario.discovery_options import FEWEST
+
+LAGS = 10
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """What of a window is not white: p value of each test that was rejected, by output and test."""
+
+    p_values: Mapping[str, float]
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} p = {p:.1g}" for name, p in self.p_values.items())
+
+
+def watch(innovations: Mapping[str, FloatArray], false_alarm: float) -> Alarm | None:
+    """Test a window of innovations for whiteness and zero mean.
+
+    Each output takes two tests: Ljung and Box's for correlation over the first 10 lags (Biometrika 65 (1978)), and
+    Student's for the mean. Both take the size of the noise from the window itself. Holm's correction makes them one
+    test: white innovations of mean zero, of whatever size, alarm in a share `false_alarm` of the windows at most (both
+    laws hold for large windows; windows that do not overlap are independent, so the rate in time is
+    `false_alarm / window`).
+
+    Parameters
+    ----------
+    innovations
+        Innovations of the window by output (N,), NaN where missing; an output with fewer than 50 is not tested.
+    false_alarm
+        Level of all tests together.
+
+    Returns
+    -------
+    Alarm or None
+        None where nothing speaks against white innovations.
+    """
+    found: dict[str, float] = {}
+    for output, values in innovations.items():
+        seen = values[np.isfinite(values)]
+        if len(seen) >= FEWEST and np.ptp(seen) > 0:
+            found[f"{output} correlation"] = float(acorr_ljungbox(seen, lags=[LAGS])["lb_pvalue"].iloc[0])
+            found[f"{output} mean"] = float(ttest_1samp(seen, 0.0).pvalue)
+    if not found:
+        return None
+    rejected = multipletests(list(found.values()), alpha=false_alarm, method="holm")[0]
+    shown = {name: p for (name, p), bad in zip(found.items(), rejected, strict=True) if bad}
+    return Alarm(shown) if shown else None

@@ -1,0 +1,14 @@
+"""What the commands of the command line do.
+
+Map
+---
+run.py             Run a scenario for estimators, controllers and seeds.
+run_files.py       Files that a run leaves.
+runs_table.py      One row a run.
+comparison.py      Controllers and estimators side by side.
+fingerprint.py     What a scenario asks of its controllers: only like is compared with like.
+estimate.py        Replay a measured record through estimators.
+estimate_files.py  Files that `estimate` leaves.
+discover.py        Discovery on a file.
+simulate.py        Simulate a table of inputs.
+"""

@@ -1,0 +1,115 @@
+"""Discovery on a file: read the record, run the search, write verdict and extended model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from adaptive_flot.discovery.discover import Discovery, discover
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.processes import iron_columns, zinc_level
+from adaptive_flot.processes.cascaded_tanks import read_benchmark
+from adaptive_flot.processes.model_file import is_model_file
+from adaptive_flot.processes.model_writer import save_model
+
+
+def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
+    """Read the record to search and, from the published file of the tanks benchmark, the one that only reports.
+
+    The published files of the tanks, the zinc cell and the iron columns are read as they are; else see `read_dataset`.
+
+    Raises
+    ------
+    DataError, RangeError
+        The table can not be used.
+    """
+    if model.name == "cascaded-tanks":
+        return read_benchmark(path)
+    readers = {"zinc-level": zinc_level.read_record, "iron-columns": iron_columns.read_record}
+    if model.name in readers:
+        return readers[model.name](path), None
+    return read_dataset(path, model), None
+
+
+def discover_file(
+    path: Path,
+    model: Model,
+    *,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Discovery:
+    """Read a measured record and find what physical effect the model lacks.
+
+    Parameters
+    ----------
+    path
+        CSV or Parquet file.
+    model
+        The model, with sites.
+    limits
+        Ranges of inputs by name for the test that is proposed.
+    processes
+        Fits that run at once.
+    progress
+        Called with a word for each stage and each fit.
+
+    Raises
+    ------
+    DataError, RangeError, ModelError
+        The table or the model can not be used.
+    """
+    record, report = read_records(path, model)
+    return discover(model, record, report_record=report, limits=limits, processes=processes, progress=progress)
+
+
+def read_limits(given: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Ranges of inputs from `input=low:high`.
+
+    >>> read_limits(["air_flow=0.0009:0.0022"])
+    {'air_flow': (0.0009, 0.0022)}
+
+    Raises
+    ------
+    ModelError
+        Not of that form.
+    """
+    found = {}
+    for text in given:
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        try:
+            found[name] = (float(low), float(high))
+        except ValueError:
+            raise ModelError(
+                f"--limit: {text!r}; write input=low:high in SI units, as air_flow=0.0009:0.0022"
+            ) from None
+    return found
+
+
+def check_model_path(path: Path | None) -> None:
+    """Refuse the name of a file that could not be written, before the search and not after it.
+
+    Raises
+    ------
+    ModelError
+        Not the name of a model file.
+    """
+    if path is not None and not is_model_file(path.name):
+        raise ModelError(f"--save-model: {path}: a model file ends in .yaml; give such a name")
+
+
+def save_discovered(
+    found: Discovery, data: Path, path: Path, *, base: str, cell: str | None, folder: Path | None
+) -> bool:
+    """Write the extended (else the fitted) model as a model file; False where nothing was fitted.
+
+    `base`, `cell` and `folder` are what the model was made from, see `save_model`.
+    """
+    if found.before is None:
+        return False
+    note = f"discovered in {data.name}: {found.verdict.word}"
+    save_model(found.model, path, base=base, cell=cell, folder=folder, note=note)
+    return True

@@ -1,0 +1,68 @@
+"""Write results: JSON without NaN, tables and pages, each whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adaptive_flot.files import write_text
+from adaptive_flot.greybox.data.tables import write_table
+from adaptive_flot.runner.commands.fingerprint import conditions
+from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.scenario.scenario import Scenario
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write strict JSON; numbers that are not finite become null."""
+    write_text(path, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+
+
+def plain(value: Any) -> Any:
+    """Reduce a result to what JSON knows.
+
+    >>> plain({"a": float("nan"), "b": np.array([1.0, 2.0])})
+    {'a': None, 'b': [1.0, 2.0]}
+    """
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(v) for v in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def run_summary(scenario: Scenario, runs: Sequence[Run]) -> dict[str, Any]:
+    """JSON summary of a scenario; with economics also what `compare` must know to compare like with like."""
+    head: dict[str, Any] = {"scenario": scenario.name}
+    if scenario.limits is not None and scenario.prices is not None:
+        head |= {"conditions": conditions(scenario), "grade_limit": scenario.limits.grade}
+    return {**head, "runs": [run.summary() for run in runs]}
+
+
+def write_runs(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[Path]:
+    """Write the time series of each run as `<estimator>_<controller>_seed<N>`, its plans as `..._plans` beside it.
+
+    Returns
+    -------
+    list of Path
+        The time series.
+    """
+    paths = []
+    for run in runs:
+        name = f"{run.estimator}_{run.controller}_seed{run.seed}".replace(":", "-").replace("/", "-")
+        paths.append(folder / f"{name}{suffix}")
+        write_table(run.table, paths[-1])
+        if not run.plans.empty:
+            write_table(run.plans, folder / f"{name}_plans{suffix}")
+    return paths

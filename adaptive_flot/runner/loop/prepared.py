@@ -1,0 +1,130 @@
+"""A scenario with all that its runs have in common: estimators and batch fit are built once, for every seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from adaptive_flot.contracts import AnyController, AnyEstimator, ControllerSetup, Setup
+from adaptive_flot.contracts.batch import BatchEstimator
+from adaptive_flot.contracts.delayed_measurements import taking_late_values
+from adaptive_flot.errors import ScenarioError, near_match
+from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
+from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scenario and its plug-ins.
+
+    An estimator is a frozen configuration (`Estimator`), so all seeds can share one; a controller is built for the
+    schedule of its run.
+
+    Attributes
+    ----------
+    scenario
+        The scenario.
+    estimators, controllers
+        Plug-ins by the name under which they run.
+    """
+
+    scenario: Scenario
+    estimators: Mapping[str, Plugin]
+    controllers: Mapping[str, Plugin]
+    _built: dict[str, AnyEstimator] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, scenario: Scenario, estimators: Sequence[str] = (), controllers: Sequence[str] = ()) -> Prepared:
+        """The estimators and controllers named, default all of the scenario.
+
+        Raises
+        ------
+        ScenarioError
+            Unknown estimator or controller.
+        """
+        chosen = {name: estimator_plugin(scenario, name) for name in estimators} or dict(scenario.file.estimators)
+        moved = {name: controller_plugin(scenario, name) for name in controllers} or dict(scenario.file.controllers)
+        return cls(scenario, chosen, moved)
+
+    def setup(self, name: str, seed: int) -> Setup:
+        """What the estimator of a run is built for; only the oracle is shown the truth, and the plant's model."""
+        s = self.scenario
+        if self.estimators[name].use != "oracle":
+            return s.setup
+        known = tuple(p for p in s.setup.parameters if p in s.plant_model.names("parameters"))
+        return replace(s.setup, model=s.plant_model, parameters=known, truth=s.true_parameters(seed))
+
+    def shares_fit(self, name: str) -> bool:
+        """Whether runs with this estimator see the same first part as all others: not where its model is another."""
+        return self.estimators[name].use != "oracle" or self.scenario.plant_model is self.scenario.model
+
+    def estimator(self, name: str, seed: int) -> AnyEstimator:
+        """The estimator of that name for the run of a seed: one for all, but where it is told the truth."""
+        key = f"{name}-{seed}" if self.estimators[name].use == "oracle" else name
+        if key not in self._built:
+            self._built[key] = self.estimator_for(name, self.setup(name, seed))
+        return self._built[key]
+
+    def estimator_for(self, name: str, setup: Setup) -> AnyEstimator:
+        """A new estimator of that name for another setup."""
+        use, options = self.estimators[name].use, self.estimators[name].options
+        factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
+        made = construct(factory, use, "estimator", setup, **options)
+        return taking_late_values(made, self.scenario.longest_dead_time)
+
+    def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
+        """A controller of that name for the run of a seed, with the model of the estimator that it listens to."""
+        return self.controller_for(
+            name, seed, self.scenario.setup if estimator is None else self.setup(estimator, seed)
+        )
+
+    def controller_for(self, name: str, seed: int, told: Setup) -> AnyController:
+        """A controller of that name for the run of a seed and an estimator with that setup."""
+        use, options = self.controllers[name].use, self.controllers[name].options
+        s = self.scenario
+        setup = ControllerSetup(told.model, s.dt, s.plan(seed), told.parameters, s.limits, s.prices)
+        made: AnyController = construct(
+            load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options
+        )
+        return made
+
+    @cached_property
+    def batch(self) -> BatchEstimator:
+        """The batch fit that gives the initial estimate, from the scenario's guess."""
+        part, s = self.scenario.file.initial_estimate, self.scenario
+        guess = Setup(s.model.with_parameters(part.guess), s.dt, s.setup.parameters, s.setup.outputs)
+        factory = load(part.method, BATCH_ESTIMATORS, "batch estimator", s.path.parent)
+        made: BatchEstimator = construct(factory, part.method, "batch estimator", guess, **part.options)
+        return made
+
+
+def estimator_plugin(scenario: Scenario, name: str) -> Plugin:
+    """Plug-in behind a name: of the scenario, a shipped one or `my_file:MyEstimator`.
+
+    Raises
+    ------
+    ScenarioError
+        None of these; the message holds the nearest name.
+    """
+    return _plugin(name, "estimator", scenario.file.estimators, ESTIMATORS)
+
+
+def controller_plugin(scenario: Scenario, name: str) -> Plugin:
+    """Plug-in behind a name: of the scenario, a shipped one or `my_file:MyController`.
+
+    Raises
+    ------
+    ScenarioError
+        None of these; the message holds the nearest name.
+    """
+    return _plugin(name, "controller", scenario.file.controllers, CONTROLLERS)
+
+
+def _plugin(name: str, what: str, own: Mapping[str, Plugin], shipped: Mapping[str, str]) -> Plugin:
+    if name in own:
+        return own[name]
+    if name in shipped or ":" in name:
+        return Plugin(use=name)
+    raise ScenarioError(f"unknown {what} {name!r}; {near_match(name, {*own, *shipped})}")

@@ -1,0 +1,51 @@
+"""Where the estimators of a run start: from the record of its first part, or from nominal parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.contracts import Prior, Setup
+from adaptive_flot.contracts.delayed_measurements import in_time
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.runner.plants.scenario_plant import initial_state
+from adaptive_flot.runner.scenario.scenario import Scenario
+
+
+def record_of(scenario: Scenario, setup: Setup, steps: Sequence[Step]) -> Dataset:
+    """What is known by the last step, as a record that starts one interval before the first, at the initial instant.
+
+    Where the scenario says that the cell does not start steady, that is known too: the record carries the state, in the
+    model of the setup.
+    """
+    samples = in_time([s.plant.sample for s in steps], setup)
+    dt = samples[1].time - samples[0].time
+    return Dataset(
+        name="initial record",
+        time=np.array([samples[0].time - dt, *(s.time for s in samples)]),
+        dt=dt,
+        inputs=np.vstack([samples[0].inputs, *(s.inputs for s in samples)]),
+        outputs=np.vstack([np.full(samples[0].outputs.size, np.nan), *(s.outputs for s in samples)]),
+        initial_state=_start(scenario, setup, samples[0].inputs) if scenario.file.initial_state else None,
+    )
+
+
+def nominal_start(scenario: Scenario, setup: Setup, steps: Sequence[Step], fitted: Prior) -> Prior:
+    """Nominal parameters and their own free run from the start, for an estimator that is built for `setup`.
+
+    `fitted` is the start that the batch fit of the scenario's own setup gives, for its time, covariance and noise.
+    """
+    model, record = setup.model, record_of(scenario, setup, steps)
+    x0 = _start(scenario, setup, record.inputs[0])
+    state = RecordSimulator(model, setup.dt).last_state(record, x0, model.parameter_values)
+    values = model.parameter_values[model.indices("parameters", setup.parameters)]
+    among = [scenario.setup.parameters.index(name) for name in setup.parameters]
+    return Prior(fitted.time, state, values, fitted.covariance[np.ix_(among, among)], fitted.noise_std)
+
+
+def _start(scenario: Scenario, setup: Setup, inputs: FloatArray) -> FloatArray:
+    return initial_state(scenario, setup.model, inputs, setup.model.parameter_values)

@@ -1,0 +1,10 @@
+"""What is taken from a run.
+
+Map
+---
+timeseries.py        One row an interval, and the fits that are taken from it.
+accounts.py          What the run earned, and how it was decided.
+plans.py             What the controller expected.
+prediction.py        How well the models in use predicted.
+cramer_rao_limit.py  The smallest error that any estimator could have.
+"""

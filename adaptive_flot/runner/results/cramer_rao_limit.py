@@ -1,0 +1,120 @@
+"""The smallest error that any estimator of a scenario can have: its posterior Cramer-Rao bound, run by run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from adaptive_flot.greybox.cramer_rao_bound import Course, Linearisation, bound, course_of, linearise, model_scale
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.steady_state import steady_state_gradient
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.plants.scenario_plant import initial_state
+from adaptive_flot.runner.scenario.scenario import Scenario
+
+MORE_SENSORS = {"air_recovery": 0.01, "concentrate_flow": 0.01}
+"""Outputs that a plant may measure beside the grade, with their noise as a share of their mean."""
+
+
+@dataclass(frozen=True)
+class TrueRun:
+    """A run as it really was: what an estimator of it can know at best.
+
+    Parameters
+    ----------
+    scenario
+        The scenario; its plant must have all adapted parameters (see `has_limit`).
+    seed
+        Seed of the run.
+    inputs
+        Inputs that acted (N, nu); those of the schedule in open loop.
+    """
+
+    scenario: Scenario
+    seed: int
+    inputs: FloatArray
+
+    @cached_property
+    def parameters(self) -> FloatArray:
+        """True parameters of the plant's model (N, np)."""
+        return self.scenario.true_parameters(self.seed)
+
+    @cached_property
+    def adapted(self) -> FloatArray:
+        """True values of the adapted parameters (N, q)."""
+        columns = self.scenario.plant_model.indices("parameters", self.scenario.setup.parameters)
+        return self.parameters[:, columns]
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """State (nx,) at the start."""
+        return initial_state(self.scenario, self.scenario.plant_model, self.inputs[0], self.parameters[0])
+
+    @cached_property
+    def outputs(self) -> FloatArray:
+        """True outputs (N, ny) without what effects on sensors add."""
+        return self._stepper.simulate(self.start, self.inputs, self.parameters).outputs
+
+    @cached_property
+    def linear(self) -> Linearisation:
+        """The run, linearised."""
+        return linearise(self._stepper, self.scenario.setup.parameters, self.start, self.inputs, self.parameters)
+
+    @property
+    def _stepper(self) -> Stepper:
+        return Stepper(self.scenario.plant_model, self.scenario.dt)
+
+    def limit(self, course: Course | None = None, more: Mapping[str, float] | None = None) -> FloatArray:
+        """Smallest error covariance of the adapted parameters at the end of each interval (N, q, q), in their units.
+
+        The inputs are known, and so is the start: steady at unknown parameters, or the state that the scenario gives.
+
+        Parameters
+        ----------
+        course
+            How the parameters may move; default the bound of one who is told when each parameter turns, but not where
+            to (see `course_of`): nobody who has to find that out himself can do better.
+        more
+            Outputs measured every interval beside those that drive the adaptation, with their noise as a share of their
+            mean.
+        """
+        q = len(self.scenario.setup.parameters)
+        found = bound(self.linear, course or course_of(self.adapted), self._noise(more or {}), self._first_covariance())
+        return found[:, -q:, -q:]
+
+    def fits(self, covariance: FloatArray) -> FloatArray:
+        """Fits in percent (q,), as estimators are given them, of errors with this covariance (N, q, q)."""
+        late = self.scenario.starts + self.scenario.dt > self.scenario.fits_after + 1e-9
+        variance = np.diagonal(covariance, axis1=1, axis2=2)[late].sum(axis=0)
+        fits: FloatArray = 100.0 * (1.0 - np.sqrt(variance) / np.linalg.norm(self.adapted[late], axis=0))
+        return fits
+
+    def _noise(self, more: Mapping[str, float]) -> FloatArray:
+        s, model = self.scenario, self.scenario.plant_model
+        driving = np.isin(np.arange(len(model.outputs)), model.indices("outputs", s.setup.outputs))
+        noise = np.where(s.measured_at() & driving, s.noise_std(), np.nan)
+        for name, share in more.items():
+            j = model.index("outputs", name)
+            noise[:, j] = share * np.abs(self.outputs[:, j]).mean()
+        return noise
+
+    def _first_covariance(self) -> FloatArray:
+        s, model = self.scenario, self.scenario.plant_model
+        names = s.setup.parameters
+        moved = np.zeros((len(model.states), len(names)))
+        if not s.file.initial_state:
+            moved = steady_state_gradient(model, self.start, self.inputs[0], self.parameters[0], names)
+        by_parameters = np.vstack([moved, np.eye(len(names))])
+        covariance: FloatArray = by_parameters @ np.diag(model_scale(model, names) ** 2) @ by_parameters.T
+        return covariance
+
+
+def has_limit(scenario: Scenario) -> bool:
+    """Whether the plant has all adapted parameters and driving outputs, so that there is a truth to estimate."""
+    plant = scenario.plant_model
+    return set(scenario.setup.parameters) <= set(plant.names("parameters")) and set(scenario.setup.outputs) <= set(
+        plant.names("outputs")
+    )

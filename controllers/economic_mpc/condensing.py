@@ -1,0 +1,145 @@
+"""The linearised optimal control problem in the moves alone: a small dense quadratic programme.
+
+With the equations of a stage linearised, its collocation points follow from the state at its begin and the moved inputs
+(one linear system a stage), and the states follow from the inputs before them. What is left are the inputs and slacks
+of the horizon (Bock and Plitt 1984; the names of the blocks below are those of a linear system dx' = A dx + B du + b).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from adaptive_flot.greybox.model import FloatArray
+from controllers.economic_mpc.layout import MOVED, SLACKS, Layout
+
+INPUTS = len(MOVED)
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Functions of each of the K stages at a plan; the variables of a stage are those of `Layout`.
+
+    Attributes
+    ----------
+    constraints, jacobian
+        Rows of a stage without the initial condition (K, m) and their derivatives by its variables (K, m, block).
+    initial
+        Residual of the initial condition (state_size,).
+    gradient, hessian
+        Of the objective (K, block) and of the Lagrangian (K, block, block).
+    """
+
+    constraints: FloatArray
+    jacobian: FloatArray
+    initial: FloatArray
+    gradient: FloatArray
+    hessian: FloatArray
+
+
+class Condensed:
+    """Quadratic programme in the changes of all inputs and then of all slacks: (K inputs + K slacks,).
+
+    Attributes
+    ----------
+    hessian, gradient
+        Of the objective; the Hessian is that of the inputs (K * 2, K * 2), as it is: it need not be convex.
+    slack_hessian, slack_gradient
+        Of the slacks, (K * 2,) each: nothing couples them.
+    rows, offsets
+        Inequalities of a stage (moves, grade, level; K * 6) by inputs and slacks, and their values at no change.
+    """
+
+    def __init__(self, layout: Layout, at: Linearised) -> None:
+        self.layout, self.at = layout, at
+        self._eliminate_points()
+        self._eliminate_states()
+        self._write()
+
+    def _eliminate_points(self) -> None:
+        """Points by state, inputs and slacks: dw = T (dx, du, ds) + t."""
+        layout, at = self.layout, self.at
+        nx, points = layout.state_size, layout.points
+        equations = at.jacobian[:, nx : nx + layout.block - points]
+        self.inverse = np.linalg.inv(equations[:, :, points:])
+        k, size = layout.horizon, points
+        self.t = np.zeros((k, layout.block))
+        self.t[:, points:] = -_times(self.inverse, at.constraints[:, nx : nx + layout.block - points])
+        self.T = np.zeros((k, layout.block, size))
+        self.T[:, :size] = np.eye(size)
+        self.T[:, points:] = -self.inverse @ equations[:, :, :points]
+
+    def _eliminate_states(self) -> None:
+        """States at the begin of each stage by all inputs: dx = X du + xi."""
+        layout, at = self.layout, self.at
+        nx, horizon = layout.state_size, layout.horizon
+        gap = at.jacobian[:, :nx]
+        moved = -gap @ self.T
+        b = -at.constraints[:, :nx] - _times(gap, self.t)
+        self.X, self.xi = np.zeros((horizon, nx, horizon * INPUTS)), np.zeros((horizon, nx))
+        self.xi[0] = -at.initial
+        for k in range(horizon - 1):
+            self.X[k + 1] = moved[k, :, :nx] @ self.X[k]
+            self.X[k + 1, :, k * INPUTS : (k + 1) * INPUTS] += moved[k, :, nx : nx + INPUTS]
+            self.xi[k + 1] = moved[k, :, :nx] @ self.xi[k] + b[k]
+
+    def _write(self) -> None:
+        layout, at = self.layout, self.at
+        nx, horizon = layout.state_size, layout.horizon
+        free = horizon * INPUTS
+        chosen = nx + INPUTS
+        T, t = self.T[:, :, :chosen], self.t + _times(self.T[:, :, :nx], self.xi)
+        choice = np.zeros((horizon, chosen, free))
+        choice[:, :nx] = self.X
+        for k in range(horizon):
+            choice[k, nx:, k * INPUTS : (k + 1) * INPUTS] = np.eye(INPUTS)
+        self.Y, self.y = T @ choice, t  # dw = Y du + y, but for the slacks
+        tall = self.Y.reshape(-1, free)
+        self.hessian = tall.T @ (at.hessian @ self.Y).reshape(-1, free)
+        self.gradient = tall.T @ (at.gradient + _times(at.hessian, self.y)).ravel()
+        slack = slice(chosen, chosen + SLACKS)
+        self.slack_gradient = at.gradient[:, slack].ravel()
+        self.slack_hessian = np.diagonal(at.hessian[:, slack, slack], axis1=1, axis2=2).ravel()
+        kept = slice(nx + layout.block - layout.points, None)
+        inequalities = at.jacobian[:, kept]
+        self.offsets = (at.constraints[:, kept] + _times(inequalities, self.y)).ravel()
+        of_slacks = np.zeros((horizon, inequalities.shape[1], horizon * SLACKS))
+        for k in range(horizon):
+            of_slacks[k, :, k * SLACKS : (k + 1) * SLACKS] = inequalities[k, :, slack]
+        self.rows = np.concatenate([inequalities @ self.Y, of_slacks], axis=2).reshape(-1, horizon * (INPUTS + SLACKS))
+
+    def change(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Changes of the stages (K, block) and of the last state (state_size,) from a solution of the programme."""
+        layout, at = self.layout, self.at
+        inputs, slacks = np.split(solution, [layout.horizon * INPUTS])
+        dw = self.Y @ inputs + self.y
+        begin = layout.state_size + INPUTS
+        dw[:, begin : begin + SLACKS] = slacks.reshape(-1, SLACKS)
+        last = -at.constraints[-1, : layout.state_size] - at.jacobian[-1, : layout.state_size] @ dw[-1]
+        return dw, last
+
+    def multipliers(self, dw: FloatArray, of_rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Multipliers of the stages' rows (K, m) and of the initial condition (state_size,), from the last stage on.
+
+        Each makes the Lagrangian stationary in the variable that its equation was used to eliminate.
+        """
+        layout, at = self.layout, self.at
+        nx, points, horizon = layout.state_size, layout.points, layout.horizon
+        count = layout.block - points
+        found = np.zeros_like(at.constraints)
+        found[:, nx + count :] = of_rows.reshape(horizon, -1)
+        slope = at.gradient + _times(at.hessian, dw) + _times(at.jacobian.transpose(0, 2, 1), found)
+        next_x = np.zeros(nx)
+        for k in reversed(range(horizon)):
+            found[k, :nx] = -next_x
+            slope[k] += at.jacobian[k, :nx].T @ found[k, :nx]
+            found[k, nx : nx + count] = -self.inverse[k].T @ slope[k, points:]
+            next_x = slope[k, :nx] + at.jacobian[k, nx : nx + count, :nx].T @ found[k, nx : nx + count]
+        return found, -next_x
+
+
+def _times(matrices: Any, vectors: FloatArray) -> FloatArray:
+    """Matrices (K, a, b) times vectors (K, b)."""
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])

@@ -1,0 +1,143 @@
+"""NLP solvers by name: real-time iterations (`real_time_iteration.py`), and interior-point methods of CasADi.
+
+These are warm started from the plan of the move before. Both follow the central path only down to a small barrier
+parameter and stop there. What is left of the barrier costs less than 1e-5 of the objective and keeps the next start
+well inside the feasible set: ipopt, which takes the multipliers of the move before, needs 6 iterations instead of 14;
+fatrop, which can not take them, 6 instead of 20.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.derivatives import Assembled
+from controllers.economic_mpc.layout import Multipliers
+from controllers.economic_mpc.real_time_iteration import RealTimeIteration
+from controllers.economic_mpc.verification import Solution, Solver, Verifier, no_solution
+
+BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
+"""Barrier parameter in units of the objective (see `VALUE_SCALE` of the controller). A larger one for fatrop would
+save an iteration, but then plans are not exact enough to tell what a dip of the air flow costs (`probing.py`)."""
+SOLVERS = ("ipopt", "fatrop", "rti")
+
+
+def make_solver(problem: Problem, name: str, budget_s: float) -> Solver:
+    """Build a solver by its name.
+
+    Raises
+    ------
+    ModelError
+        Unknown solver.
+    """
+    if name not in SOLVERS:
+        raise ModelError(f"economic_mpc: unknown solver {name!r}; {near_match(name, SOLVERS)}")
+    if name == "rti":
+        return RealTimeIteration(problem, InteriorPoint(problem, "fatrop", budget_s))
+    return InteriorPoint(problem, name, budget_s)
+
+
+class InteriorPoint:
+    """One solver for one problem, built once; estimates, prices and bounds are arguments of every call.
+
+    Parameters
+    ----------
+    problem
+        The NLP.
+    name
+        `ipopt` or `fatrop` (exploits the stage structure).
+    budget_s
+        Wall-clock time after which ipopt stops (soft: ipopt checks it between iterations; fatrop counts iterations).
+    """
+
+    def __init__(self, problem: Problem, name: str, budget_s: float) -> None:
+        self.problem = problem
+        self.name = name
+        options = _ipopt(budget_s) if name == "ipopt" else _fatrop(problem)
+        common: dict[str, Any] = {
+            "cache": Assembled(problem).functions(name),
+            "print_time": False,
+            "error_on_fail": False,
+        }
+        # called through its buffers: a plain call converts every argument, and allocates
+        self._solve = FastCall(ca.nlpsol("economic_mpc", name, problem.nlp, {**common, **options}))
+        self._verify = Verifier(problem)
+
+    def __call__(
+        self,
+        arguments: FloatArray,
+        bounds: dict[str, FloatArray],
+        start: FloatArray,
+        multipliers: Multipliers | None = None,
+    ) -> Solution:
+        """Solve from a start (n,), warm if multipliers are given. Never raises: a failure is a verdict."""
+        m = len(bounds["lbg"])
+        if not (np.isfinite(arguments).all() and np.isfinite(start).all()):  # fatrop would not come back from a NaN
+            return no_solution(len(start), m, "state or estimate is not finite")
+        lam_x, lam_g = (np.zeros(len(start)), np.zeros(m)) if multipliers is None else multipliers
+        begin = time.perf_counter()
+        x, _, _, lam_x, lam_g, _ = self._solve(
+            start, arguments, bounds["lbx"], bounds["ubx"], bounds["lbg"], bounds["ubg"], lam_x, lam_g
+        )
+        seconds = time.perf_counter() - begin
+        verdict, message = self._verify(x, arguments, bounds)
+        iterations = int(self._solve.stats().get("iter_count", 0))
+        return Solution(x, (lam_x, lam_g), verdict, message, iterations, seconds, self.name)
+
+
+class FailingSolver:
+    """Never finds a solution: for drills."""
+
+    def __call__(
+        self,
+        arguments: FloatArray,
+        bounds: dict[str, FloatArray],
+        start: FloatArray,
+        multipliers: Multipliers | None = None,
+    ) -> Solution:
+        """Fail; see `Solver`."""
+        del arguments, multipliers
+        return no_solution(len(start), len(bounds["lbg"]), "the solver was made to fail")
+
+
+def _fatrop(problem: Problem) -> dict[str, Any]:
+    return {
+        "structure_detection": "auto",
+        "equality": problem.equality,
+        "fatrop.print_level": 0,
+        "fatrop.tol": 50 * BARRIER["fatrop"],  # what is left of the barrier counts as an error
+        "fatrop.compl_inf_tol": 1.0,
+        "fatrop.barrier_tol_factor": 9.0,
+        "fatrop.mu_init": BARRIER["fatrop"],
+        "fatrop.bound_push": 1e-3,
+        "fatrop.bound_frac": 1e-3,
+        "fatrop.lam_max": 1e8,
+        "fatrop.max_iter": 100,
+    }
+
+
+def _ipopt(budget_s: float) -> dict[str, Any]:
+    push = {f"ipopt.warm_start_{what}": 1e-6 for what in ("bound_push", "bound_frac", "mult_bound_push")}
+    slack = {f"ipopt.warm_start_slack_{what}": 1e-6 for what in ("bound_push", "bound_frac")}
+    return {
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.tol": 1e-5,
+        "ipopt.mu_init": BARRIER["ipopt"],
+        "ipopt.mu_target": BARRIER["ipopt"],
+        "ipopt.warm_start_init_point": "yes",
+        "ipopt.max_wall_time": budget_s,
+        # the problem comes scaled: what MUMPS does to scale it again takes an eighth of the time
+        "ipopt.mumps_permuting_scaling": 0,
+        "ipopt.mumps_scaling": 0,
+        "ipopt.min_refinement_steps": 0,
+        **push,
+        **slack,
+    }
