@@ -10,7 +10,7 @@ import pytest
 from adaptive_flot import console
 from adaptive_flot.runner.commands.run_files import write_json
 from tests.cli.conftest import Call, WriteScenario
-from tests.runner.test_runs_table import closed_loop_summary
+from tests.runner.commands.test_runs_table import closed_loop_summary
 
 
 def test_what_run_wrote_is_compared(call: Call, scenario: WriteScenario, tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ import yaml
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.resources import cell_file
 from tests.cli.conftest import Call, WriteTable
+from tests.runner.loop.test_plugins import MODEL
 from tests.runner.records import TRUTH, PlantRecord
-from tests.runner.test_plugins import MODEL
 
 
 def test_it_writes_summary_tables_and_report(call: Call, table: WriteTable, tmp_path: Path) -> None:

@@ -18,8 +18,8 @@ from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
 from adaptive_flot.runner.scenario.scenario import load_scenario
+from tests.runner.adaptation.test_discovery_in_the_loop import CLOSED, GROWTH, OPTIONS
 from tests.runner.conftest import edited
-from tests.runner.test_discovery_in_the_loop import CLOSED, GROWTH, OPTIONS
 
 
 def test_a_move_is_held_against_what_came_at_its_end() -> None:

@@ -10,9 +10,8 @@ from adaptive_flot.files import write_text
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.compare.tables import MANY_SEEDS, compare_tables, overview_table, spread_text
 from adaptive_flot.report.kit import distributions
-from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, render
+from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, render, seed_list
 from adaptive_flot.report.kit.plotdata import Role, Spread
-from adaptive_flot.report.run.tables import seed_list
 from adaptive_flot.runner.commands.comparison import ORACLE, Comparison, seeds_of
 
 SPREADS = (("recovery", "recovery [–]", 1.0), ("below_limit", "below limit [% of time]", 100.0))

@@ -111,6 +111,20 @@ def number(value: float, form: str = ".2f") -> str:
     return text.lstrip("-") if zero else text.replace("-", MINUS)
 
 
+def seed_list(seeds: Iterable[int]) -> str:
+    """Name seeds briefly.
+
+    >>> seed_list([1, 2, 3]), seed_list([4, 9]), seed_list([1])
+    ('3 seeds (1–3)', '2 seeds (4, 9)', 'seed 1')
+    """
+    found = list(seeds)
+    if len(found) == 1:
+        return f"seed {found[0]}"
+    runs_on = len(found) > 2 and found == list(range(found[0], found[0] + len(found)))
+    inside = f"{found[0]}–{found[-1]}" if runs_on else ", ".join(map(str, found))
+    return f"{len(found)} seeds ({inside})"
+
+
 @cache
 def _environment() -> jinja2.Environment:
     return jinja2.Environment(

@@ -12,10 +12,9 @@ from adaptive_flot.contracts.batch import INSEPARABLE, WELL_IDENTIFIED
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit import figures
-from adaptive_flot.report.kit.page import Album, Picture, Table, number
+from adaptive_flot.report.kit.page import Album, Picture, Table, number, seed_list
 from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 from adaptive_flot.report.run.series import Case
-from adaptive_flot.report.run.tables import seed_list
 from adaptive_flot.runner.commands.run import Run
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from adaptive_flot.files import write_text
 from adaptive_flot.report.compare import page as compare
 from adaptive_flot.report.kit import distributions, figures
-from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, render
+from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, render, seed_list
 from adaptive_flot.report.kit.plotdata import Panel
 from adaptive_flot.report.run import series, tables
 from adaptive_flot.report.run.closed_loop_figures import Sections, closed_loop_sections
@@ -102,7 +102,7 @@ def _lead(cases: Sequence[Case]) -> str:
 
 
 def _made(cases: Sequence[Case]) -> list[tuple[str, str]]:
-    seeds = {case.scenario.path.name: tables.seed_list(case.seeds) for case in cases}
+    seeds = {case.scenario.path.name: seed_list(case.seeds) for case in cases}
     return [(f"Seeds of {name}", text) for name, text in seeds.items()]
 
 

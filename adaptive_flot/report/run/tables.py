@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from adaptive_flot.contracts import Status
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit.figures import p_text
-from adaptive_flot.report.kit.page import Table, number
+from adaptive_flot.report.kit.page import Table, number, seed_list
 from adaptive_flot.report.kit.plotdata import Role
 from adaptive_flot.report.kit.style import exponent, unit_text
 from adaptive_flot.report.run.series import Case, residuals
@@ -160,20 +158,6 @@ def coverage(case: Case, run: Run, label: str) -> float:
 def seeds_text(case: Case) -> str:
     """Name the seeds of a case: "20 seeds (1–20)", "seed 1"."""
     return seed_list(case.seeds)
-
-
-def seed_list(seeds: Iterable[int]) -> str:
-    """Name seeds briefly.
-
-    >>> seed_list([1, 2, 3]), seed_list([4, 9]), seed_list([1])
-    ('3 seeds (1–3)', '2 seeds (4, 9)', 'seed 1')
-    """
-    found = list(seeds)
-    if len(found) == 1:
-        return f"seed {found[0]}"
-    runs_on = len(found) > 2 and found == list(range(found[0], found[0] + len(found)))
-    inside = f"{found[0]}–{found[-1]}" if runs_on else ", ".join(map(str, found))
-    return f"{len(found)} seeds ({inside})"
 
 
 def _range(values: FloatArray) -> str:
