@@ -7,14 +7,12 @@ and back to the reservoir. Levels are in volts of an uncalibrated sensor; only t
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import numeric_column, read_table
+from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 
@@ -85,7 +83,7 @@ def _equations(m: Scope) -> None:
     m.output("level", m.site("level_sensor", lower, "sensor", "offset", unit="V"))
 
 
-def read_benchmark(path: Path | str) -> tuple[Dataset, Dataset]:
+def read_benchmark(path: Source) -> tuple[Dataset, Dataset]:
     """Read the published file: estimation record (uEst, yEst) and validation record (uVal, yVal).
 
     The file samples input and output at the same instant and holds the input *after* it; a `Dataset` wants the input
@@ -96,8 +94,7 @@ def read_benchmark(path: Path | str) -> tuple[Dataset, Dataset]:
     DataError
         A column or the sampling interval is missing, or a cell is empty.
     """
-    file = Path(path)
-    table = read_table(file)
+    file, table = named(path), read_table(path)
     missing = [c for c in BENCHMARK_COLUMNS if c not in table.columns]
     if missing:
         raise DataError(f"{file}: column {missing[0]!r} is missing; the cascaded-tanks file has {BENCHMARK_COLUMNS}")

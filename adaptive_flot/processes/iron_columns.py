@@ -8,7 +8,6 @@ amine that covers it; iron oxide, depressed by starch, sinks to the concentrate.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -16,7 +15,7 @@ import pandas as pd
 
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import numeric_column, read_table
+from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 
@@ -139,7 +138,7 @@ def _equations(m: Scope) -> None:
         m.output(name, m.site(f"{name}_assay", m.state(name), "sensor", "offset"))
 
 
-def read_record(path: Path | str) -> Dataset:
+def read_record(path: Source) -> Dataset:
     """Read `hourly.csv` from FIRST_HOUR on; concentrate assays that are held for HELD_HOURS or more are missing.
 
     Row k holds the means of the hour that ends at its time.
@@ -149,8 +148,7 @@ def read_record(path: Path | str) -> Dataset:
     DataError
         A column is missing, an input is empty, or an hour.
     """
-    file = Path(path)
-    table = read_table(file)
+    file, table = named(path), read_table(path)
     if "hour" not in table.columns:
         raise DataError(f"{file}: column 'hour' is missing; give the hourly table of the mining plant")
     hour = pd.to_datetime(table["hour"], errors="coerce")

@@ -7,14 +7,12 @@ the level loop are not recorded.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import numeric_column, read_table
+from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 
@@ -90,7 +88,7 @@ def _equations(m: Scope) -> None:
     m.output("level", m.site("level_sensor", level, "sensor", "offset"))
 
 
-def read_record(path: Path | str) -> Dataset:
+def read_record(path: Source) -> Dataset:
     """Read the published file: its longest stretch without a gap, on its mean sampling interval (30.5 s).
 
     Raises
@@ -98,8 +96,7 @@ def read_record(path: Path | str) -> Dataset:
     DataError
         A column is missing, or a time can not be read.
     """
-    file = Path(path)
-    table = read_table(file)
+    file, table = named(path), read_table(path)
     missing = [c for c in (TIME, *COLUMNS.values()) if c not in table.columns]
     if missing:
         wanted = ", ".join((TIME, *COLUMNS.values()))

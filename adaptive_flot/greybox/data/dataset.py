@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
-from adaptive_flot.greybox.data.tables import line, numeric_column, read_table
+from adaptive_flot.greybox.data.tables import Source, line, named, numeric_column, read_table
 from adaptive_flot.greybox.model import FloatArray, Model
 
 TIME_COLUMN = "time_s"
@@ -71,13 +71,13 @@ class Dataset:
         return tuple(q.name for q, y in zip(model.outputs, self.outputs.T, strict=True) if np.isfinite(y).any())
 
 
-def read_dataset(path: Path | str, model: Model, *, required_outputs: Sequence[str] = ()) -> Dataset:
+def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] = ()) -> Dataset:
     """Read a table whose columns carry the model's column names (see `Quantity.column`) and `time_s`.
 
     Parameters
     ----------
     path
-        CSV or Parquet file.
+        CSV or Parquet file, or a table with these columns.
     model
         Names, units and ranges. Inputs are needed; outputs and parameters are used where present.
     required_outputs
@@ -90,8 +90,7 @@ def read_dataset(path: Path | str, model: Model, *, required_outputs: Sequence[s
     RangeError
         An input outside the model's physical range.
     """
-    file = Path(path)
-    table = read_table(file)
+    file, table = named(path), read_table(path)
     columns = [str(c) for c in table.columns]
     time = numeric_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
     dt = _interval(table, time, file)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -16,15 +17,28 @@ FIRST_LINE = 2
 """Line of a CSV file that holds row 0: messages count lines as an editor does."""
 
 
-def read_table(path: Path | str) -> pd.DataFrame:
+Source: TypeAlias = Path | str | pd.DataFrame
+"""Where a table comes from: a file, or a table at hand."""
+
+
+def named(source: Source) -> Path:
+    """What messages call a table: its file, or `DataFrame` for a table at hand."""
+    return Path("DataFrame") if isinstance(source, pd.DataFrame) else Path(source)
+
+
+def read_table(source: Source) -> pd.DataFrame:
     """Read a table with a header line. Blank lines and empty last columns are dropped; the index keeps the row numbers.
+
+    Rows of a table at hand are counted as lines of the CSV file that it would make.
 
     Raises
     ------
     DataError
         No such file, empty, not a table, rows longer than the header, or no rows.
     """
-    file = Path(path)
+    file = named(source)
+    if isinstance(source, pd.DataFrame):
+        return _with_rows(source.reset_index(drop=source.index.name is None), file)
     if not file.is_file():
         raise DataError(f"{file}: no such file; give the path of a CSV or Parquet table")
     if file.stat().st_size == 0:
@@ -35,6 +49,10 @@ def read_table(path: Path | str) -> pd.DataFrame:
         raise DataError(f"{file}: a row is longer than the header (a decimal comma?); correct it") from error
     except (ValueError, OSError, pd.errors.ParserError) as error:
         raise DataError(f"{file}: not a readable table ({str(error).splitlines()[0]}); give CSV or Parquet") from error
+    return _with_rows(table, file)
+
+
+def _with_rows(table: pd.DataFrame, file: Path) -> pd.DataFrame:
     table = table.dropna(how="all")
     table = table.loc[:, [c for c in table.columns if not (str(c).startswith("Unnamed") and table[c].isna().all())]]
     if len(table.columns) == 0 or not str(table.columns[0]).isprintable():

@@ -8,6 +8,7 @@ from pathlib import Path
 from adaptive_flot.discovery.discover import Discovery, discover
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
+from adaptive_flot.greybox.data.tables import Source
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes import iron_columns, zinc_level
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
@@ -15,7 +16,7 @@ from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
 
 
-def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
+def read_records(path: Source, model: Model) -> tuple[Dataset, Dataset | None]:
     """Read the record to search and, from the published file of the tanks benchmark, the one that only reports.
 
     The published files of the tanks, the zinc cell and the iron columns are read as they are; else see `read_dataset`.
@@ -34,7 +35,7 @@ def read_records(path: Path, model: Model) -> tuple[Dataset, Dataset | None]:
 
 
 def discover_file(
-    path: Path,
+    path: Source,
     model: Model,
     *,
     limits: Mapping[str, tuple[float, float]] | None = None,
@@ -46,7 +47,7 @@ def discover_file(
     Parameters
     ----------
     path
-        CSV or Parquet file.
+        CSV or Parquet file, or a table.
     model
         The model, with sites.
     limits

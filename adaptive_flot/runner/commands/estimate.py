@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,12 +16,14 @@ from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.errors import DataError, ModelError, PluginError, near_match
 from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
+from adaptive_flot.greybox.data.tables import Source, named
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.runner.loop.loop import run_loop
 from adaptive_flot.runner.plants.plant import ReplayPlant
+from adaptive_flot.runner.scenario.keys import Plugin
 
 WHITENESS_LAGS = 20
 
@@ -101,7 +103,7 @@ class RecordEstimate:
     replays: tuple[Replay, ...]
 
 
-def read_blocks(path: Path, model: Model, fit_share: float) -> Blocks:
+def read_blocks(path: Source, model: Model, fit_share: float) -> Blocks:
     """Read a record and cut it into fit and test block.
 
     The cascaded-tanks benchmark brings its two records; any other table is cut in time at `fit_share`.
@@ -113,21 +115,21 @@ def read_blocks(path: Path, model: Model, fit_share: float) -> Blocks:
     """
     if model.name == "cascaded-tanks":
         estimation, validation = read_benchmark(path)
-        return Blocks(path.stem, estimation, validation, continues=False)
+        return Blocks(estimation.name.partition(":")[0], estimation, validation, continues=False)
     required = (model.outputs[0].name,)
     record = read_dataset(path, model, required_outputs=required)
     cut = round(fit_share * len(record))
     if not 2 <= cut <= len(record) - 2:
-        raise DataError(f"{path}: {len(record)} rows can not be cut at {fit_share:g}; give a longer record")
+        raise DataError(f"{named(path)}: {len(record)} rows can not be cut at {fit_share:g}; give a longer record")
     # the test block starts at the last row of the fit block: that is its initial instant
-    return Blocks(path.stem, record.rows(0, cut), record.rows(cut - 1), continues=True)
+    return Blocks(record.name, record.rows(0, cut), record.rows(cut - 1), continues=True)
 
 
 def estimate_record(
     blocks: Blocks,
     model: Model,
     *,
-    estimators: Sequence[str] = ("fixed", "rpem", "pem"),
+    estimators: Sequence[str] | Mapping[str, Plugin] = ("fixed", "rpem", "pem"),
     fit: Sequence[str] = (),
     outputs: Sequence[str] = (),
     folder: Path | None = None,
@@ -142,8 +144,9 @@ def estimate_record(
     model
         The model; its parameter values are the nominal ones.
     estimators
-        Shipped names, `pem` for the batch fit held fixed, or `my_file:MyEstimator`. All start at the fitted initial
-        state: `fixed` with the nominal parameters, the others with the batch fit of the fit block.
+        Shipped names, `pem` for the batch fit held fixed, or `my_file:MyEstimator`; or plug-ins by the name to show.
+        All start at the fitted initial state: `fixed` with the nominal parameters, the others with the batch fit of
+        the fit block.
     fit
         Parameters to estimate; default those with the role "estimated".
     outputs
@@ -161,7 +164,7 @@ def estimate_record(
     names = model.expand_parameters(fit) if fit else tuple(p.name for p in model.parameters if p.role == "estimated")
     if not names:
         raise ModelError(f"model '{model.name}' has no parameter with the role 'estimated'; name them with --fit")
-    _check_estimators(estimators)
+    plugins = _plugins(estimators)
     driving = tuple(outputs) or blocks.fit.measured(model)
     model.indices("outputs", driving)
     unmeasured = [o for o in driving if o not in blocks.fit.measured(model)]
@@ -172,24 +175,26 @@ def estimate_record(
     batch: BatchFit = construct(factory, "pem", "batch estimator", setup, initial_state="estimated").fit(blocks.fit)
     progress()
     replays = []
-    for name in estimators:
-        replays.append(_replay(name, setup, blocks, batch, folder))
+    for name, plugin in plugins.items():
+        replays.append(_replay(name, plugin, setup, blocks, batch, folder))
         progress()
     return RecordEstimate(blocks, setup, batch, tuple(replays))
 
 
-def _check_estimators(names: Sequence[str]) -> None:
+def _plugins(given: Sequence[str] | Mapping[str, Plugin]) -> dict[str, Plugin]:
+    if isinstance(given, Mapping):
+        return dict(given)
     known = {**ESTIMATORS, **BATCH_ESTIMATORS}
-    for name in names:
+    for name in given:
         if name not in known and ":" not in name:
             raise PluginError(f"unknown estimator {name!r}; {near_match(name, known)}")
+    return {name: Plugin(use=name) for name in given}
 
 
-def _replay(name: str, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Path | None) -> Replay:
-    use = "fixed" if name in BATCH_ESTIMATORS else name
-    factory = load(use, ESTIMATORS, "estimator", folder)
-    estimator = construct(factory, use, "estimator", setup)
-    prior = _start(name, setup, blocks, batch)
+def _replay(name: str, plugin: Plugin, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Path | None) -> Replay:
+    held = plugin.use in BATCH_ESTIMATORS
+    estimator = (Plugin(use="fixed") if held else plugin).make(setup, ESTIMATORS, "estimator", folder)
+    prior = _start(plugin.use, setup, blocks, batch)
 
     first = _run(blocks.fit, estimator, setup, prior)
     end = first.end(prior.noise_std)
@@ -202,7 +207,7 @@ def _replay(name: str, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Pa
     x_free = simulator.last_state(blocks.fit, batch.initial_state, p) if blocks.continues else batch.initial_state
     free_test = simulator.outputs(blocks.test, x_free, p)
 
-    known = batch.covariance if name in BATCH_ESTIMATORS else None  # held parameters keep what the fit knew of them
+    known = batch.covariance if held else None  # held parameters keep what the fit knew of them
     tables = [
         _table("fit", setup, blocks.fit, first, free_fit, known),
         _table("test", setup, blocks.test, second, free_test, known).iloc[1 if blocks.continues else 0 :],
@@ -218,10 +223,10 @@ def _replay(name: str, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Pa
     )
 
 
-def _start(name: str, setup: Setup, blocks: Blocks, batch: BatchFit) -> Prior:
+def _start(use: str, setup: Setup, blocks: Blocks, batch: BatchFit) -> Prior:
     """`fixed` holds the nominal parameters; the others start from the batch fit, as the paper's RPEM does."""
     values = batch.values()
-    if name == "fixed":
+    if use == "fixed":
         values = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     return Prior(float(blocks.fit.time[0]), batch.initial_state, values, batch.covariance, batch.noise_std)
 

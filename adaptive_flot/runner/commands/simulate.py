@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset, read_dataset
+from adaptive_flot.greybox.data.tables import Source
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 
-def simulate_file(path: Path, model: Model, *, accurate: bool = False) -> pd.DataFrame:
+def simulate_file(path: Source, model: Model, *, accurate: bool = False) -> pd.DataFrame:
     """Simulate the inputs of a table; see `simulate_record`.
 
     Raises

@@ -69,9 +69,7 @@ class Prepared:
 
     def estimator_for(self, name: str, setup: Setup) -> AnyEstimator:
         """A new estimator of that name for another setup."""
-        use, options = self.estimators[name].use, self.estimators[name].options
-        factory = load(use, ESTIMATORS, "estimator", self.scenario.path.parent)
-        made = construct(factory, use, "estimator", setup, **options)
+        made = self.estimators[name].make(setup, ESTIMATORS, "estimator", self.scenario.path.parent)
         return taking_late_values(made, self.scenario.longest_dead_time)
 
     def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
@@ -82,12 +80,9 @@ class Prepared:
 
     def controller_for(self, name: str, seed: int, told: Setup) -> AnyController:
         """A controller of that name for the run of a seed and an estimator with that setup."""
-        use, options = self.controllers[name].use, self.controllers[name].options
         s = self.scenario
         setup = ControllerSetup(told.model, s.dt, s.plan(seed), told.parameters, s.limits, s.prices)
-        made: AnyController = construct(
-            load(use, CONTROLLERS, "controller", s.path.parent), use, "controller", setup, **options
-        )
+        made: AnyController = self.controllers[name].make(setup, CONTROLLERS, "controller", s.path.parent)
         return made
 
     @cached_property

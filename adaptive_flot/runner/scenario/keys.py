@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
 from adaptive_flot.economics import Prices
+from adaptive_flot.plugins import construct, load
 from adaptive_flot.processes.effect_entry import EffectEntry
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.faults import Fault
@@ -73,6 +76,32 @@ class Plugin(_Part):
     use: str
     options: dict[str, Any] = Field(default_factory=dict)
     start: Literal["initial_estimate", "nominal"] = "initial_estimate"
+    _factory: Callable[..., Any] | None = PrivateAttr(default=None)
+
+    @classmethod
+    def of(cls, factory: Callable[..., Any], options: Mapping[str, Any]) -> Plugin:
+        """A class (or a function that makes one) given in Python, where a file would give an address."""
+        plugin = cls(use=getattr(factory, "__name__", type(factory).__name__), options=dict(options))
+        plugin._factory = factory
+        return plugin
+
+    def make(self, setup: object, shipped: Mapping[str, str], what: str, folder: Path | None = None) -> Any:
+        """Construct it.
+
+        Parameters
+        ----------
+        setup
+            First argument of the constructor; the options follow.
+        shipped, what, folder
+            As for `adaptive_flot.plugins.load`.
+
+        Raises
+        ------
+        PluginError
+            It can not be loaded, or does not take the options.
+        """
+        factory = self._factory or load(self.use, shipped, what, folder)
+        return construct(factory, self.use, what, setup, **self.options)
 
 
 class LimitsPart(_Part):

@@ -249,3 +249,17 @@ def test_rows_longer_than_the_header_are_refused(write: Write) -> None:
 def test_line_number_counts_blank_lines(write: Write) -> None:
     with pytest.raises(DataError, match="line 5"):
         read_dataset(write(HEADER, ROWS[0], "", ROWS[1], "4,0.3,high,0.3"), TANK)
+
+
+def test_a_table_at_hand_is_read_like_its_file(tmp_path: Path) -> None:
+    """A notebook has a DataFrame, with or without the time as its index: same record, same words on a mistake."""
+    (tmp_path / "record.csv").write_text("\n".join((HEADER, *ROWS)))
+    table = pd.read_csv(tmp_path / "record.csv")
+    from_file = read_dataset(tmp_path / "record.csv", TANK)
+    for source in (table, table.set_index("time_s"), table.set_axis([7, 8, 9, 10])):
+        record = read_dataset(source, TANK)
+        np.testing.assert_array_equal(record.time, from_file.time)
+        np.testing.assert_array_equal(record.inputs, from_file.inputs)
+        np.testing.assert_array_equal(record.outputs, from_file.outputs)
+    with pytest.raises(DataError, match=r"^DataFrame: column 'inflow_m3_s' is missing"):
+        read_dataset(table.drop(columns="inflow_m3_s"), TANK)

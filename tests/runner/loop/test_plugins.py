@@ -15,6 +15,7 @@ from adaptive_flot.plugins import ESTIMATORS, load
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
 from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.scenario import load_scenario
 from tests.estimators import toys
 from tests.runner.conftest import WriteScenario
@@ -178,3 +179,28 @@ def test_what_is_no_model_is_one_line(tmp_path: Path, write_module: WriteModule,
     with pytest.raises(PluginError) as caught:
         make_model(name, folder=tmp_path)
     assert says in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_class_given_in_python_estimates_like_the_same_class_by_name(tmp_path: Path) -> None:
+    """A notebook has its estimator as a class with options, and nowhere a file of it."""
+    (tmp_path / "tanks.csv").write_text(_tanks())
+    model = make_model("cascaded-tanks")
+    blocks = read_blocks(tmp_path / "tanks.csv", model, 0.6)
+
+    class Mine(load("rpem", ESTIMATORS, "estimator")):  # type: ignore[misc]
+        """A class that no address can reach."""
+
+    options = {"forgetting": 0.9}
+    plugins = {"by name": Plugin(use="rpem", options=options), "given": Plugin.of(Mine, options)}
+    plugins["default"] = Plugin(use="rpem")
+    by_name, given, default = (r.table for r in estimate_record(blocks, model, estimators=plugins).replays)
+    pd.testing.assert_frame_equal(by_name, given)
+    assert not by_name.equals(default), "the options must reach the constructor"
+    with pytest.raises(PluginError, match="'Mine' can not be made with frogetting=1"):
+        estimate_record(blocks, model, estimators={"x": Plugin.of(Mine, {"frogetting": 1})})
+
+
+def _tanks() -> str:
+    rng = np.random.default_rng(1)
+    rows = (f"{u:.4f},{u:.4f},{y:.4f},{y:.4f},4" for u, y in rng.uniform((2, 4), (4, 6), (60, 2)))
+    return "\n".join(("uEst,uVal,yEst,yVal,Ts", *rows))
