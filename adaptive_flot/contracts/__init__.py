@@ -16,7 +16,7 @@ track                 Estimates over a whole record, as arrays.
 batch                 The contract of a fit to a whole record at once, and what it returns.
 controller            `ControllerSetup`, `Limits`, `Plan`, `Decision` and the contract `Controller`.
 plant                 `PlantRecord` and the contract `Plant`.
-delayed_measurements  Values that arrive late, put where they belong, for any estimator.
+delayed_measurements  Delayed values put where they belong, for any estimator.
 """
 
 from adaptive_flot.contracts.controller import (
@@ -30,7 +30,7 @@ from adaptive_flot.contracts.controller import (
 )
 from adaptive_flot.contracts.estimator import AnyEstimator, Estimate, Estimator, Prior, Setup, full_parameters
 from adaptive_flot.contracts.plant import AnyPlant, Plant, PlantRecord
-from adaptive_flot.contracts.sample import LateValue, Sample
+from adaptive_flot.contracts.sample import DelayedValue, Sample
 from adaptive_flot.contracts.status import Status
 
 __all__ = [
@@ -40,9 +40,9 @@ __all__ = [
     "Controller",
     "ControllerSetup",
     "Decision",
+    "DelayedValue",
     "Estimate",
     "Estimator",
-    "LateValue",
     "Limits",
     "Plan",
     "Plant",

@@ -1,4 +1,7 @@
-"""Late measurements for any estimator: a late value is put where it belongs, and the samples since are taken again."""
+"""Delayed measurements for any estimator.
+
+A delayed value is put into the sample at whose time it was taken; the samples since then are taken again.
+"""
 
 from __future__ import annotations
 
@@ -7,29 +10,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from adaptive_flot.contracts import AnyEstimator, Estimate, LateValue, Prior, Sample, Setup, Status
+from adaptive_flot.contracts import AnyEstimator, DelayedValue, Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError
 
 
 @dataclass(frozen=True)
-class LateState:
+class DelayedState:
     """The estimator's own state now, and the state before each of the last samples with that sample, oldest first."""
 
     inner: Any
     history: tuple[tuple[Any, Sample], ...]
 
 
-class LateValues:
-    """An estimator that also takes late values, built around one that does not.
+class DelayedMeasurements:
+    """An estimator that also takes delayed values, built around one that does not.
 
-    After a late value the estimate is the one that the same value would have given in time, to the bit: the state from
-    before its sample is kept, the value is put into that sample, and the samples since then are taken again. That
-    costs as many updates as the value is late; any other sample costs the estimator's own update and one entry of
-    the history, which never grows beyond the window.
+    After a delayed value the estimate is the one that the same value in time would have given, to the bit. The state
+    from before its sample is kept. The value is put into that sample, and the samples since then are taken again.
+    That costs one update for each sample of the delay. Any other sample costs the estimator's own update and one entry
+    of the history, which never grows beyond the window.
 
-    A value belongs to the sample nearest to its time. Where that sample already has a value of this output, the late
-    one replaces it. A value without a sample (older than the window, from before the start, in the future) is
-    refused, and the status says so.
+    A value belongs to the sample nearest to its time. Where that sample already has a value of this output,
+    the delayed one replaces it. A value without a sample is refused, and the status says so: it is older than the
+    window, from before the start, or in the future.
 
     Parameters
     ----------
@@ -44,70 +47,72 @@ class LateValues:
         self.estimator = estimator
         self.rows = max(1, math.ceil(window_s / self.setup.dt - 1e-9))
 
-    def init(self, prior: Prior) -> LateState:
+    def init(self, prior: Prior) -> DelayedState:
         """Start the estimator; there is no history yet."""
-        return LateState(self.estimator.init(prior), ())
+        return DelayedState(self.estimator.init(prior), ())
 
-    def update(self, state: LateState, sample: Sample) -> tuple[LateState, Estimate]:
-        """Use the late values, then take the sample; see `Estimator.update`."""
-        used: tuple[LateValue, ...] = ()
+    def update(self, state: DelayedState, sample: Sample) -> tuple[DelayedState, Estimate]:
+        """Use the delayed values, then take the sample; see `Estimator.update`."""
+        used: tuple[DelayedValue, ...] = ()
         refused = False
-        if sample.late:
+        if sample.delayed:
             state, sample, used, refused = self._take_again(state, sample)
         inner, estimate = self.estimator.update(state.inner, sample)
         if used or refused:
-            estimate = replace(estimate, late=used, status=_status(estimate.status, refused))
+            estimate = replace(estimate, delayed=used, status=_status(estimate.status, refused))
         history = (*state.history, (state.inner, sample))[-self.rows :]
-        return LateState(inner, history), estimate
+        return DelayedState(inner, history), estimate
 
-    def _take_again(self, state: LateState, sample: Sample) -> tuple[LateState, Sample, tuple[LateValue, ...], bool]:
-        """State just before the sample with its late values in their places, the sample, innovations, any refused."""
-        samples = [*(s for _, s in state.history), replace(sample, late=())]
-        placed, at, refused = put_in_place(samples, sample.late, self.setup)
+    def _take_again(
+        self, state: DelayedState, sample: Sample
+    ) -> tuple[DelayedState, Sample, tuple[DelayedValue, ...], bool]:
+        """State just before the sample, the sample, innovations of the delayed values, whether any was refused."""
+        samples = [*(s for _, s in state.history), replace(sample, delayed=())]
+        placed, at, refused = put_in_place(samples, sample.delayed, self.setup)
         last = len(state.history)
         first = min(at, default=last)
         inner = state.history[first][0] if first < last else state.inner
         history = list(state.history[:first])
-        innovations: list[LateValue] = []
+        innovations: list[DelayedValue] = []
         for k in range(first, last):
             history.append((inner, placed[k]))
             inner, estimate = self.estimator.update(inner, placed[k])
             for value in at.get(k, ()):
                 j = self.setup.model.index("outputs", value.output)
                 innovations.append(replace(value, time=placed[k].time, value=float(estimate.innovation[j])))
-        return LateState(inner, tuple(history)), placed[last], tuple(innovations), refused
+        return DelayedState(inner, tuple(history)), placed[last], tuple(innovations), refused
 
 
-def taking_late_values(estimator: AnyEstimator, window_s: float) -> AnyEstimator:
-    """Return the estimator itself where nothing is late (a window of 0) or it takes late values; else wrapped."""
-    if window_s <= 0 or getattr(estimator, "takes_late_values", False):
+def taking_delayed_values(estimator: AnyEstimator, window_s: float) -> AnyEstimator:
+    """Return the estimator itself if nothing is delayed (window 0) or it takes delayed values; else wrap it."""
+    if window_s <= 0 or getattr(estimator, "takes_delayed_values", False):
         return estimator
-    return LateValues(estimator, window_s)
+    return DelayedMeasurements(estimator, window_s)
 
 
 def in_time(samples: Sequence[Sample], setup: Setup) -> list[Sample]:
-    """Record as it looks once everything has arrived: late values in their places; those without a place are left out.
+    """Record as it looks once everything has arrived: delayed values in their places, those without one left out.
 
     Raises
     ------
     ModelError
-        A late value of an output that the model does not have.
+        A delayed value of an output that the model does not have.
     """
-    late = [value for sample in samples for value in sample.late]
-    return put_in_place([replace(s, late=()) for s in samples], late, setup)[0] if late else list(samples)
+    delayed = [value for sample in samples for value in sample.delayed]
+    return put_in_place([replace(s, delayed=()) for s in samples], delayed, setup)[0] if delayed else list(samples)
 
 
 def put_in_place(
-    samples: Sequence[Sample], late: Sequence[LateValue], setup: Setup
-) -> tuple[list[Sample], dict[int, list[LateValue]], bool]:
-    """Put late values into the samples that they were taken at.
+    samples: Sequence[Sample], delayed: Sequence[DelayedValue], setup: Setup
+) -> tuple[list[Sample], dict[int, list[DelayedValue]], bool]:
+    """Put delayed values into the samples that they were taken at.
 
     Parameters
     ----------
     samples
         Samples in uniform time, oldest first.
-    late
-        The late values; a value that is not a number is a missing one.
+    delayed
+        The delayed values; a value that is not a number is a missing one.
     setup
         Names of the outputs, sampling interval.
 
@@ -123,12 +128,12 @@ def put_in_place(
     Raises
     ------
     ModelError
-        A late value of an output that the model does not have.
+        A delayed value of an output that the model does not have.
     """
     placed = list(samples)
-    at: dict[int, list[LateValue]] = {}
+    at: dict[int, list[DelayedValue]] = {}
     refused = False
-    for value in late:
+    for value in delayed:
         j = setup.model.index("outputs", value.output)
         if not math.isfinite(value.value):
             continue
@@ -155,5 +160,5 @@ def _row(samples: Sequence[Sample], time: float, dt: float) -> int | None:
 def _status(status: Status, refused: bool) -> Status:
     """What went wrong outranks a refused value, that outranks a used one; those outrank a plain sample."""
     if status in (Status.OK, Status.MISSING):
-        return Status.TOO_OLD if refused else Status.LATE
+        return Status.TOO_OLD if refused else Status.DELAYED
     return status

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from adaptive_flot.contracts.sample import LateValue, Sample
+from adaptive_flot.contracts.sample import DelayedValue, Sample
 from adaptive_flot.contracts.status import Status
 from adaptive_flot.greybox.model import FloatArray, Model
 
@@ -88,8 +88,8 @@ class Estimate:
         Model state (nx,) at the time of the sample.
     status
         What happened.
-    late
-        Innovations of the late values that were used: output, time taken, measured minus predicted then.
+    delayed
+        Innovations of the delayed values that were used: output, time taken, measured minus predicted then.
     """
 
     time: float
@@ -100,7 +100,7 @@ class Estimate:
     covariance: FloatArray
     state: FloatArray
     status: Status
-    late: tuple[LateValue, ...] = ()
+    delayed: tuple[DelayedValue, ...] = ()
 
 
 class Estimator(Protocol[State]):
@@ -109,9 +109,9 @@ class Estimator(Protocol[State]):
     Made by `Name(setup, **options)`. `setup` is kept as an attribute; nothing else may change after construction.
 
     Delayed measurements: after one, the estimate is what the same value in time would have given. An estimator need
-    not see to that. The loop puts `adaptive_flot.contracts.delayed_measurements.LateValues` around it wherever a
-    measurement has a dead time. An estimator that keeps a window of samples anyway may take `Sample.late` itself; it
-    then has `takes_late_values = True`.
+    not see to that: wherever a measurement has a dead time, the loop wraps it (`DelayedMeasurements` in
+    `adaptive_flot/contracts/delayed_measurements.py`). An estimator that keeps a window of samples anyway may take
+    `Sample.delayed` itself; it then has `takes_delayed_values = True`.
 
     Whole records: an estimator may have `track(state, time, inputs, outputs) -> Track`
     (`adaptive_flot/contracts/track.py`) that gives for N samples what N calls of `update` give. Replays of measured

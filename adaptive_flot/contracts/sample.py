@@ -1,4 +1,4 @@
-"""What the instruments show at one sampling instant, values that arrive late included."""
+"""What the instruments show at one sampling instant, delayed values included."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 
 @dataclass(frozen=True)
-class LateValue:
-    """A measurement that arrives after its time: output by name, time it was taken [s], value in the output's unit."""
+class DelayedValue:
+    """A measurement known only after its time: output by name, time it was taken [s], value in the output's unit."""
 
     output: str
     time: float
@@ -31,7 +31,7 @@ class Sample:
         are measured or assumed.
     outputs
         Outputs measured at this time (ny,), NaN where there is no measurement.
-    late
+    delayed
         Values that arrive with this sample and were taken earlier (a laboratory assay, an analyser with dead time).
     parameters
         Parameter vector (np,): the nominal one with what is measured in it (the feed grade); None where nothing is.
@@ -40,5 +40,5 @@ class Sample:
     time: float
     inputs: FloatArray
     outputs: FloatArray
-    late: tuple[LateValue, ...] = ()
+    delayed: tuple[DelayedValue, ...] = ()
     parameters: FloatArray | None = None

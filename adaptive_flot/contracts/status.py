@@ -10,8 +10,8 @@ class Status(Enum):
 
     OK = "ok"
     MISSING = "measurement missing: predicted only"
-    LATE = "late value put in its place, the samples since then taken again"
-    TOO_OLD = "late value without a sample of its time among those kept: not used"
+    DELAYED = "delayed value put in its place, the samples since then taken again"
+    TOO_OLD = "delayed value without a sample of its time among those kept: not used"
     PROJECTED = "estimate projected onto its bounds"
     LOW_INFORMATION = "the data say too little about some direction: the estimate is held along it"
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"

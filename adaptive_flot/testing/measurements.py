@@ -1,4 +1,4 @@
-"""Checks of what is measured: missing, at several rates, late."""
+"""Checks of what is measured: missing, at several rates, delayed."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.contracts import LateValue, Sample, Status
-from adaptive_flot.contracts.delayed_measurements import taking_late_values
+from adaptive_flot.contracts import DelayedValue, Sample, Status
+from adaptive_flot.contracts.delayed_measurements import taking_delayed_values
 from adaptive_flot.testing.cases import EstimatorCase, run_estimator
 from adaptive_flot.testing.comparing import same
 
@@ -41,41 +41,43 @@ def check_several_rates(case: EstimatorCase) -> None:
         assert (e.status is Status.MISSING) == ((k + 1) % 4 != 0), f"status {e.status.name} of sample {k}"
 
 
-def check_late_value_is_as_good_as_one_in_time(case: EstimatorCase) -> None:
-    """Once a late value has come, estimates are those of a record in which it was there in time."""
+def check_delayed_value_is_as_good_as_one_in_time(case: EstimatorCase) -> None:
+    """Once a delayed value has come, estimates are those of a record in which it was there in time."""
     setup = case.estimator.setup
     output = setup.outputs[0]
     j = setup.model.index("outputs", output)
     taken, arrives = 6, 11
-    late, in_time = list(case.samples), list(case.samples)
+    delayed, in_time = list(case.samples), list(case.samples)
     outputs = case.samples[taken].outputs.copy()
     outputs[j] *= 1.01
     in_time[taken] = replace(case.samples[taken], outputs=outputs)
-    late[taken] = _without(case.samples[taken], j)
-    value = LateValue(output, case.samples[taken].time + 0.3 * setup.dt, float(outputs[j]))
-    late[arrives] = replace(case.samples[arrives], late=(value,))
-    estimator = taking_late_values(case.estimator, 10 * setup.dt)
-    _, found = run_estimator(estimator, estimator.init(case.prior), late)
+    delayed[taken] = _without(case.samples[taken], j)
+    value = DelayedValue(output, case.samples[taken].time + 0.3 * setup.dt, float(outputs[j]))
+    delayed[arrives] = replace(case.samples[arrives], delayed=(value,))
+    estimator = taking_delayed_values(case.estimator, 10 * setup.dt)
+    _, found = run_estimator(estimator, estimator.init(case.prior), delayed)
     _, expected = run_estimator(case.estimator, case.estimator.init(case.prior), in_time)
-    assert found[arrives].status is Status.LATE, f"status {found[arrives].status.name} where a late value was used"
-    assert [(v.output, v.time) for v in found[arrives].late] == [(output, case.samples[taken].time)]
-    assert np.isclose(found[arrives].late[0].value, expected[taken].innovation[j], rtol=1e-6)
+    assert found[arrives].status is Status.DELAYED, (
+        f"status {found[arrives].status.name} where a delayed value was used"
+    )
+    assert [(v.output, v.time) for v in found[arrives].delayed] == [(output, case.samples[taken].time)]
+    assert np.isclose(found[arrives].delayed[0].value, expected[taken].innovation[j], rtol=1e-6)
     for a, b in zip(found[arrives:], expected[arrives:], strict=True):
         for x, y in ((a.parameters, b.parameters), (a.state, b.state), (a.prediction, b.prediction)):
             assert np.allclose(x, y, rtol=1e-6), "the estimate differs from the one with the value in time"
         assert np.allclose(a.covariance, b.covariance, rtol=1e-4, atol=1e-18)
 
 
-def check_late_value_without_a_sample_is_a_status(case: EstimatorCase) -> None:
-    """A late value from before the start, from the future or without a time is refused and changes nothing."""
-    estimator = taking_late_values(case.estimator, 10 * case.estimator.setup.dt)
+def check_delayed_value_without_a_sample_is_a_status(case: EstimatorCase) -> None:
+    """A delayed value from before the start, from the future or without a time is refused and changes nothing."""
+    estimator = taking_delayed_values(case.estimator, 10 * case.estimator.setup.dt)
     output = case.estimator.setup.outputs[0]
     _, expected = run_estimator(estimator, estimator.init(case.prior), case.samples)
     for time in (-1e4, case.samples[5].time + 100.0, float("nan")):
         samples = list(case.samples)
-        samples[5] = replace(samples[5], late=(LateValue(output, time, 0.5),))
+        samples[5] = replace(samples[5], delayed=(DelayedValue(output, time, 0.5),))
         _, found = run_estimator(estimator, estimator.init(case.prior), samples)
-        assert found[5].status is Status.TOO_OLD and found[5].late == (), f"a late value of time {time} was taken"
+        assert found[5].status is Status.TOO_OLD and found[5].delayed == (), f"a delayed value of time {time} was taken"
         assert same(found[5].parameters, expected[5].parameters) and same(found[6:], expected[6:])
 
 
@@ -88,6 +90,6 @@ def _without(sample: Sample, j: int) -> Sample:
 MEASUREMENT_CHECKS: tuple[Callable[[EstimatorCase], None], ...] = (
     check_missing_measurement_is_a_status,
     check_several_rates,
-    check_late_value_is_as_good_as_one_in_time,
-    check_late_value_without_a_sample_is_a_status,
+    check_delayed_value_is_as_good_as_one_in_time,
+    check_delayed_value_without_a_sample_is_a_status,
 )

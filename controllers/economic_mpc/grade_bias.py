@@ -45,8 +45,8 @@ class GradeBias:
     def _newest(self, estimate: Estimate) -> float:
         """The newest innovation that comes with an estimate; NaN where none does."""
         innovation = float(estimate.innovation[self.column])
-        late = [v.value for v in estimate.late if v.output == "concentrate_grade"]
-        return late[-1] if late and not np.isfinite(innovation) else innovation
+        delayed = [v.value for v in estimate.delayed if v.output == "concentrate_grade"]
+        return delayed[-1] if delayed and not np.isfinite(innovation) else innovation
 
     def _filtered(self, bias: float, heard: float, time: float, innovation: float) -> tuple[float, float]:
         """One innovation later; after a gap, one value counts for the time since the last one, NaN for nothing."""

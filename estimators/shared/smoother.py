@@ -61,7 +61,7 @@ def smooth(estimator: Ekf, prior: Prior, samples: Sequence[Sample]) -> Smoothed:
     prior
         Where it starts.
     samples
-        The record, late values in their places (`adaptive_flot.contracts.delayed_measurements.in_time`).
+        The record, delayed values in their places (`adaptive_flot.contracts.delayed_measurements.in_time`).
     """
     back = FastCall(_backward_step(estimator), matrices=("P", "Q", "L", "L_before"))
     states = [estimator.init(prior)]

@@ -55,7 +55,7 @@ class _Bad(Fixed):
         super().__init__(setup)
         self.fault = fault
         self.calls = 0
-        self.takes_late_values = fault == "deaf"
+        self.takes_delayed_values = fault == "deaf"
 
     def init(self, prior: Prior) -> FixedState:
         return _Thawed(0.0) if self.fault == "thawed" else super().init(prior)  # type: ignore[return-value]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.contracts import Estimate, LateValue, Status
+from adaptive_flot.contracts import DelayedValue, Estimate, Status
 from adaptive_flot.greybox import Model, steady_state
 from controllers.economic_mpc.grade_bias import GradeBias
 from controllers.economic_mpc.layout import Layout
@@ -29,8 +29,8 @@ def test_a_widened_plan_is_the_same_plan_with_the_further_states_held(model: Mod
     np.testing.assert_array_equal(large.inputs_of(widened(before, small, large, x)), small.inputs_of(before))
 
 
-def estimate(time: float, innovation: float, late: float) -> Estimate:
-    came = (LateValue("concentrate_grade", time - 3, late),) if np.isfinite(late) else ()
+def estimate(time: float, innovation: float, delayed: float) -> Estimate:
+    came = (DelayedValue("concentrate_grade", time - 3, delayed),) if np.isfinite(delayed) else ()
     nothing = np.empty(0)
     values = np.array([0.0, innovation])
     return Estimate(time, nothing, values, nothing, nothing, nothing, nothing, Status.OK, came)
@@ -43,14 +43,14 @@ VALUES = st.lists(st.tuples(*[st.floats(-1, 1)] * 4, st.booleans(), st.booleans(
 def test_the_bias_changes_by_the_filtered_change_of_the_innovations(
     rows: list[tuple[float, float, float, float, bool, bool]],
 ) -> None:
-    """Property: filtering other innovations from the same start on gives the old bias plus `change`; missing and late
-    values come at the same samples, as they are the plant's."""
+    """Property: filtering other innovations from the same start on gives the old bias plus `change`; missing and
+    delayed values come at the same samples, as they are the plant's."""
     bias = GradeBias(1, 1.0, 20.0)
     known: list[Estimate] = []
     again: list[Estimate] = []
-    for k, (old, new, late_old, late_new, seen, late) in enumerate(rows):
-        for found, now, after in ((known, old, late_old), (again, new, late_new)):
-            found.append(estimate(1.0 + k, now if seen else np.nan, after if late else np.nan))
+    for k, (old, new, delayed_old, delayed_new, seen, delayed) in enumerate(rows):
+        for found, now, after in ((known, old, delayed_old), (again, new, delayed_new)):
+            found.append(estimate(1.0 + k, now if seen else np.nan, after if delayed else np.nan))
 
     def filtered(estimates: list[Estimate]) -> float:
         value, heard = 0.3, 0.0

@@ -155,7 +155,7 @@ class Supervisor:
 
 
 def measured_record(steps: Sequence[Step], setup: Setup) -> Dataset:
-    """What the instruments have shown until now, late values in their places: no truth of the plant enters."""
+    """What the instruments have shown until now, delayed values in their places: no truth of the plant enters."""
     samples = in_time([s.plant.sample for s in steps], setup)
     return Dataset(
         name="measured in the loop",

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from adaptive_flot.contracts import AnyController, AnyEstimator, ControllerSetup, Setup
 from adaptive_flot.contracts.batch import BatchEstimator
-from adaptive_flot.contracts.delayed_measurements import taking_late_values
+from adaptive_flot.contracts.delayed_measurements import taking_delayed_values
 from adaptive_flot.errors import ScenarioError, near_match
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.runner.scenario.keys import Plugin
@@ -70,7 +70,7 @@ class Prepared:
     def estimator_for(self, name: str, setup: Setup) -> AnyEstimator:
         """A new estimator of that name for another setup."""
         made = self.estimators[name].make(setup, ESTIMATORS, "estimator", self.scenario.path.parent)
-        return taking_late_values(made, self.scenario.longest_dead_time)
+        return taking_delayed_values(made, self.scenario.longest_dead_time)
 
     def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
         """A controller of that name for the run of a seed, with the model of the estimator that it listens to."""

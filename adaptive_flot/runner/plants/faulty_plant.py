@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adaptive_flot.contracts import AnyPlant, LateValue, PlantRecord, Sample
+from adaptive_flot.contracts import AnyPlant, DelayedValue, PlantRecord, Sample
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.scenario.faults import Fault, Frozen, SensorFault, SlowAnalyser, Stuck
 
@@ -35,7 +35,7 @@ class FaultyState:
     row: int
     acted: FloatArray
     shown: FloatArray
-    pending: tuple[tuple[float, LateValue], ...] = ()
+    pending: tuple[tuple[float, DelayedValue], ...] = ()
 
 
 class FaultyPlant:
@@ -99,30 +99,30 @@ class FaultyPlant:
         return acting, hidden, names
 
     def _sensors(self, state: FaultyState, sample: Sample) -> tuple[Sample, list[str]]:
-        """The sample, its late values too, as the instruments show it, and names of the faults that changed a value."""
-        outputs, late, names = sample.outputs.copy(), list(sample.late), []
+        """The sample as the instruments show it, delayed values too, and names of the faults that changed a value."""
+        outputs, delayed, names = sample.outputs.copy(), list(sample.delayed), []
         for i, fault in self._faults:
             if not isinstance(fault, SensorFault):
                 continue
             j = self._model.index("outputs", fault.output)
-            before = (outputs[j], *(v.value for v in late))
+            before = (outputs[j], *(v.value for v in delayed))
             if fault.acts(sample.time) and np.isfinite(outputs[j]):
                 outputs[j] = fault.alter(outputs[j], state.shown[j], self._draw(sample.time, i))
-            late = [
+            delayed = [
                 replace(v, value=fault.alter(v.value, state.shown[j], self._draw(v.time, i)))
                 if v.output == fault.output and fault.acts(v.time)
                 else v
-                for v in late
+                for v in delayed
             ]
-            if not np.array_equal(before, (outputs[j], *(v.value for v in late)), equal_nan=True):
+            if not np.array_equal(before, (outputs[j], *(v.value for v in delayed)), equal_nan=True):
                 names.append(f"{fault.fault} {fault.output}")
-        known = tuple(v for v in late if np.isfinite(v.value))
-        return replace(sample, outputs=outputs, late=known), names
+        known = tuple(v for v in delayed if np.isfinite(v.value))
+        return replace(sample, outputs=outputs, delayed=known), names
 
     def _shown(self, state: FaultyState, sample: Sample) -> FloatArray:
         """Last value of each output, for the day its instrument freezes: while it is frozen, that from before."""
         frozen = [f.output for _, f in self._acting(sample.time) if isinstance(f, Frozen)]
-        newest = [*zip(self._names, sample.outputs, strict=True), *((v.output, v.value) for v in sample.late)]
+        newest = [*zip(self._names, sample.outputs, strict=True), *((v.output, v.value) for v in sample.delayed)]
         shown = state.shown.copy()
         for name, value in newest:
             if name not in frozen and np.isfinite(value):
@@ -135,7 +135,7 @@ class FaultyPlant:
 
     def _analysers(
         self, state: FaultyState, sample: Sample
-    ) -> tuple[Sample, tuple[tuple[float, LateValue], ...], list[str]]:
+    ) -> tuple[Sample, tuple[tuple[float, DelayedValue], ...], list[str]]:
         """The sample without what a slow analyser has not measured or not told yet."""
         outputs, names, now = sample.outputs.copy(), [], sample.time
         pending = list(state.pending)
@@ -146,9 +146,9 @@ class FaultyPlant:
             taken = (now - fault.from_s) % fault.every_s < self._dt - 1e-9
             if np.isfinite(outputs[j]) and not (taken and fault.dead_time_s == 0):
                 if taken:
-                    pending.append((now + fault.dead_time_s, LateValue(fault.output, now, float(outputs[j]))))
+                    pending.append((now + fault.dead_time_s, DelayedValue(fault.output, now, float(outputs[j]))))
                 outputs[j] = np.nan
                 names.append(f"{fault.fault} {fault.output}")
         due = tuple(value for known_at, value in pending if known_at <= now + 1e-9)
         later = tuple((known_at, value) for known_at, value in pending if known_at > now + 1e-9)
-        return replace(sample, outputs=outputs, late=(*sample.late, *due)), later, names
+        return replace(sample, outputs=outputs, delayed=(*sample.delayed, *due)), later, names

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.contracts import LateValue, PlantRecord, Sample
+from adaptive_flot.contracts import DelayedValue, PlantRecord, Sample
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
@@ -39,7 +39,7 @@ class SimulatedState:
 
     row: int
     x: FloatArray
-    pending: tuple[LateValue, ...] = ()
+    pending: tuple[DelayedValue, ...] = ()
 
 
 class SimulatedPlant:
@@ -77,7 +77,7 @@ class SimulatedPlant:
         accurate: bool = False,
         dead_time: Mapping[str, float] | None = None,
     ) -> None:
-        self._late = {model.index("outputs", name): (name, d) for name, d in (dead_time or {}).items() if d > 0}
+        self._delayed = {model.index("outputs", name): (name, d) for name, d in (dead_time or {}).items() if d > 0}
         self._dt = dt
         self._x0 = x0
         self._parameters = parameters
@@ -97,8 +97,8 @@ class SimulatedPlant:
         p = self._parameters[k]
         x, y, _ = self._step(state.x, k * self._dt, acting, p)
         now, measured = (k + 1) * self._dt, y + self._noise[k]
-        taken = tuple(LateValue(name, now, float(measured[j])) for j, (name, _) in self._late.items())
-        measured[list(self._late)] = np.nan
+        taken = tuple(DelayedValue(name, now, float(measured[j])) for j, (name, _) in self._delayed.items())
+        measured[list(self._delayed)] = np.nan
         known, pending = self._arrived((*state.pending, *taken), now)
         sample = Sample(now, shown, measured, known, known_parameters)
         true = self._true(y, now, x, acting, p)
@@ -114,10 +114,10 @@ class SimulatedPlant:
         return np.where(np.isnan(imposed), inputs, imposed), np.where(np.isnan(shown), inputs, shown), known
 
     def _arrived(
-        self, values: tuple[LateValue, ...], now: float
-    ) -> tuple[tuple[LateValue, ...], tuple[LateValue, ...]]:
+        self, values: tuple[DelayedValue, ...], now: float
+    ) -> tuple[tuple[DelayedValue, ...], tuple[DelayedValue, ...]]:
         """Cut the values into those known by now and those still to come; a value that is NaN never was."""
-        wait = dict(self._late.values())
+        wait = dict(self._delayed.values())
         due = [v.time + wait[v.output] <= now + 1e-9 for v in values]
         known = tuple(v for v, d in zip(values, due, strict=True) if d)
         return known, tuple(v for v, d in zip(values, due, strict=True) if not d and np.isfinite(v.value))

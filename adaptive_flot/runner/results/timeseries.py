@@ -76,12 +76,12 @@ def _outputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
 
 
 def innovations(steps: Sequence[Step]) -> list[Sample]:
-    """Innovations in place of the measurements, those of late values with the sample that they arrived with."""
+    """Innovations in place of the measurements, those of delayed values with the sample that they arrived with."""
     unknown = np.full(len(steps[0].plant.outputs), np.nan)
     return [
-        replace(s.plant.sample, outputs=s.estimate.innovation, late=s.estimate.late)
+        replace(s.plant.sample, outputs=s.estimate.innovation, delayed=s.estimate.delayed)
         if s.estimate
-        else replace(s.plant.sample, outputs=unknown, late=())
+        else replace(s.plant.sample, outputs=unknown, delayed=())
         for s in steps
     ]
 

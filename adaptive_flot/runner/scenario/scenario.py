@@ -158,7 +158,7 @@ class Scenario:
 
     @property
     def dead_times(self) -> dict[str, float]:
-        """Dead time of each output that is known late [s]."""
+        """Dead time of each output that is known with a delay [s]."""
         return {name: m.dead_time_s for name, m in self.file.measurements.items() if m.dead_time_s > 0}
 
     @property

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.contracts import Estimate, LateValue, Prior, Sample, Setup, Status
-from adaptive_flot.contracts.delayed_measurements import LateValues
+from adaptive_flot.contracts import DelayedValue, Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.delayed_measurements import DelayedMeasurements
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.ekf import Ekf
@@ -189,19 +189,19 @@ def test_without_the_measurement_the_state_is_predicted_only(cell_case: CellCase
         assert a.status is b.status
 
 
-def test_a_late_level_is_as_good_as_one_in_time(cell_case: CellCase) -> None:
+def test_a_delayed_level_is_as_good_as_one_in_time(cell_case: CellCase) -> None:
     setup = cell_case.setup
     level = setup.model.index("outputs", "level")
-    estimator = LateValues(Rpem(setup, correct_state=MEASURED), 20.0)
+    estimator = DelayedMeasurements(Rpem(setup, correct_state=MEASURED), 20.0)
     state, found = estimator.init(cell_case.prior), []
-    value = LateValue("level", cell_case.samples[10].time, float(cell_case.samples[10].outputs[level]))
+    value = DelayedValue("level", cell_case.samples[10].time, float(cell_case.samples[10].outputs[level]))
     for k, sample in enumerate(cell_case.samples):
         outputs = sample.outputs.copy()
         outputs[level] = np.nan if k == 10 else outputs[level]
-        late = (value,) if k == 25 else ()
-        state, estimate = estimator.update(state, replace(sample, outputs=outputs, late=late))
+        delayed = (value,) if k == 25 else ()
+        state, estimate = estimator.update(state, replace(sample, outputs=outputs, delayed=delayed))
         found.append(estimate)
     expected = replay(Rpem(setup, correct_state=MEASURED), cell_case.prior, cell_case.samples)
-    assert found[25].status is Status.LATE
+    assert found[25].status is Status.DELAYED
     assert not np.array_equal(found[20].state, expected[20].state)
     np.testing.assert_array_equal(found[-1].state, expected[-1].state)

@@ -14,25 +14,25 @@ from tests.runner.conftest import DURATION, INITIAL, WriteScenario
 GRADE = "concentrate_grade"
 
 
-def test_plant_shows_each_output_at_its_rate_and_late_ones_after_their_dead_time(
+def test_plant_shows_each_output_at_its_rate_and_delayed_ones_after_their_dead_time(
     write_scenario: WriteScenario,
 ) -> None:
     """Every 7 s from 7 s on, known 10 s later: the same values as without dead time, each once."""
     plain = load_scenario(write_scenario({f"measurements.{GRADE}.every_s": 7}))
     in_time = simulate_plant(plain, 1)
-    late = simulate_plant(
+    delayed = simulate_plant(
         load_scenario(write_scenario({f"measurements.{GRADE}": {"noise_std": 1e-3, "every_s": 7, "dead_time_s": 10}})),
         1,
     )
     column = plain.model.index("outputs", GRADE)
     taken = {r.sample.time: r.sample.outputs[column] for r in in_time if np.isfinite(r.sample.outputs[column])}
     assert list(taken) == [float(t) for t in range(7, DURATION + 1, 7)]
-    arrived = {r.sample.time: r.sample.late for r in late if r.sample.late}
+    arrived = {r.sample.time: r.sample.delayed for r in delayed if r.sample.delayed}
     assert [(t, v[0].time) for t, v in arrived.items()] == [(t + 10, t) for t in taken if t + 10 <= DURATION]
     assert all(v[0].value == taken[v[0].time] and v[0].output == GRADE for v in arrived.values())
-    assert all(np.isnan(r.sample.outputs[column]) for r in late)
+    assert all(np.isnan(r.sample.outputs[column]) for r in delayed)
     level = plain.model.index("outputs", "level")
-    assert all(a.sample.outputs[level] == b.sample.outputs[level] for a, b in zip(in_time, late, strict=True))
+    assert all(a.sample.outputs[level] == b.sample.outputs[level] for a, b in zip(in_time, delayed, strict=True))
 
 
 def test_a_period_that_is_no_multiple_of_the_sampling_interval_keeps_its_mean_rate(
@@ -45,7 +45,7 @@ def test_a_period_that_is_no_multiple_of_the_sampling_interval_keeps_its_mean_ra
 
 
 @pytest.mark.parametrize("dead_time", [0, 12])
-def test_table_shows_late_values_and_their_innovations_at_the_time_they_were_taken(
+def test_table_shows_delayed_values_and_their_innovations_at_the_time_they_were_taken(
     write_scenario: WriteScenario, dead_time: int
 ) -> None:
     grade = {"noise_std": 1e-3, "every_s": 5, "dead_time_s": dead_time}
@@ -53,10 +53,10 @@ def test_table_shows_late_values_and_their_innovations_at_the_time_they_were_tak
     run = run_scenario(load_scenario(write_scenario(changes)), ["rpem"], [1])[0]
     table = run.table[run.table["time_s"] > INITIAL]
     arrivals = sum(INITIAL < t + dead_time <= DURATION and t > INITIAL for t in range(5, DURATION + 1, 5))
-    assert run.status_counts.get("late", 0) == (arrivals if dead_time else 0)
+    assert run.status_counts.get("delayed", 0) == (arrivals if dead_time else 0)
     measured = table.loc[table[f"{GRADE}_measured"].notna(), "time_s"].tolist()
     assert measured == [t for t in range(INITIAL + 1, DURATION - dead_time + 1) if t % 5 == 0]
     assert table.loc[table[f"{GRADE}_innovation"].notna(), "time_s"].tolist() == measured
     assert {Status[s.upper()] for s in run.status_counts} <= {
-        Status.INITIALISING, Status.OK, Status.MISSING, Status.LATE, Status.TOO_OLD
+        Status.INITIALISING, Status.OK, Status.MISSING, Status.DELAYED, Status.TOO_OLD
     }  # fmt: skip

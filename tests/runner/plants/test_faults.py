@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from adaptive_flot.contracts import Decision, Estimate, LateValue, PlantRecord, Sample, Status
+from adaptive_flot.contracts import Decision, DelayedValue, Estimate, PlantRecord, Sample, Status
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.plants.faulty_controller import FaultyController
 from adaptive_flot.runner.plants.faulty_plant import FaultyPlant
@@ -31,22 +31,22 @@ class Row:
 class Scripted:
     """Every output shows the time of the sample, and whatever is applied acts."""
 
-    def __init__(self, model: Model, late: tuple[str, float] | None = None) -> None:
+    def __init__(self, model: Model, delayed: tuple[str, float] | None = None) -> None:
         self.outputs = len(model.outputs)
-        self.late = late
+        self.delayed = delayed
 
     def init(self) -> Row:
         return Row(0)
 
     def apply(self, state: Row, inputs: FloatArray) -> tuple[Row, PlantRecord]:
         now = state.k + 1.0
-        late: tuple[LateValue, ...] = ()
+        delayed: tuple[DelayedValue, ...] = ()
         outputs = np.full(self.outputs, now)
-        if self.late is not None:
-            name, dead_time = self.late
-            late = (LateValue(name, now - dead_time, now - dead_time),)
+        if self.delayed is not None:
+            name, dead_time = self.delayed
+            delayed = (DelayedValue(name, now - dead_time, now - dead_time),)
             outputs[0] = np.nan
-        sample = Sample(now, inputs, outputs, late)
+        sample = Sample(now, inputs, outputs, delayed)
         return Row(state.k + 1), PlantRecord(sample, np.full(self.outputs, now), np.zeros(0), inputs)
 
 
@@ -105,23 +105,27 @@ def test_a_frozen_instrument_repeats_its_last_value_then_follows_again(model: Mo
     np.testing.assert_array_equal(shown(records), np.where(DURING, 99.0, TIMES))
 
 
-def test_faults_follow_a_late_value_by_the_time_it_was_taken(model: Model) -> None:
+def test_faults_follow_a_delayed_value_by_the_time_it_was_taken(model: Model) -> None:
     """A value that was taken before the fault arrives unharmed while it lasts, and the other way round."""
-    plant = Scripted(model, late=("concentrate_grade", 30.0))
+    plant = Scripted(model, delayed=("concentrate_grade", 30.0))
     entry = fault(fault="outliers", output="concentrate_grade", rate=1.0, size=0.5, from_s=100, to_s=200)
     for record in play(model, [entry], plant):
-        (value,) = record.sample.late
+        (value,) = record.sample.delayed
         assert abs(value.value - value.time) == (0.5 if 100 <= value.time < 200 else 0.0)
     frozen = play(model, [fault(fault="frozen", output="concentrate_grade", from_s=100, to_s=200)], plant)
-    assert {r.sample.late[0].value for r in frozen if 100 <= r.sample.late[0].time < 200} == {69.0}  # known at 99 s
+    assert {r.sample.delayed[0].value for r in frozen if 100 <= r.sample.delayed[0].time < 200} == {
+        69.0
+    }  # known at 99 s
 
 
 def test_a_slow_analyser_measures_at_its_period_and_tells_later(model: Model) -> None:
-    """Every 50 s from 100 s on, 20 s late, each value with the time at which it was taken."""
+    """Every 50 s from 100 s on, known 20 s later, each value with the time at which it was taken."""
     entry = fault(fault="slow_analyser", output="concentrate_grade", every_s=50, dead_time_s=20, from_s=100)
     records = play(model, [entry])
     np.testing.assert_array_equal(shown(records), np.where(TIMES < 100, TIMES, np.nan))
-    arrived = {r.sample.time: [(v.output, v.time, v.value) for v in r.sample.late] for r in records if r.sample.late}
+    arrived = {
+        r.sample.time: [(v.output, v.time, v.value) for v in r.sample.delayed] for r in records if r.sample.delayed
+    }
     assert arrived == {t + 20.0: [("concentrate_grade", t, t)] for t in (100.0, 150.0, 200.0, 250.0, 300.0, 350.0)}
 
 
@@ -130,7 +134,7 @@ def test_a_slow_analyser_without_dead_time_leaves_gaps(model: Model) -> None:
     records = play(model, [entry])
     known = TIMES[np.isfinite(shown(records))]
     assert known.tolist() == [*range(1, 100), 100, 150, 200, 250, *range(300, ROWS + 1)]
-    assert not any(r.sample.late for r in records)
+    assert not any(r.sample.delayed for r in records)
 
 
 def test_a_stuck_actuator_ignores_the_command_and_nobody_sees_it(model: Model) -> None:

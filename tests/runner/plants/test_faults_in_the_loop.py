@@ -110,8 +110,8 @@ def test_what_was_wrong_with_a_failed_solve_is_told(runs: list[Run]) -> None:
 
 
 def test_after_every_fault_it_decides_as_a_fresh_controller(runs: list[Run], solves: list[Solve]) -> None:
-    """Also after missing, outlying, frozen and late values and a stuck valve: a controller that starts now, is told the
-    same and knows the inputs held and the bias of the grade finds the same inputs, to the solver's tolerance."""
+    """Also after missing, outlying, frozen and delayed values and a stuck valve: a controller that starts now, is told
+    the same and knows the inputs held and the bias of the grade finds the same inputs, to the solver's tolerance."""
     assert len(runs) == 2 and len(solves) == 8
     valid = [s for s in solves if s.decision.status is Status.OK]
     assert [s.sample.time for s in valid] == [301, 331, 361, 391, 511]
