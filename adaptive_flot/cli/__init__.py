@@ -1,0 +1,17 @@
+"""The command `adaptive-flot`.
+
+===================== =================================================================
+`entry`               the entry point: errors become one line and an exit code
+`commands`            the list of commands, and the options before a command
+`run` ... `scenarios` one file a command: its options, and what it calls
+`options`             options that several commands share
+`targets`             what a command will write, checked before any work
+===================== =================================================================
+
+Heavy libraries are imported by the command that needs them, so that help is quick.
+"""
+
+from adaptive_flot.cli.commands import app
+from adaptive_flot.cli.entry import main
+
+__all__ = ["app", "main"]

@@ -1,0 +1,63 @@
+"""The entry point: every error becomes one line on standard error and an exit code."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+from adaptive_flot.cli.commands import app
+from adaptive_flot.errors import AdaptiveFlotError
+
+DEFECT = 1
+USER_ERROR = 2
+DEBUG = "--debug"
+OWN = ("adaptive_flot", "estimators", "controllers")
+"""Packages of this program."""
+
+
+def main() -> None:
+    """Run the command line.
+
+    Exit codes: 0 done, 1 a defect of this program, 2 a mistake of the user, 130 interrupted.
+    """
+    arguments, debug = _debug_first(sys.argv[1:])
+    try:
+        app(arguments)
+    except AdaptiveFlotError as error:
+        _end(error, str(error), USER_ERROR, debug)
+    except MemoryError as error:
+        _end(error, "not enough memory; give a shorter record, or fewer processes", DEFECT, debug)
+    except Exception as error:
+        hint = "report it" if debug else f"run it again with {DEBUG} and report what it prints"
+        _end(error, f"a defect of this program ({_place(error)}): {_described(error)}; {hint}", DEFECT, debug)
+
+
+def _debug_first(given: Sequence[str]) -> tuple[list[str], bool]:
+    """Arguments with `--debug`, which may stand anywhere, before the command."""
+    end = given.index("--") if "--" in given else len(given)
+    if DEBUG not in given[:end]:
+        return list(given), False
+    return [DEBUG, *(a for a in given[:end] if a != DEBUG), *given[end:]], True
+
+
+def _end(error: BaseException, message: str, code: int, debug: bool) -> None:
+    if debug:
+        traceback.print_exception(error)
+    sys.stderr.write(f"adaptive-flot: {' '.join(message.split())}\n")
+    sys.exit(code)
+
+
+def _described(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
+def _place(error: BaseException) -> str:
+    """File and line of the innermost frame of this program, as `adaptive_flot/files.py, line 12`."""
+    root = Path(__file__).parents[2]
+    frames = [(Path(f.filename), f.lineno) for f in traceback.extract_tb(error.__traceback__)]
+    inside = [(f.relative_to(root), line) for f, line in frames if f.is_relative_to(root)]
+    own = [(f, line) for f, line in inside if f.parts[0] in OWN]
+    file, number = own[-1]
+    return f"{file.as_posix()}, line {number}"

@@ -1,0 +1,68 @@
+"""`adaptive-flot estimate`: a measured record through estimators."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from adaptive_flot.cli.options import CellOption, Compile, Json, ModelOption, Out, can_compile, command_line
+
+
+def estimate(
+    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
+    model: ModelOption = "flotation",
+    cell: CellOption = None,
+    estimator: Annotated[
+        list[str] | None, typer.Option(help="Estimator (repeatable); default fixed, rpem and pem.")
+    ] = None,
+    fit: Annotated[
+        list[str] | None, typer.Option(help="Parameter to estimate (repeatable), or a group of them.")
+    ] = None,
+    output: Annotated[
+        list[str] | None, typer.Option(help="Output to fit to (repeatable); default all measured.")
+    ] = None,
+    fit_share: Annotated[float, typer.Option(min=0.05, max=0.95, help="Share of the record to fit on.")] = 0.6,
+    save_cell: Annotated[Path | None, typer.Option(help="Write the fitted parameters as a cell file.")] = None,
+    save_model: Annotated[Path | None, typer.Option(help="Write the fitted model as a model file (YAML).")] = None,
+    out: Out = None,
+    json: Json = None,
+    compile_: Compile = False,
+) -> None:
+    """Replay a measured record through fixed, recursive and batch estimation."""
+    from adaptive_flot.console import print_estimate, progress_bar
+    from adaptive_flot.errors import CellError
+    from adaptive_flot.processes.registry import find_cell, make_model
+    from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
+    from adaptive_flot.runner.commands.estimate_files import (
+        estimate_summary,
+        save_fitted_cell,
+        save_fitted_model,
+        write_replays,
+    )
+    from adaptive_flot.runner.commands.run_files import write_json
+
+    if save_cell is not None and model != "flotation":
+        raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
+    made = replace(make_model(model, cell=cell, folder=data.parent), compiled=can_compile(compile_))
+    blocks = read_blocks(data, made, fit_share)
+    names = estimator or ["fixed", "rpem", "pem"]
+    with progress_bar(data.stem, 1 + len(names)) as advance:
+        result = estimate_record(
+            blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent, progress=advance
+        )
+    folder = out or Path("results") / data.stem
+    write_replays(result, folder)
+    for target in filter(None, (folder / "summary.json", json)):
+        write_json(target, estimate_summary(data, result))
+    if save_cell is not None:
+        save_fitted_cell(result, find_cell(cell, data.parent), save_cell)
+    if save_model is not None:
+        save_fitted_model(result, save_model, base=model, cell=cell, folder=data.parent)
+    print_estimate(result)
+    from adaptive_flot.report.estimate.page import write_estimate_report
+
+    write_estimate_report(result, folder / "report.html", command=command_line())
+    typer.echo(f"Report: {folder / 'report.html'}")

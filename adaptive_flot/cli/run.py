@@ -1,0 +1,49 @@
+"""`adaptive-flot run`: plant, estimators and controller of a scenario together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from adaptive_flot.cli.options import Compile, Json, Out, can_compile, command_line, once
+
+
+def run(
+    scenario: Annotated[str, typer.Argument(help="Scenario file, or the name of a shipped scenario.")],
+    estimator: Annotated[list[str] | None, typer.Option(help="Estimator (repeatable); default the scenario's.")] = None,
+    controller: Annotated[
+        list[str] | None, typer.Option(help="Controller (repeatable); default the scenario's.")
+    ] = None,
+    seed: Annotated[
+        list[int] | None, typer.Option(min=0, help="Noise seed (repeatable); default the scenario's.")
+    ] = None,
+    out: Out = None,
+    json: Json = None,
+    parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
+    compile_: Compile = False,
+) -> None:
+    """Run a scenario: plant, estimators and controller together."""
+    from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
+    from adaptive_flot.runner.commands.run import run_scenario
+    from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
+    from adaptive_flot.runner.scenario.scenario import load_scenario
+
+    loaded = load_scenario(scenario)
+    loaded = loaded.compiled() if can_compile(compile_) else loaded
+    who = once(estimator), once(controller)
+    count = len(loaded.combinations(*who)) * len(once(seed) or set(loaded.file.seeds))
+    with progress_bar(loaded.name, count) as advance:
+        runs = run_scenario(loaded, who[0], once(seed), advance, who[1])
+    folder = out or Path("results") / loaded.name
+    write_runs(runs, folder, ".parquet" if parquet else ".csv")
+    summary = run_summary(loaded, runs)
+    for target in filter(None, (folder / "summary.json", json)):
+        write_json(target, summary)
+    print_fits([(loaded, runs)])
+    print_closed_loop(loaded, runs)
+    from adaptive_flot.report.run.page import write_run_report
+
+    write_run_report([(loaded, runs)], folder / "report.html", command=command_line())
+    typer.echo(f"Report: {folder / 'report.html'}")

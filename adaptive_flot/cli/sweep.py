@@ -1,0 +1,49 @@
+"""`adaptive-flot sweep`: a study of many runs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from adaptive_flot.cli.options import Compile, Out, can_compile
+
+INTERRUPTED = 130
+
+
+def sweep(
+    study: Annotated[str, typer.Argument(help="Study file, or the name of a shipped study.")],
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; default one a core.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler to run on instead, tcp://host:8786.")
+    ] = None,
+    out: Out = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed runs again.")] = False,
+    compile_: Compile = False,
+) -> None:
+    """Run a study of many runs. Interrupted, the same command goes on where it was."""
+    from adaptive_flot.studies.progress import live, print_study
+    from adaptive_flot.studies.study_file import load_study
+    from adaptive_flot.studies.sweep import sweep as run_study
+
+    loaded = load_study(study)
+    folder = out or Path("results") / loaded.name
+    compiled = can_compile(compile_)
+    try:
+        with live(loaded.name) as progress:
+            outcome = run_study(
+                loaded,
+                folder,
+                workers=workers,
+                scheduler=scheduler,
+                retry_failed=retry_failed,
+                compiled=compiled,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        sys.stderr.write(f"adaptive-flot: interrupted; results so far are in {folder}, the same command goes on\n")
+        sys.exit(INTERRUPTED)
+    print_study(outcome.table)
+    typer.echo(f"{len(outcome.table)} runs, {outcome.found} of them from before: {folder / 'runs.parquet'}")
