@@ -32,7 +32,7 @@ app.command(
 app.command(epilog="Example: adaptive-flot discover record.csv --json verdict.json --save-model extended.yaml")(
     discover
 )
-app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift --out results/comparison")(compare)
+app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift/run --out results/comparison")(compare)
 app.command(epilog="Example: adaptive-flot sweep paper_1000 --workers 2 --out results/paper_1000")(sweep)
 app.command(epilog="Example: adaptive-flot scenarios")(scenarios)
 

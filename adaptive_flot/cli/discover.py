@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.options import CellOption, ModelOption, Out, command_line
+from adaptive_flot.cli.options import CellOption, ModelOption, Out, command_line, results_folder
 
 
 def discover(
@@ -43,7 +43,7 @@ def discover(
         found = discover_file(
             data, made, limits=limits, processes=processes or available_processes(), progress=progress
         )
-    folder = out or Path("results") / data.stem
+    folder = results_folder(out, data.stem, "discover")
     for target in filter(None, (folder / "verdict.json", json)):
         write_json(target, found.verdict.as_dict())
     print_discovery(found)

@@ -8,7 +8,16 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.options import CellOption, Compile, Json, ModelOption, Out, can_compile, command_line
+from adaptive_flot.cli.options import (
+    CellOption,
+    Compile,
+    Json,
+    ModelOption,
+    Out,
+    can_compile,
+    command_line,
+    results_folder,
+)
 
 
 def estimate(
@@ -53,7 +62,7 @@ def estimate(
         result = estimate_record(
             blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent, progress=advance
         )
-    folder = out or Path("results") / data.stem
+    folder = results_folder(out, data.stem, "estimate")
     write_replays(result, folder)
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, estimate_summary(data, result))

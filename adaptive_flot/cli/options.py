@@ -12,7 +12,7 @@ import typer
 
 T = TypeVar("T")
 
-Out = Annotated[Path | None, typer.Option("--out", help="Folder of the results; default results/<name>.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder of the results; default results/<name>/<command>.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the summary here too.")]
 
 
@@ -59,6 +59,11 @@ def ignore_unknown_backend() -> None:
         os.environ["MPLBACKEND"] = backend  # for processes that are started from here
     except ValueError:
         sys.stderr.write(f"adaptive-flot: MPLBACKEND={backend} is no backend of matplotlib; going on without it\n")
+
+
+def results_folder(out: Path | None, name: str, command: str) -> Path:
+    """Folder of a command's results: no two commands share one, so that none overwrites what another wrote."""
+    return out or Path("results") / name / command
 
 
 def once(given: list[T] | None) -> list[T]:

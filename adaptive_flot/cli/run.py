@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.options import Compile, Json, Out, can_compile, command_line, once
+from adaptive_flot.cli.options import Compile, Json, Out, can_compile, command_line, once, results_folder
 
 
 def run(
@@ -36,7 +35,7 @@ def run(
     count = len(loaded.combinations(*who)) * len(once(seed) or set(loaded.file.seeds))
     with progress_bar(loaded.name, count) as advance:
         runs = run_scenario(loaded, who[0], once(seed), advance, who[1])
-    folder = out or Path("results") / loaded.name
+    folder = results_folder(out, loaded.name, "run")
     write_runs(runs, folder, ".parquet" if parquet else ".csv")
     summary = run_summary(loaded, runs)
     for target in filter(None, (folder / "summary.json", json)):

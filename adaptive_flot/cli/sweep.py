@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.options import Compile, Out, can_compile
+from adaptive_flot.cli.options import Compile, Out, can_compile, results_folder
 
 INTERRUPTED = 130
 
@@ -29,7 +28,7 @@ def sweep(
     from adaptive_flot.studies.sweep import sweep as run_study
 
     loaded = load_study(study)
-    folder = out or Path("results") / loaded.name
+    folder = results_folder(out, loaded.name, "sweep")
     compiled = can_compile(compile_)
     try:
         with live(loaded.name) as progress:

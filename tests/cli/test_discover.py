@@ -132,9 +132,9 @@ def test_a_model_of_the_user_from_record_to_extended_model(call: Call, tmp_path:
     said = " ".join(result.out.split())
     assert said.startswith("named: The model lacks this: heat_loss depends on fan_speed")
     assert "temperature" in said and "Model: more.yaml" in said
-    page = (tmp_path / "results" / "tank" / "report.html").read_text()
+    page = (tmp_path / "results" / "tank" / "discover" / "report.html").read_text()
     assert "heat loss by fan speed" in page and "Error before and after" in page
-    verdict = json.loads((tmp_path / "results" / "tank" / "verdict.json").read_text())
+    verdict = json.loads((tmp_path / "results" / "tank" / "discover" / "verdict.json").read_text())
     assert verdict["effects"][0]["site"] == "heat_loss"
     assert verdict["error"]["temperature"]["after"] < 0.2 * verdict["error"]["temperature"]["before"]
 

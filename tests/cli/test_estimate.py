@@ -118,3 +118,16 @@ def test_the_tanks_need_no_cell_and_save_none(call: Call, shared_file: Callable[
     result = call("estimate", file, "--model", "cascaded-tanks", "--save-cell", "fitted.yaml", "--out", "r")
     assert result.code == 2 and "--save-cell" in result.err and len(result.err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_discovery_on_the_same_record_leaves_the_results_of_an_estimate(
+    call: Call, table: WriteTable, tmp_path: Path
+) -> None:
+    """Each command has its own default folder: neither report overwrites the other."""
+    file = table()
+    assert call("estimate", file, "--estimator", "fixed").code == 0
+    before = {f: f.read_bytes() for f in (tmp_path / "results").rglob("*") if f.is_file()}
+    assert call("discover", file).code == 0
+    assert {f.parent.name for f in before} == {"estimate"}
+    assert all(f.read_bytes() == content for f, content in before.items())
+    assert (tmp_path / "results" / "record" / "discover" / "report.html").is_file()

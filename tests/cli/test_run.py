@@ -79,7 +79,7 @@ def test_parquet_instead_of_csv(call: Call, scenario: WriteScenario, tmp_path: P
 
 def test_results_go_into_a_folder_named_after_the_scenario(call: Call, scenario: WriteScenario, tmp_path: Path) -> None:
     assert call("run", scenario(), "--estimator", "fixed").code == 0
-    assert (tmp_path / "results" / "short" / "summary.json").is_file()
+    assert (tmp_path / "results" / "short" / "run" / "summary.json").is_file()
 
 
 def test_a_second_run_replaces_the_files_of_the_first(call: Call, scenario: WriteScenario, tmp_path: Path) -> None:

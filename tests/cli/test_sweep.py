@@ -26,8 +26,8 @@ def test_a_study_prints_its_distributions_and_goes_on_from_what_is_there(call: C
     result = call("sweep", study, "--workers", "1")
     assert result.code == 0 and "Traceback" not in result.err
     text = " ".join(result.out.split())
-    assert "median [5 %, 95 %]" in text and "2 runs, 0 of them from before: results/two/runs.parquet" in text
-    table = pd.read_parquet("results/two/runs.parquet")
+    assert "median [5 %, 95 %]" in text and "2 runs, 0 of them from before: results/two/sweep/runs.parquet" in text
+    table = pd.read_parquet("results/two/sweep/runs.parquet")
     assert f"{table['fit_C'].median():.2f} [" in text
     again = call("sweep", study)
     assert again.code == 0 and "2 of them from before" in again.out and "2 of 2 runs are there" in again.err

@@ -97,7 +97,7 @@ def read_runs(results: Sequence[Path]) -> pd.DataFrame:
 def _file_or_folder(path: Path) -> Path:
     """Where the runs are: a summary, a Parquet file, or a folder of parts."""
     if not path.exists():
-        raise ResultError(f"{path}: no such file or folder; give what `adaptive-flot run` wrote, as results/NAME")
+        raise ResultError(f"{path}: no such file or folder; give what `adaptive-flot run` wrote, as results/NAME/run")
     return (path / SUMMARY if path.is_dir() and (path / SUMMARY).is_file() else path).resolve()
 
 
