@@ -94,7 +94,7 @@ class Ekf:
         self.columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
         self._step = FastCall(
-            filter_step(setup, self.coordinates, self.layout, outlier_std),
+            filter_step(setup, self.layout, outlier_std),
             matrices=("P", "Q", "P_next"),
             as_machine_code=setup.model.compiled,
         )

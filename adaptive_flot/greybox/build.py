@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import casadi as ca
 
@@ -11,6 +12,9 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.quantities import Kind
 from adaptive_flot.greybox.scope import Scope, Site
+
+if TYPE_CHECKING:
+    from adaptive_flot.greybox.model import Model
 
 NEWTON_STEPS = 3
 """Newton iterations that close the algebraic loop inside the explicit right-hand side. Convergence is quadratic from a
@@ -123,3 +127,11 @@ def tangent(ode: ca.Function, dae: ca.Function, decay: ca.Function, seeds: ca.DM
         ["xdot", "y", "decay", "dxdot", "dy", "ddecay"],
         {"cse": True},
     )
+
+
+def tangent_for(
+    model: Model, shape: tuple[int, int], places: tuple[int, ...], values: tuple[float, ...]
+) -> ca.Function:
+    """`tangent` of a model, for seeds of this shape: places of the nonzeros (counted by columns) and their values."""
+    seeds = ca.DM(ca.Sparsity.nonzeros(*shape, list(places)), list(values))
+    return tangent(model.ode, model.dae, model.decay, seeds)

@@ -19,10 +19,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.rows import over_rows
+from adaptive_flot.greybox.stepping.step_functions import Interval, one_step_jacobians
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CHUNK = 500
@@ -68,19 +70,21 @@ def linearise(
     run = stepper.simulate(x0, inputs, parameters, t0)
     before = np.vstack([x0, run.states[:-1]])
     model, dt, rows = stepper.model, stepper.dt, len(inputs)
-    key = ("bound", dt, stepper.substeps, tuple(wrt))
-    if key not in model.kept:
-        model.kept[key] = over_rows(stepper.one_step_jacobians(wrt), CHUNK)
+    jacobians = model.derived(_jacobians_of_rows, stepper.interval, tuple(wrt))
     nx, ny, q = len(model.states), len(model.outputs), len(wrt)
     F, H = np.empty((rows, nx, nx + q)), np.empty((rows, ny, nx + q))
     time = t0 + dt * np.arange(rows)
     for first in range(0, rows, CHUNK):
         part = np.minimum(np.arange(first, first + CHUNK), rows - 1)  # the last call repeats its last row
-        found = model.kept[key](before[part].T, time[part], inputs[part].T, parameters[part].T)
-        blocks = [_rows(np.array(found[i]), CHUNK)[: rows - first] for i in range(2, 6)]
+        results = jacobians(before[part].T, time[part], inputs[part].T, parameters[part].T)
+        blocks = [_rows(np.array(results[i]), CHUNK)[: rows - first] for i in range(2, 6)]
         F[first : first + CHUNK] = np.concatenate(blocks[:2], axis=2)
         H[first : first + CHUNK] = np.concatenate(blocks[2:], axis=2)
     return Linearisation(F, H)
+
+
+def _jacobians_of_rows(model: Model, interval: Interval, wrt: tuple[str, ...]) -> ca.Function:
+    return over_rows(one_step_jacobians(model, interval, wrt), CHUNK)
 
 
 def _rows(side_by_side: FloatArray, count: int) -> FloatArray:

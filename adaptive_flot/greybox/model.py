@@ -16,27 +16,32 @@ Every quantity in which physics may be missing passes through a named *site*. A 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVarTuple
 
 import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError, RangeError, near_match
-from adaptive_flot.greybox.build import Built, build, tangent
-from adaptive_flot.greybox.effects import Effect, check_distinct
-from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
+from adaptive_flot.greybox.build import Built, build, tangent_for
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.extension import with_effects, without_effects
+from adaptive_flot.greybox.function_cache import FunctionCache
+from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity, check_range
 from adaptive_flot.greybox.scope import Scope, Site
 
 __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
+
+Arguments = TypeVarTuple("Arguments")
 
 
 @dataclass(frozen=True)
 class Model:
     """Named quantities plus equations; building it compiles nothing and takes milliseconds.
 
-    Attributes `dae`, `ode` and `decay`, and what `tangent(seeds)` returns, are CasADi functions of `(t, x, u, p[, z])`:
+    Properties `dae`, `ode` and `decay`, and what `tangent(seeds)` returns, are CasADi functions of `(t, x, u, p[, z])`:
 
     ========= ============================================= ==========================================
     function  arguments                                     results
@@ -46,6 +51,35 @@ class Model:
     `tangent` t, x, u, p, dx (nx, q)                        dx/dt, y, decay; then their derivatives along (dx, seeds)
     `decay`   t, x, u, p, z                                 decay rate of each state (nx,), 0 where none is given
     ========= ============================================= ==========================================
+
+    Attributes
+    ----------
+    name
+        Name in messages and files.
+    states, inputs, parameters, outputs
+        The nx states, nu inputs, np parameters and ny outputs, in vector order.
+    equations
+        Function that writes the equations into a `Scope`.
+    signals, algebraic
+        The ns internal quantities that tables and effects may use, and the nz algebraic variables.
+    initial_guess
+        First guess of the steady state by state name; the scale of the state where it is not given.
+    max_step_s
+        Largest step [s] at which the fast integration of this model is accurate (about 1e-5 of each state).
+    starts_steady
+        Whether a record without further knowledge starts near a steady state; else near `initial_guess`.
+    drivers
+        Quantities that effects may depend on, in the order of a search; default all inputs and states.
+    late_drivers
+        Drivers that are known only after the sites: signals which an effect follows through a state of its own.
+    known_effects
+        Effects that a search may call by name; when empty, every site with every driver.
+    edges
+        Outputs that may stay at the highest or lowest value of their range: no sensor is clipped there.
+    effects
+        Effects attached by `with_effects`; their parameters and states follow those of the model.
+    compiled
+        Whether steppers and estimators turn what they call in a loop into machine code.
 
     Raises
     ------
@@ -62,28 +96,18 @@ class Model:
     signals: tuple[Quantity, ...] = ()
     algebraic: tuple[Quantity, ...] = ()
     initial_guess: Mapping[str, float] = field(default_factory=dict)
-    """First guess of the steady state by state name; the scale of the state where it is not given."""
     max_step_s: float = 1.0
-    """Largest step [s] at which the fast integration of this model is accurate (about 1e-5 of each state)."""
     starts_steady: bool = True
-    """A record without further knowledge is taken to start near a steady state; else near `initial_guess`."""
     drivers: tuple[str, ...] = ()
-    """Quantities that effects may depend on, in the order of a search; default all inputs and states."""
     late_drivers: tuple[str, ...] = ()
-    """Drivers that are known only after the sites: signals which an effect follows through a state of its own."""
     known_effects: tuple[KnownEffect, ...] = ()
-    """What a search may call by name; when empty, every site with every driver."""
     edges: tuple[str, ...] = ()
-    """Outputs that may stay at the highest or lowest value of their range: no sensor is clipped there."""
     effects: tuple[Effect, ...] = ()
-    """Effects attached by `with_effects`; their parameters and states follow those of the model."""
     compiled: bool = False
-    """Steppers and estimators of this model turn what they call in a loop into machine code (`greybox/compiled.py`)."""
+    _functions: FunctionCache[ca.Function] = field(default_factory=FunctionCache, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         _ = self._built  # equations are checked when the model is made, not when it is first used
-
-    # -- names -----------------------------------------------------------------------------------------------------
 
     def names(self, kind: Kind) -> tuple[str, ...]:
         """Names of one kind of quantity, in vector order."""
@@ -110,11 +134,11 @@ class Model:
 
     def expand_parameters(self, names: Iterable[str]) -> tuple[str, ...]:
         """Full parameter names for names, symbols and group prefixes (`floatability` is all its minerals)."""
-        found: list[str] = []
+        full: list[str] = []
         for name in names:
             group = [p.name for p in self.parameters if p.name.startswith(name + ".")]
-            found += group or [self.parameters[self.index("parameters", name)].name]
-        return tuple(dict.fromkeys(found))
+            full += group or [self.parameters[self.index("parameters", name)].name]
+        return tuple(dict.fromkeys(full))
 
     @property
     def parameter_values(self) -> FloatArray:
@@ -140,7 +164,7 @@ class Model:
                     f"[{p.lower:g}, {p.upper:g}] {p.unit}; give a value inside it"
                 )
             new[i] = replace(p, value=float(value))
-        _, other = self.kept, copy.copy(self)  # the values are arguments of all functions: both models share these
+        other = copy.copy(self)  # parameter values are arguments of all functions: both models share these
         object.__setattr__(other, "parameters", tuple(new))
         return other
 
@@ -152,43 +176,18 @@ class Model:
         ModelError
             Unknown site or driver, a driver that is not known where the site is passed, or two effects of one name.
         """
-        added = tuple(effects)
-        check_distinct((*self.effects, *added))
-        return replace(
-            self,
-            states=self.states + tuple(s for e in added for s in self._effect_states(e)),
-            parameters=self.parameters + tuple(p for e in added for p in e.parameters(self.effect_units(e))),
-            effects=self.effects + added,
-        )
+        return with_effects(self, tuple(effects))
 
     def without_effects(self) -> Model:
         """Return this model without its effects; its own parameters keep their present values."""
-        states = len(self.states) - sum(len(self._effect_states(e)) for e in self.effects)
-        parameters = len(self.parameters) - sum(len(e.terms) for e in self.effects)
-        return replace(self, states=self.states[:states], parameters=self.parameters[:parameters], effects=())
+        return without_effects(self)
 
-    def _effect_states(self, effect: Effect) -> tuple[Quantity, ...]:
-        """States of an effect: those of its form, and one that follows a late driver."""
-        if effect.driver not in self.late_drivers:
-            return effect.states()
-        driver = self.signals[self.index("signals", effect.driver)]
-        follower = f"{driver.name} as it reaches {effect.site}"
-        return (*effect.states(), replace(driver, name=effect.follower, description=follower))
-
-    def effect_units(self, effect: Effect) -> dict[str, str | None]:
-        """Unit of each coefficient and setting of an effect on this model; None where its site does not tell its unit.
-
-        Raises
-        ------
-        ModelError
-            Unknown site.
-        """
-        sites = {s.name: s for s in self.sites}
-        if effect.site not in sites:
-            raise ModelError(f"model '{self.name}' has no site {effect.site!r}; {near_match(effect.site, sites)}")
-        units = {q.name: q.unit for q in (*self.inputs, *self.states, *self.signals)} | {"time": "s"}
-        site = sites[effect.site]
-        return effect.units(site.unit, units.get(effect.driver), site.mode)
+    def fitted_effects(self) -> tuple[Effect, ...]:
+        """Effects with the present parameter values as their coefficients."""
+        values = {p.name: p.value for p in self.parameters}
+        return tuple(
+            replace(e, coefficients={c.name: values[e.parameter(c.name)] for c in e.terms}) for e in self.effects
+        )
 
     def check_inputs(self, inputs: FloatArray, time: FloatArray | None = None, where: str = "inputs") -> None:
         """Check an input table (N, nu) against the physical range of each input.
@@ -197,21 +196,10 @@ class Model:
         ------
         RangeError
             Names the first input that leaves its range, the row or time, the value and the range.
+        ModelError
+            Wrong number of columns.
         """
-        table = np.atleast_2d(np.asarray(inputs, dtype=float))
-        if table.shape[1] != len(self.inputs):
-            raise ModelError(f"{where}: {table.shape[1]} columns, but the model has {len(self.inputs)} inputs")
-        for j, q in enumerate(self.inputs):
-            bad = np.flatnonzero(~((table[:, j] >= q.lower) & (table[:, j] <= q.upper)))
-            if bad.size:
-                k = int(bad[0])
-                at = f"row {k}" if time is None else f"time {time[k]:g} s"
-                raise RangeError(
-                    f"{where}: {q.name} = {table[k, j]:g} {q.unit} at {at} is outside the model's range "
-                    f"[{q.lower:g}, {q.upper:g}] {q.unit}; correct the value or its unit"
-                )
-
-    # -- built functions -------------------------------------------------------------------------------------------
+        check_range(self.inputs, np.atleast_2d(np.asarray(inputs, dtype=float)), time, where)
 
     @property
     def dae(self) -> ca.Function:
@@ -228,10 +216,19 @@ class Model:
 
         The directions are (dx, seeds): `seeds` (np, q) are those of the parameters, constants, most of them zero.
         """
-        key = "tangent", seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros())
-        if key not in self.kept:
-            self.kept[key] = tangent(self.ode, self.dae, self.decay, seeds)
-        return self.kept[key]
+        return self.derived(tangent_for, seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros()))
+
+    def derived(self, builder: Callable[[Model, *Arguments], ca.Function], *arguments: *Arguments) -> ca.Function:
+        """Return `builder(model, *arguments)`, made once for this model and those of other parameter values.
+
+        Parameters
+        ----------
+        builder
+            A function of a module. What it makes may depend on the equations, not on the values of parameters.
+        arguments
+            Its further arguments, hashable. Builder and arguments together are the key.
+        """
+        return self._functions.get((builder, arguments), lambda: builder(self, *arguments))
 
     @property
     def decay(self) -> ca.Function:
@@ -247,18 +244,6 @@ class Model:
     def site_values(self) -> ca.Function:
         """`(t, x, u, p, z)` to the value at each site (sites,) before any effect; the first of several components."""
         return self._built.site_values
-
-    def fitted_effects(self) -> tuple[Effect, ...]:
-        """Effects with the present parameter values as their coefficients."""
-        values = {p.name: p.value for p in self.parameters}
-        return tuple(
-            replace(e, coefficients={c.name: values[e.parameter(c.name)] for c in e.terms}) for e in self.effects
-        )
-
-    @cached_property
-    def kept(self) -> dict[Hashable, ca.Function]:
-        """Functions derived from this model, by what they are; shared with models of other parameter values."""
-        return {}
 
     @cached_property
     def _built(self) -> Built:

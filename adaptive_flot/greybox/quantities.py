@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from adaptive_flot.errors import ModelError, RangeError
 
 FloatArray = NDArray[np.float64]
 Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
@@ -16,8 +19,18 @@ Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebrai
 class Quantity:
     """A named physical quantity: state, input, output, signal or algebraic variable.
 
-    `lower` and `upper` are the physical range in the unit given; `scale` is a typical size, used to condition
-    solvers and as the standard deviation of an unknown initial state.
+    Attributes
+    ----------
+    name
+        Name in tables, files and messages.
+    unit
+        Its unit, "-" for none.
+    description
+        What it is, in words.
+    lower, upper
+        Physical range, in the unit.
+    scale
+        Typical size, in the unit: conditions solvers, and is the standard deviation of an unknown initial state.
     """
 
     name: str
@@ -39,10 +52,26 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A model parameter with its value, unit, source, physical range and role in a calibration.
+    """A model parameter.
 
-    `symbol` is the letter of the literature, accepted wherever the name is. `scale` is the size of a change that
-    matters (relative scale of fits); `prior_std` the standard deviation of the prior in a calibration, None for none.
+    Attributes
+    ----------
+    name
+        Full name; a group shares what stands before the dot (`floatability.chalcopyrite`).
+    value, unit
+        Value in its unit, "-" for none.
+    source
+        Where the value comes from.
+    symbol
+        Letter of the literature, accepted wherever the name is.
+    lower, upper
+        Physical range, in the unit.
+    scale
+        Size of a change that matters, in the unit: the relative scale of fits.
+    prior_std
+        Standard deviation of the prior in a calibration, in the unit; None for no prior.
+    role
+        "estimated" where a calibration fits it unless told otherwise, else "fixed".
     """
 
     name: str
@@ -64,10 +93,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """A physical effect that a model may lack: where it acts, what drives it, and what it is in words.
+    """A physical effect that a model may lack, known by name.
 
     Attributes
     ----------
+    site
+        Name of the site where it acts.
+    driver
+        What drives it: a quantity of the model, or one of the words that `Effect` lists.
+    meaning
+        What it is in words, as a verdict says it.
     direction
         How the value at the site must change as the driver grows; "" where both ways are physical.
     """
@@ -76,3 +111,26 @@ class KnownEffect:
     driver: str
     meaning: str
     direction: Literal["", "rises", "falls"] = ""
+
+
+def check_range(quantities: Sequence[Quantity], table: FloatArray, time: FloatArray | None, where: str) -> None:
+    """Check a table (N, n) of n inputs, each in its unit, against the physical range of each.
+
+    Raises
+    ------
+    ModelError
+        Wrong number of columns.
+    RangeError
+        Names the first input that leaves its range, the row or time [s], the value and the range.
+    """
+    if table.shape[1] != len(quantities):
+        raise ModelError(f"{where}: {table.shape[1]} columns, but the model has {len(quantities)} inputs")
+    for values, q in zip(table.T, quantities, strict=True):
+        outside = np.flatnonzero(~((values >= q.lower) & (values <= q.upper)))
+        if outside.size:
+            k = int(outside[0])
+            at = f"row {k}" if time is None else f"time {time[k]:g} s"
+            raise RangeError(
+                f"{where}: {q.name} = {values[k]:g} {q.unit} at {at} is outside the model's range "
+                f"[{q.lower:g}, {q.upper:g}] {q.unit}; correct the value or its unit"
+            )

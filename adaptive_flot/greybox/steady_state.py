@@ -125,9 +125,10 @@ def _solved(slope: FloatArray, by_parameters: FloatArray) -> FloatArray:
 
 def _jacobian(model: Model, wrt: Literal["x", "p"]) -> FastCall:
     """d(dx/dt)/d(x or p) as a function of (t, x, u, p)."""
-    key = ("jacobian", wrt)
-    if key not in model.kept:
-        t, x, u, p = model.ode.sx_in()
-        slope = ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], {"x": x, "p": p}[wrt]))
-        model.kept[key] = ca.Function("jacobian", [t, x, u, p], [slope], ["t", "x", "u", "p"], ["jacobian"])
-    return FastCall(model.kept[key], matrices=("jacobian",))
+    return FastCall(model.derived(_jacobian_function, wrt), matrices=("jacobian",))
+
+
+def _jacobian_function(model: Model, wrt: Literal["x", "p"]) -> ca.Function:
+    t, x, u, p = model.ode.sx_in()
+    slope = ca.densify(ca.jacobian(model.ode(t, x, u, p)[0], {"x": x, "p": p}[wrt]))
+    return ca.Function("jacobian", [t, x, u, p], [slope], ["t", "x", "u", "p"], ["jacobian"])

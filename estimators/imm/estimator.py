@@ -106,7 +106,7 @@ class Imm:
         self.transitions = transitions(self.modes, durations, jump_share, setup.dt)
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
-        step = filter_step(setup, self.coordinates, self.layout, outlier_std)
+        step = filter_step(setup, self.layout, outlier_std)
         mix = mix_function(self.layout, self.modes, self.transitions)
         combine = combine_function(self.layout, len(self.modes))
         code = setup.model.compiled

@@ -32,7 +32,7 @@ class DriftFit:
 def log_likelihood(setup: Setup, prior: Prior, samples: Sequence[Sample], drift_per_hour: float) -> float:
     """Logarithm of the likelihood of a record: that of the innovations of the joint filter with this drift."""
     estimator = Ekf(setup, drift_per_hour=drift_per_hour, outlier_std=np.inf)
-    step = FastCall(filter_step(setup, estimator.coordinates, estimator.layout), matrices=("P", "Q", "P_next"))
+    step = FastCall(filter_step(setup, estimator.layout), matrices=("P", "Q", "P_next"))
     state, total = estimator.init(prior), 0.0
     z, P, time = state.z, state.P, prior.time
     for sample in samples:

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.contracts import Prior, Setup
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.shared.coordinates import Coordinates
 
@@ -87,7 +87,7 @@ def linearise_interval(setup: Setup, coordinates: Coordinates, shape: Layout) ->
     return Linearised(z, t, u, p, ca.vertcat(x_next, c, z[nx + q :]), y, F, H)
 
 
-def filter_step(setup: Setup, coordinates: Coordinates, shape: Layout, outlier: float = np.inf) -> ca.Function:
+def filter_step(setup: Setup, shape: Layout, outlier: float = np.inf) -> ca.Function:
     """Build the step.
 
     An innovation beyond `outlier` standard deviations s is not believed: its influence stays that of one of
@@ -103,16 +103,15 @@ def filter_step(setup: Setup, coordinates: Coordinates, shape: Layout, outlier: 
         Q is the covariance of w over the interval, noise a standard deviation. flags: a number that is finite only if
         the whole result is, and how many parameters were projected onto their bounds.
     """
-    key = ("filter_step", setup.dt, setup.parameters, setup.outputs, shape, coordinates.log, outlier)
-    kept = setup.model.kept
-    if key not in kept:
-        kept[key] = _filter_step(setup, coordinates, shape, outlier)
-    return kept[key]
+    return setup.model.derived(_filter_step, setup.dt, setup.parameters, setup.outputs, shape, outlier)
 
 
-def _filter_step(setup: Setup, coordinates: Coordinates, shape: Layout, outlier: float) -> ca.Function:
-    interval = linearise_interval(setup, coordinates, shape)
-    rows = setup.model.indices("outputs", setup.outputs)
+def _filter_step(
+    model: Model, dt: float, parameters: tuple[str, ...], outputs: tuple[str, ...], shape: Layout, outlier: float
+) -> ca.Function:
+    coordinates = Coordinates.of(model, parameters)
+    interval = linearise_interval(Setup(model, dt, parameters, outputs), coordinates, shape)
+    rows = model.indices("outputs", outputs)
     m, n, robust = len(rows), shape.size, bool(np.isfinite(outlier))
     P, Q = ca.SX.sym("P", n, n), ca.SX.sym("Q", n, n)
     noise, measured, present = (ca.SX.sym(name, m) for name in ("noise", "measured", "present"))

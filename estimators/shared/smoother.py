@@ -18,11 +18,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from adaptive_flot.contracts import Prior, Sample, Status
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.contracts import Prior, Sample, Setup, Status
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.ekf import Ekf
-from estimators.shared.joint_filter import linearise_interval, parameters_of
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import Layout, linearise_interval, parameters_of
 from estimators.shared.measured import driving_outputs
 
 
@@ -63,7 +64,10 @@ def smooth(estimator: Ekf, prior: Prior, samples: Sequence[Sample]) -> Smoothed:
     samples
         The record, delayed values in their places (`adaptive_flot.contracts.delayed_measurements.in_time`).
     """
-    back = FastCall(_backward_step(estimator), matrices=("P", "Q", "L", "L_before"))
+    setup = estimator.setup
+    names = setup.parameters, setup.outputs
+    step = setup.model.derived(_backward_step, setup.dt, *names, estimator.layout, estimator.outlier_std)
+    back = FastCall(step, matrices=("P", "Q", "L", "L_before"))
     states = [estimator.init(prior)]
     lost = []
     for sample in samples:
@@ -112,20 +116,13 @@ def _result(estimator: Ekf, samples: Sequence[Sample], rows: list[tuple[FloatArr
     )
 
 
-def _backward_step(estimator: Ekf) -> ca.Function:
+def _backward_step(
+    model: Model, dt: float, parameters: tuple[str, ...], outputs: tuple[str, ...], shape: Layout, outlier: float
+) -> ca.Function:
     """`(z, P, Q, t, u, p, noise, measured, present, l (n,), L (n, n)) -> (l, L)` before the sample."""
-    setup, shape = estimator.setup, estimator.layout
-    names = setup.parameters, setup.outputs
-    key = ("backward_step", setup.dt, names, shape, estimator.coordinates.log, estimator.outlier_std)
-    if key not in setup.model.kept:
-        setup.model.kept[key] = _make_backward_step(estimator)
-    return setup.model.kept[key]
-
-
-def _make_backward_step(estimator: Ekf) -> ca.Function:
-    setup, shape = estimator.setup, estimator.layout
-    interval = linearise_interval(setup, estimator.coordinates, shape)
-    rows = setup.model.indices("outputs", setup.outputs)
+    setup = Setup(model, dt, parameters, outputs)
+    interval = linearise_interval(setup, Coordinates.of(model, parameters), shape)
+    rows = model.indices("outputs", outputs)
     n, m = shape.size, len(rows)
     P, Q, L = (ca.SX.sym(name, n, n) for name in ("P", "Q", "L"))
     noise, measured, present = (ca.SX.sym(name, m) for name in ("noise", "measured", "present"))
@@ -137,8 +134,8 @@ def _make_backward_step(estimator: Ekf) -> ca.Function:
         row = H[j, :]
         across = corrected @ row.T
         variance = row @ across + noise[j] ** 2
-        error, limit = residual[j] - row @ moved, estimator.outlier_std * ca.sqrt(variance)
-        if np.isfinite(estimator.outlier_std):
+        error, limit = residual[j] - row @ moved, outlier * ca.sqrt(variance)
+        if np.isfinite(outlier):
             error = ca.fmin(ca.fmax(error, -limit), limit)
         gain = present[j] * across / variance
         moved = moved + gain * error

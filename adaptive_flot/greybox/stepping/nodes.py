@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.fast_step import Moving, fast_step, fast_step_along
+from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 MOVE = 0.001
@@ -126,21 +125,14 @@ def _interpolation(nodes: IntArray, offset: int) -> tuple[FloatArray, IntArray, 
 
 
 class NodeStepper(Stepper):
-    """The step of a model with its length as a last input; one Runge-Kutta step an interval."""
+    """The step of a model with its length as a last input; one Runge-Kutta step an interval.
+
+    Its functions take u as the inputs and, as the last entry, the length of the step [s].
+    """
 
     def __init__(self, model: Model) -> None:
         super().__init__(model, 1.0, substeps=1)
-        self._key = ("node stepper", *self._key)
-        self._options = {}  # a search runs a step some thousand times: looking for common terms takes longer
-
-    @property
-    def step(self) -> ca.Function:
-        """`(x, t, u, p) -> (x_next, y, s)`: u is the inputs and the length of the step."""
-        return self._kept(("step",), lambda: fast_step(self.model, None, 1))
-
-    def _along(self, moved: ca.SX, seeds: ca.DM) -> tuple[Moving, Moving]:
-        x, t, u, p = self._symbols()
-        return fast_step_along(self.model, u[-1], 1, (x, t, u[:-1], p), moved, seeds)
+        self.interval = Interval(None, 1)
 
     def _tables(
         self, inputs: FloatArray, parameters: FloatArray | None, t0: float

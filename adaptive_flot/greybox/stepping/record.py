@@ -30,7 +30,7 @@ class RecordSimulator:
     def __init__(self, model: Model, dt: float, nodes: Nodes | None = None) -> None:
         self.model, self.nodes = model, nodes
         self.stepper = Stepper(model, dt) if nodes is None else NodeStepper(model)
-        self._first = FastCall(_first_row(model))
+        self._first = FastCall(model.derived(_first_row))
 
     def outputs(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
         """Outputs (N, ny) of the free run from x0 (nx,) with parameters p (np,)."""
@@ -65,8 +65,7 @@ class RecordSimulator:
 
 
 def _first_row(model: Model) -> ca.Function:
-    if "first_row" not in model.kept:
-        t, x, u, p = model.ode.sx_in()
-        y = model.ode(t, x, u, p)[1]
-        model.kept["first_row"] = ca.Function("first_row", [x, t, u, p], [y, ca.jacobian(y, x), ca.jacobian(y, p)])
-    return model.kept["first_row"]
+    """`(x, t, u, p) -> (y, dy_dx, dy_dp)` at one instant."""
+    t, x, u, p = model.ode.sx_in()
+    y = model.ode(t, x, u, p)[1]
+    return ca.Function("first_row", [x, t, u, p], [y, ca.jacobian(y, x), ca.jacobian(y, p)])

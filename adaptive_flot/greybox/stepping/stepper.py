@@ -1,8 +1,8 @@
 """One sampling interval as one compiled function, with exact sensitivities; whole records in one call.
 
-The fast step (`fast_step.py`) is a Runge-Kutta method of order 4 on the explicit right-hand side, unrolled in SX, with
-sensitivities that are exact for the map itself. The accurate step is IDAS (SUNDIALS) on the index-1 DAE. No compiler is
-needed for either.
+The functions are those of `step_functions.py`. The fast step (`fast_step.py`) is a Runge-Kutta method of order 4 on the
+explicit right-hand side, with sensitivities that are exact for the map itself. The accurate step is IDAS (SUNDIALS) on
+the index-1 DAE. Neither needs a compiler.
 
 Time convention: the inputs of row k are held during the interval that ends at the time of row k, and states,
 outputs and signals are those at that time.
@@ -11,7 +11,7 @@ outputs and signals are those at that time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.compiled import compiled
-from adaptive_flot.greybox.stepping.fast_step import Moving, fast_step, fast_step_along
+from adaptive_flot.greybox.stepping import step_functions
 from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.step_functions import Interval
 
-IDAS_TOLERANCE = 1e-11
 MOST_UNROLLED = 4
 """Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
 ten of them, with derivatives, takes longer to make than a record takes to simulate."""
@@ -75,26 +75,20 @@ class Stepper:
         self.dt = float(dt)
         self.substeps = substeps or max(1, math.ceil(dt / model.max_step_s - 1e-9))
         self.accurate = accurate
-        self._key: tuple[Hashable, ...] = ("stepper", self.dt, self.substeps, accurate)
-        self._options = {"cse": True}
-        self._compiled = model.compiled and not accurate  # IDAS is machine code already
-        self._records: dict[tuple[str, tuple[str, ...], int], FastCall] = {}
+        self.interval = Interval(self.dt, self.substeps, accurate)
+        self._calls: FunctionCache[FastCall] = FunctionCache()
         many = self.substeps > MOST_UNROLLED and not accurate
         self._single = Stepper(model, self.dt / self.substeps, substeps=1) if many else None
 
     @property
     def step(self) -> ca.Function:
         """`(x, t, u, p) -> (x_next, y, s)`: t [s] at the start of the interval, y and s at its end."""
-
-        def make() -> ca.Function:
-            return _idas_step(self.model, self.dt) if self.accurate else fast_step(self.model, self.dt, self.substeps)
-
-        return self._kept(("step",), make)
+        return self.model.derived(step_functions.step, self.interval)
 
     @cached_property
     def call(self) -> FastCall:
         """The step as a NumPy function `(x, t, u, p) -> (x_next, y, s)`."""
-        return FastCall(self._ready(self.step))
+        return FastCall(self.model.derived(step_functions.ready_step, self.interval))
 
     def outputs_at(self, state: FloatArray, time: float, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
         """Outputs and signals (ny + ns,) at one instant: the first row of a table."""
@@ -107,22 +101,11 @@ class Stepper:
         Returns `(x, t, u, p) -> (x_next (nx,), y (ny,), dy_dtheta (ny, q))`; x is held, as in the one-step predictor of
         the paper (Section IV-B).
         """
-        x, t, u, p = self._symbols()
-        seeds = self._parameter_seeds(wrt)
-        end, y = self._along(ca.SX(x.numel(), len(wrt)), seeds)
-        names = ["x", "t", "u", "p"], ["x_next", "y", "dy_dtheta"]
-        return ca.Function("one_step_gradient", [x, t, u, p], [end.value, y.value, y.along], *names, {"cse": True})
+        return step_functions.one_step_gradient(self.model, self.interval, tuple(wrt))
 
     def one_step_jacobians(self, wrt: Sequence[str]) -> ca.Function:
         """Return `(x, t, u, p) -> (x_next, y, dx_dx, dx_dtheta, dy_dx, dy_dtheta)`, exact, in forward mode."""
-        x, t, u, p = self._symbols()
-        nx, q = x.numel(), len(wrt)
-        moved = ca.horzcat(ca.SX.eye(nx), ca.SX(nx, q))
-        seeds = ca.horzcat(ca.DM(p.numel(), nx), self._parameter_seeds(wrt))
-        end, y = self._along(moved, seeds)
-        blocks = [m.along[:, columns] for m in (end, y) for columns in (slice(0, nx), slice(nx, nx + q))]
-        names = ["x", "t", "u", "p"], ["x_next", "y", "dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"]
-        return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, {"cse": True})
+        return step_functions.one_step_jacobians(self.model, self.interval, tuple(wrt))
 
     def simulate(
         self, x0: FloatArray, inputs: FloatArray, parameters: FloatArray | None = None, t0: float = 0.0
@@ -131,14 +114,12 @@ class Stepper:
 
         Parameters
         ----------
-        x0
-            State at t0 (nx,).
+        x0, t0
+            State (nx,) at the start of the first interval, and its time [s].
         inputs
             Inputs held in each interval (N, nu).
         parameters
             Parameter vector (np,), or one a row (N, np); default the model's values.
-        t0
-            Time at the start of the first interval [s].
 
         Returns
         -------
@@ -157,9 +138,8 @@ class Stepper:
         parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         by_row = np.tile(p, (len(u), 1)) if p.ndim == 1 else p
         for rows, count in _chunks(len(u)):
-            accumulated = self._accumulated(self.step, (), len(rows), 1)
-            found = accumulated(x[:, None], t[None, rows], u[rows].T, by_row[rows].T)
-            parts.append((found[0].T[:count], found[1].T[:count], found[2].T[:count]))
+            xs, ys, ss = self._steps(len(rows))(x[:, None], t[None, rows], u[rows].T, by_row[rows].T)
+            parts.append((xs.T[:count], ys.T[:count], ss.T[:count]))
             x = parts[-1][0][-1]
         widths = (len(q) for q in (self.model.states, self.model.outputs, self.model.signals))
         xs, ys, ss = (np.vstack([np.empty((0, w)), *(part[i] for part in parts)]) for i, w in enumerate(widths))
@@ -195,19 +175,18 @@ class Stepper:
             raise ModelError("sensitivities need one parameter vector for the whole record, got one a row")
         if self._single is not None:
             every = np.repeat(u, self.substeps, axis=0)
-            found = self._single.simulate_sensitivities(x0, every, p, wrt, x0_gradient, t0)
+            all_steps = self._single.simulate_sensitivities(x0, every, p, wrt, x0_gradient, t0)
             ends = slice(self.substeps - 1, None, self.substeps)
-            return replace(found, outputs=found.outputs[ends], gradient=found.gradient[ends])
+            return replace(all_steps, outputs=all_steps.outputs[ends], gradient=all_steps.gradient[ends])
         x = self._initial(x0)
         gradient = np.asarray(x0_gradient, dtype=float).reshape(x.size, -1)
         q = gradient.shape[1]
-        function = self.sensitivity_step(tuple(wrt), q)
         ys: list[FloatArray] = []
         dys: list[FloatArray] = []
         for rows, count in _chunks(len(u)):
-            accumulated = self._accumulated(function, tuple(wrt), len(rows), 2)
             held = np.tile(p[:, None], len(rows))
-            xs, gs, y, dy = accumulated(x[:, None], gradient, t[None, rows], u[rows].T, held)
+            steps = self._sensitivity_steps(tuple(wrt), q, len(rows))
+            xs, gs, y, dy = steps(x[:, None], gradient, t[None, rows], u[rows].T, held)
             x, gradient = xs[:, count - 1], gs[:, (count - 1) * q : count * q]
             ys.append(y.T[:count])
             dys.append(dy.reshape(len(y), len(rows), q).transpose(1, 0, 2)[:count])
@@ -219,57 +198,20 @@ class Stepper:
         Returns `(x, S (nx, q), t, u, p) -> (x_next, S_next (nx, q), y, dy (ny, q))` for q unknowns: the parameters
         `wrt`, followed by further ones that act through the state alone; default none.
         """
-        wrt, q = tuple(wrt), len(wrt) if unknowns is None else unknowns
+        q = len(wrt) if unknowns is None else unknowns
+        return self.model.derived(step_functions.sensitivity_step, self.interval, tuple(wrt), q)
 
-        def make() -> ca.Function:
-            x, t, u, p = self._symbols()
-            sensitivity = ca.SX.sym("S", x.numel(), q)
-            seeds = ca.horzcat(self._parameter_seeds(wrt), ca.DM(p.numel(), q - len(wrt)))
-            end, y = self._along(sensitivity, seeds)
-            results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
-            names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
-            return ca.Function(f"sensitivity_step_{q}", [x, sensitivity, t, u, p], results, *names, self._options)
+    def _steps(self, rows: int) -> FastCall:
+        """The step for so many intervals in a row."""
+        return self._calls.get(rows, lambda: _by_columns(self.model.derived(step_functions.steps, self.interval, rows)))
 
-        return self._kept(("sensitivity", wrt, q), make)
-
-    def _accumulated(self, function: ca.Function, wrt: tuple[str, ...], rows: int, carried: int) -> FastCall:
-        # mapaccum carries only the first argument unless told how many: with a state and its sensitivity it must be
-        # 2, else the sensitivity silently forgets the past.
-        name = function.name()
-
-        def make() -> ca.Function:
-            return self._ready(function, wrt).mapaccum(f"{name}_x{rows}", rows, carried)
-
-        key = name, wrt, rows
-        if key not in self._records:
-            whole = self._kept(key, make)
-            self._records[key] = FastCall(whole, [*whole.name_in(), *whole.name_out()])
-        return self._records[key]
-
-    def _ready(self, function: ca.Function, wrt: tuple[str, ...] = ()) -> ca.Function:
-        """A function of the step, as machine code where the model asks for it."""
-        if not self._compiled:
-            return function
-        return self._kept((function.name(), wrt, "compiled"), lambda: compiled(function))
-
-    def _kept(self, key: tuple[Hashable, ...], make: Callable[[], ca.Function]) -> ca.Function:
-        """Function made once for all steppers of the model with the same interval and method."""
-        full = (*self._key, *key)
-        if full not in self.model.kept:
-            self.model.kept[full] = make()
-        return self.model.kept[full]
-
-    def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        if self.accurate:
-            raise ModelError("exact sensitivities are those of the fast step; build the stepper with accurate=False")
-        x, t, u, p = self.step.sx_in()
-        return x, t, u, p
-
-    def _along(self, moved: ca.SX, seeds: ca.DM) -> tuple[Moving, Moving]:
-        return fast_step_along(self.model, self.dt, self.substeps, self._symbols(), moved, seeds)
-
-    def _parameter_seeds(self, wrt: Sequence[str]) -> ca.DM:
-        return ca.DM.eye(len(self.model.parameters))[:, self.model.indices("parameters", wrt)]
+    def _sensitivity_steps(self, wrt: tuple[str, ...], unknowns: int, rows: int) -> FastCall:
+        """The step with sensitivities for so many intervals in a row."""
+        builder = step_functions.sensitivity_steps
+        return self._calls.get(
+            (wrt, unknowns, rows),
+            lambda: _by_columns(self.model.derived(builder, self.interval, wrt, unknowns, rows)),
+        )
 
     def _initial(self, x0: FloatArray) -> FloatArray:
         x = np.asarray(x0, dtype=float)
@@ -303,23 +245,6 @@ def _chunks(n: int) -> list[tuple[NDArray[np.intp], int]]:
     return [(np.minimum(np.arange(i, i + size), n - 1), min(size, n - i)) for i in range(0, n, max(size, 1))]
 
 
-def _idas_step(model: Model, dt: float) -> ca.Function:
-    # IDAS integrates in scaled time over [0, 1] and in scaled states, so that one tolerance fits quantities of
-    # 1e-4 m3/s and of 40 kg alike; the physical time enters the equations as a parameter plus the scaled time.
-    nx, nu, npar, nz = (len(q) for q in (model.states, model.inputs, model.parameters, model.algebraic))
-    scale = ca.DM([q.scale for q in model.states])
-    xi, z, tau = ca.SX.sym("xi", nx), ca.SX.sym("z", nz), ca.SX.sym("tau")
-    held = ca.SX.sym("held", 1 + nu + npar)
-    t, u, p = held[0], held[1 : 1 + nu], held[1 + nu :]
-    xdot, residual, _, _ = model.dae(t + dt * tau, xi * scale, u, p, z)
-    problem = {"x": xi, "z": z, "p": held, "t": tau, "ode": dt * xdot / scale, "alg": residual}
-    options = {"reltol": IDAS_TOLERANCE, "abstol": IDAS_TOLERANCE * 1e-2, "max_num_steps": 100_000}
-    integrator = ca.integrator("idas", "idas", problem, 0.0, 1.0, options)
-
-    X, T, U, P = ca.MX.sym("x", nx), ca.MX.sym("t"), ca.MX.sym("u", nu), ca.MX.sym("p", npar)
-    guess = model.ode(T, X, U, P)[3]
-    solution = integrator(x0=X / scale, z0=guess, p=ca.vertcat(T, U, P))
-    end = solution["xf"] * scale
-    _, _, y, s = model.dae(T + dt, end, U, P, solution["zf"])
-    names = ["x", "t", "u", "p"], ["x_next", "y", "s"]
-    return ca.Function("accurate_step", [X, T, U, P], [end, y, s], *names)
+def _by_columns(function: ca.Function) -> FastCall:
+    """A call whose arguments and results are all matrices, a column an interval."""
+    return FastCall(function, [*function.name_in(), *function.name_out()])

@@ -10,6 +10,7 @@ from adaptive_flot.discovery.assessment.verification import SURE
 from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.search.alternatives import Alternative
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.extension import effect_units
 from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.page import Table, number
 from adaptive_flot.report.kit.style import exponent, unit_text
@@ -51,7 +52,7 @@ def coefficient_table(found: Discovery) -> Table:
     """Coefficients of the effects that the verdict tells, with their intervals."""
     rows = []
     for named in found.verdict.effects:
-        units = found.model.effect_units(named.effect)
+        units = effect_units(found.model, named.effect)
         for name, value in named.effect.coefficients.items():
             low, high = named.interval95.get(name, (np.nan, np.nan))
             interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"
