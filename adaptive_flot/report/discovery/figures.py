@@ -9,9 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.verdict.curve import EffectCurve
 from adaptive_flot.report.kit import style
 from adaptive_flot.report.kit.figures import legend_above
+from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 
 LEAST_SHOWN = 1e-4
 """Shares of the best candidate below this all look alike."""
@@ -99,6 +102,19 @@ def curve_figure(curves: Sequence[EffectCurve]) -> Figure:
     figure.align_ylabels(list(grid[:, 0]))
     legend_above(figure, list(grid[::2, 0]))
     return figure
+
+
+def residual_panels(problem: Problem, before: Fit, after: Fit) -> list[Panel]:
+    """Residual of the free run of each output over time, of the model as it is and of the extended one."""
+    shown, panels = slice(problem.first_row, None), []
+    time = problem.record.time[shown]
+    for j, c in enumerate(problem.columns):
+        q = before.model.outputs[c]
+        traces = [Trace("before", time, before.residual(problem)[shown, j], Role.CONSTANT)]
+        if after is not before:
+            traces.append(Trace("after", time, after.residual(problem)[shown, j], Role.ESTIMATE))
+        panels.append(Panel(f"{_words(q.name)}: residual", q.unit, tuple(traces), height=0.8))
+    return panels
 
 
 def _words(name: str) -> str:

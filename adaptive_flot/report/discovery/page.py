@@ -10,11 +10,11 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
-from adaptive_flot.report.discovery.figures import curve_figure, heat_map
+from adaptive_flot.report.discovery.figures import curve_figure, heat_map, residual_panels
 from adaptive_flot.report.discovery.test_design import experiment_chapter
 from adaptive_flot.report.kit import figures
 from adaptive_flot.report.kit.page import Album, Page, Picture, made_by, render
-from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Trace
+from adaptive_flot.report.kit.plotdata import Residuals, Role
 
 MOST_RESIDUALS = 3
 """Outputs whose residuals are drawn: those whose error fell most, in units of their noise."""
@@ -79,7 +79,7 @@ def _evidence(found: Discovery, problem: Problem, before: Fit, after: Fit, album
         "coefficients": tables.coefficient_table(found) if verdict.effects else None,
         "curve": curve,
         "errors": tables.error_table(found),
-        "before_after": [_before_after(found, problem, before, after, album)],
+        "before_after": [_before_after(problem, before, after, album)],
         "tests": tables.test_table(found),
         "symptoms": tables.symptom_table(found),
         "places": tables.place_table(found),
@@ -123,15 +123,8 @@ def _curve_picture(found: Discovery, problem: Problem, after: Fit, album: Album)
     return album.add(curve_figure(curves), caption, "Curve of the effect over its driver")
 
 
-def _before_after(found: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
-    shown, panels = slice(problem.first_row, None), []
-    time = problem.record.time[shown]
-    for j, c in enumerate(problem.columns):
-        q = found.model.outputs[c]
-        traces = [Trace("before", time, before.residual(problem)[shown, j], Role.CONSTANT)]
-        if after is not before:
-            traces.append(Trace("after", time, after.residual(problem)[shown, j], Role.ESTIMATE))
-        panels.append(Panel(f"{tables.words(q.name)}: residual", q.unit, tuple(traces), height=0.8))
+def _before_after(problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
+    panels = residual_panels(problem, before, after)
     caption = (
         "Measured minus free run, without and with the effect, but for the first rows, which are left out because the "
         "initial state is not known."

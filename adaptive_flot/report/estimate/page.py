@@ -9,13 +9,15 @@ import numpy as np
 
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.model import Quantity
+from adaptive_flot.report.estimate import series
+from adaptive_flot.report.estimate.series import Block
 from adaptive_flot.report.kit import figures
 from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, number, render
-from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Trace
+from adaptive_flot.report.kit.plotdata import Residuals
 from adaptive_flot.report.kit.style import exponent, unit_text
 from adaptive_flot.runner.commands.estimate import WHITENESS_LAGS, RecordEstimate, Replay
 
-BLOCKS = ("fit", "test")
+BLOCKS: tuple[Block, ...] = ("fit", "test")
 
 
 def write_estimate_report(result: RecordEstimate, path: Path | str, command: str = "") -> None:
@@ -37,9 +39,11 @@ def estimate_report(result: RecordEstimate, command: str = "") -> str:
     """Return the page that `write_estimate_report` writes."""
     album = Album()
     name = result.blocks.name
-    outputs = measured_outputs(result)
+    outputs = series.measured_outputs(result)
     parameters = _parameter_picture(result, album)  # first, as it comes first on the page and so in number
-    records = [album.add(figures.time_figure(_inputs(result)), f"{name}: inputs, fit block.", "Inputs over time")]
+    records = [
+        album.add(figures.time_figure(series.input_panels(result)), f"{name}: inputs, fit block.", "Inputs over time")
+    ]
     for block in BLOCKS:
         records += [_output_picture(result, q, block, album) for q in outputs]
     residuals = [_residual_picture(result, q, album) for q in outputs]
@@ -61,12 +65,6 @@ def estimate_report(result: RecordEstimate, command: str = "") -> str:
         residuals=residuals,
         statuses=_status_table(result),
     )
-
-
-def measured_outputs(result: RecordEstimate) -> list[Quantity]:
-    """Outputs that the record holds."""
-    columns = result.replays[0].table.columns
-    return [q for q in result.setup.model.outputs if f"{q.column}_measured" in columns]
 
 
 def _lead(result: RecordEstimate) -> str:
@@ -100,7 +98,7 @@ def _error_table(result: RecordEstimate) -> Table:
 def _findings(result: RecordEstimate) -> list[str]:
     """Sentences from the numbers: who predicts the test block best, and whether something is left."""
     found = []
-    for q in measured_outputs(result):
+    for q in series.measured_outputs(result):
         tests = {r.estimator: e for r in result.replays for e in r.errors if e.block == "test" and e.output == q.name}
         name = q.name.replace("_", " ")
         best = min(tests, key=lambda who: tests[who].free_run)
@@ -127,63 +125,22 @@ def _fit_table(result: RecordEstimate) -> Table:
     return Table(caption, header, tuple(rows), words=4)
 
 
-def _inputs(result: RecordEstimate) -> list[Panel]:
-    record = result.blocks.fit
-    panels = []
-    for j, q in enumerate(result.setup.model.inputs):
-        trace = Trace("input", record.time, record.inputs[:, j], Role.ESTIMATE, held=True)
-        panels.append(Panel(q.name.replace("_", " "), q.unit, (trace,), height=0.7))
-    return panels
-
-
-def _roles(result: RecordEstimate) -> dict[str, tuple[Role, int]]:
-    """`fixed` is the constant model; the others get a colour each."""
-    roles: dict[str, tuple[Role, int]] = {}
-    for replay in result.replays:
-        role = Role.CONSTANT if replay.estimator == "fixed" else Role.ESTIMATE
-        roles[replay.estimator] = role, sum(r is role for r, _ in roles.values())
-    return roles
-
-
-def _output_picture(result: RecordEstimate, q: Quantity, block: str, album: Album) -> Picture:
+def _output_picture(result: RecordEstimate, q: Quantity, block: Block, album: Album) -> Picture:
     name = q.name.replace("_", " ")
-    first = result.replays[0].table
-    rows = first[first["block"] == block]
-    time = rows["time_s"].to_numpy()
-    traces = [Trace("measured", time, rows[f"{q.column}_measured"].to_numpy(), Role.TRUTH)]
-    errors = []
-    for replay in result.replays:
-        role, index = _roles(result)[replay.estimator]
-        own = replay.table[replay.table["block"] == block]
-        traces.append(Trace(replay.estimator, time, own[f"{q.column}_predicted"].to_numpy(), role, index))
-        errors.append(Trace(replay.estimator, time, -own[f"{q.column}_innovation"].to_numpy(), role, index))
-    zoom = any(t.role is Role.ESTIMATE for t in errors)
-    panels = [
-        Panel(name, q.unit, tuple(traces), height=1.2),
-        Panel("predicted − measured", q.unit, tuple(errors), zoom=zoom),
-    ]
     caption = f"{result.blocks.name}, {block} block: {name}, measured and predicted one step ahead; below, the error."
-    return album.add(figures.time_figure(panels), caption, f"Measured and predicted {name}")
+    figure = figures.time_figure(series.output_panels(result, q, block))
+    return album.add(figure, caption, f"Measured and predicted {name}")
 
 
 def _parameter_picture(result: RecordEstimate, album: Album) -> Picture:
-    panels = []
-    for e in result.batch.estimates:
-        traces = []
-        for replay in result.replays:
-            role, index = _roles(result)[replay.estimator]
-            rows = replay.table if result.blocks.continues else replay.table[replay.table["block"] == "fit"]
-            values, std = rows[f"{e.label}_estimate"].to_numpy(), rows[f"{e.label}_std"].to_numpy()
-            traces.append(Trace(replay.estimator, rows["time_s"].to_numpy(), values, role, index, std=std))
-        panels.append(Panel(e.label, e.unit, tuple(traces)))
     caption = f"{result.blocks.name}: parameters with the ±2σ each estimator claims."
-    return album.add(figures.time_figure(panels), caption, "Parameters over time")
+    return album.add(figures.time_figure(series.parameter_panels(result)), caption, "Parameters over time")
 
 
 def _residual_picture(result: RecordEstimate, q: Quantity, album: Album) -> Picture:
     rows = []
     for replay in result.replays:
-        role, index = _roles(result)[replay.estimator]
+        role, index = series.roles(result)[replay.estimator]
         own = replay.table[replay.table["block"] == "test"]
         innovation = own[f"{q.column}_innovation"].to_numpy()
         std = _noise(result, q, replay)

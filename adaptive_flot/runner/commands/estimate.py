@@ -116,13 +116,22 @@ def read_blocks(path: Source, model: Model, fit_share: float) -> Blocks:
     if model.name == "cascaded-tanks":
         estimation, validation = read_benchmark(path)
         return Blocks(estimation.name.partition(":")[0], estimation, validation, continues=False)
-    required = (model.outputs[0].name,)
-    record = read_dataset(path, model, required_outputs=required)
-    cut = round(fit_share * len(record))
-    if not 2 <= cut <= len(record) - 2:
-        raise DataError(f"{named(path)}: {len(record)} rows can not be cut at {fit_share:g}; give a longer record")
+    return cut(read_dataset(path, model, required_outputs=(model.outputs[0].name,)), fit_share, str(named(path)))
+
+
+def cut(record: Dataset, fit_share: float, where: str) -> Blocks:
+    """Cut a record in time into fit and test block; `where` is what messages call it.
+
+    Raises
+    ------
+    DataError
+        A block would hold fewer than two rows.
+    """
+    rows = round(fit_share * len(record))
+    if not 2 <= rows <= len(record) - 2:
+        raise DataError(f"{where}: {len(record)} rows can not be cut at {fit_share:g}; give a longer record")
     # the test block starts at the last row of the fit block: that is its initial instant
-    return Blocks(record.name, record.rows(0, cut), record.rows(cut - 1), continues=True)
+    return Blocks(record.name, record.rows(0, rows), record.rows(rows - 1), continues=True)
 
 
 def estimate_record(
@@ -164,7 +173,7 @@ def estimate_record(
     names = model.expand_parameters(fit) if fit else tuple(p.name for p in model.parameters if p.role == "estimated")
     if not names:
         raise ModelError(f"model '{model.name}' has no parameter with the role 'estimated'; name them with --fit")
-    plugins = _plugins(estimators)
+    plugins = dict(estimators) if isinstance(estimators, Mapping) else {n: shipped_plugin(n) for n in estimators}
     driving = tuple(outputs) or blocks.fit.measured(model)
     model.indices("outputs", driving)
     unmeasured = [o for o in driving if o not in blocks.fit.measured(model)]
@@ -181,14 +190,18 @@ def estimate_record(
     return RecordEstimate(blocks, setup, batch, tuple(replays))
 
 
-def _plugins(given: Sequence[str] | Mapping[str, Plugin]) -> dict[str, Plugin]:
-    if isinstance(given, Mapping):
-        return dict(given)
+def shipped_plugin(name: str) -> Plugin:
+    """Plug-in behind a shipped name, `pem`, or `my_file:MyEstimator`.
+
+    Raises
+    ------
+    PluginError
+        None of these; the message holds the nearest name.
+    """
     known = {**ESTIMATORS, **BATCH_ESTIMATORS}
-    for name in given:
-        if name not in known and ":" not in name:
-            raise PluginError(f"unknown estimator {name!r}; {near_match(name, known)}")
-    return {name: Plugin(use=name) for name in given}
+    if name not in known and ":" not in name:
+        raise PluginError(f"unknown estimator {name!r}; {near_match(name, known)}")
+    return Plugin(use=name)
 
 
 def _replay(name: str, plugin: Plugin, setup: Setup, blocks: Blocks, batch: BatchFit, folder: Path | None) -> Replay:

@@ -85,6 +85,10 @@ class Plugin(_Part):
         plugin._factory = factory
         return plugin
 
+    def with_options(self, options: Mapping[str, Any]) -> Plugin:
+        """The same plug-in with some of its options replaced, or further ones."""
+        return self.model_copy(update={"options": {**self.options, **options}})
+
     def make(self, setup: object, shipped: Mapping[str, str], what: str, folder: Path | None = None) -> Any:
         """Construct it.
 

@@ -1,0 +1,231 @@
+"""Discover from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from adaptive_flot.api.models import AnyModel, Origin, read_model
+from adaptive_flot.api.records import AnyRecord, record_name
+from adaptive_flot.api.shown import check_kind, html_of, text_of
+from adaptive_flot.console import stage_bar
+from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.discover import discover as search_record
+from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
+from adaptive_flot.discovery.verdict.verdict import Verdict
+from adaptive_flot.errors import ResultError
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.extension import effect_units
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.runner.commands.discover import discover_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class Finding:
+    """What `discover` returns.
+
+    Attributes
+    ----------
+    name
+        What the record is called.
+    discovery
+        Everything behind the verdict: data checks, search, alternatives, fits.
+    origin
+        Where the model came from.
+    """
+
+    name: str
+    discovery: Discovery
+    origin: Origin
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the record says: `word`, `reason`, `effects`, `error`, `experiment`, and `as_dict()`."""
+        return self.discovery.verdict
+
+    @property
+    def model(self) -> Model:
+        """The model with the effect that was named (or the curve without a name), fitted; else the plain fitted one."""
+        return self.discovery.model
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Free-run root mean square error of each output, before and after, on rows that neither fitted nor chose."""
+        rows = [
+            {
+                "output": c.output,
+                "unit": c.unit,
+                "before": c.before,
+                "after": c.after,
+                "noise": c.noise,
+                "reduction_low_pct": 100 * c.reduction95[0],
+                "reduction_high_pct": 100 * c.reduction95[1],
+            }
+            for c in self.verdict.error
+        ]
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def effects(self) -> pd.DataFrame:
+        """Coefficients of the effects that the verdict tells: a row a coefficient, with its 95 % interval."""
+        rows = []
+        for named in self.verdict.effects:
+            units = effect_units(self.model, named.effect)
+            place = {"site": named.effect.site, "driver": named.effect.driver, "form": named.effect.form}
+            for key, value in named.effect.coefficients.items():
+                low, high = named.interval95.get(key, (float("nan"), float("nan")))
+                rows.append({**place, "coefficient": key, "value": value, "low": low, "high": high, "unit": units[key]})
+        return pd.DataFrame(rows)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What `plot` can draw of this finding, the most telling first."""
+        d = self.discovery
+        if d.search is None or d.problem is None or d.before is None or d.after is None:
+            return ()
+        return (*(("effect",) if self._curves else ()), "residual", "map")
+
+    def plot(self, kind: str | None = None) -> Figure:
+        """Draw the finding.
+
+        Parameters
+        ----------
+        kind
+            "effect": the curve of each effect over its driver, with its 95 % band. "residual": measured minus free run
+            over time, before and after. "map": what each site with each driver would explain. Default the first of
+            these that there is (see `kinds`).
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; `figure.savefig("finding.png")` writes it.
+
+        Raises
+        ------
+        ResultError
+            No such kind, or nothing was searched.
+        """
+        from adaptive_flot.report.discovery.figures import curve_figure, heat_map, residual_panels
+        from adaptive_flot.report.kit.figures import time_figure
+
+        d = self.discovery
+        if d.search is None or d.problem is None or d.before is None or d.after is None:
+            raise ResultError(f"plot: nothing was searched in {self.name}: {self.verdict.reason}")
+        kind = self.kinds[0] if kind is None else kind
+        check_kind(kind, self.kinds)
+        if kind == "effect":
+            return curve_figure(self._curves)
+        if kind == "residual":
+            return time_figure(residual_panels(d.problem, d.before, d.after))
+        best = d.judgement.best if d.judgement else None
+        return heat_map(d.search.rounds[0].scores, best.names if best else ())
+
+    def report(self, path: Path | str) -> Path:
+        """Write the report as one HTML page, whole or not at all; returns its path.
+
+        Raises
+        ------
+        OutputError
+            The file can not be written.
+        """
+        from adaptive_flot.report.discovery.page import write_discovery_report
+
+        write_discovery_report(self.discovery, Path(self.name).stem, path)
+        return Path(path)
+
+    def save(self, path: Path | str, *, base: str | None = None) -> Path:
+        """Write the extended model as a model file (YAML); every function that takes a model accepts it.
+
+        Parameters
+        ----------
+        path
+            File to write, `.yaml`.
+        base
+            Address of the function that makes the process, "my_file:make_model"; needed where a `Model` of one's own
+            was given.
+
+        Raises
+        ------
+        ResultError
+            Nothing was fitted.
+        ModelError
+            The process is not known, or the name does not end in .yaml.
+        OutputError
+            The file can not be written.
+        """
+        if self.discovery.before is None:
+            raise ResultError(f"{path}: nothing was fitted, so there is no model to write: {self.verdict.reason}")
+        return self.origin.save(self.model, path, f"discovered in {self.name}: {self.verdict.word}", base)
+
+    def __repr__(self) -> str:
+        return text_of(self._title, self.table)
+
+    def _repr_html_(self) -> str:
+        return html_of(self._title, self.table)
+
+    @property
+    def _title(self) -> str:
+        return f"{self.name}: {self.verdict.word}. {self.verdict.reason}"
+
+    @cached_property
+    def _curves(self) -> tuple[EffectCurve, ...]:
+        d = self.discovery
+        if d.problem is None or d.after is None or d.judgement is None or d.judgement.best is None:
+            return ()
+        return effect_curves(d.problem, d.after, len(d.judgement.best.names))
+
+
+def discover(
+    model: AnyModel,
+    data: AnyRecord,
+    *,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    processes: int | None = None,
+    progress: bool = False,
+) -> Finding:
+    """Find what physical effect a model lacks, from a measured record.
+
+    Parameters
+    ----------
+    model
+        A `Model` with sites, the name of a process or cell, a YAML file, or "my_file:make_model".
+    data
+        CSV or Parquet file, a DataFrame, or what `read_dataset` returned.
+    limits
+        Lowest and highest value of inputs by name, in the input's unit, for the test that is proposed. Default: the
+        test stays where the record has been.
+    processes
+        Fits that run at once; default as many as there are cores.
+    progress
+        Show the stages in a terminal.
+
+    Returns
+    -------
+    Finding
+        The verdict, the extended model, and the error before and after.
+
+    Raises
+    ------
+    DataError, RangeError
+        The record can not be used.
+    ModelError, CellError, PluginError
+        The model can not be used, or it has no sites.
+    """
+    made, origin = read_model(model)
+    name, workers = record_name(data), processes or available_processes()
+    with stage_bar(name) if progress else nullcontext(lambda stage: None) as advance:
+        if isinstance(data, Dataset):
+            found = search_record(made, data, limits=limits, processes=workers, progress=advance)
+        else:
+            found = discover_file(data, made, limits=limits, processes=workers, progress=advance)
+    return Finding(name, found, origin)

@@ -1,0 +1,38 @@
+"""Tables as notebooks show them; the kinds of a plot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+import pandas as pd
+
+from adaptive_flot.errors import ResultError, near_match
+
+
+def text_of(title: str, table: pd.DataFrame) -> str:
+    """A heading and a table, as text."""
+    return f"{title}\n{table.to_string(index=False, float_format=_number)}" if len(table) else title
+
+
+def html_of(title: str, table: pd.DataFrame) -> str:
+    """A heading and a table, as HTML."""
+    shown = table.to_html(index=False, border=0, float_format=_number) if len(table) else ""
+    return f"<div><p><strong>{escape(title)}</strong></p>{shown}</div>"
+
+
+def check_kind(kind: str, known: Iterable[str]) -> None:
+    """Refuse a plot that a result does not have.
+
+    Raises
+    ------
+    ResultError
+        Unknown kind; the message holds those that there are.
+    """
+    kinds = list(known)
+    if kind not in kinds:
+        raise ResultError(f"plot: no kind {kind!r} here; {near_match(kind, kinds)}")
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
