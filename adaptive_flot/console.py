@@ -55,7 +55,7 @@ def print_discovery(found: Discovery) -> None:
     for note in verdict.notes:
         console.print(f"- {note}", highlight=False, markup=False)
     if verdict.error:
-        title = f"Free-run root mean square error, {verdict.block} share of the record"
+        title = f"Free-run root mean square error, {verdict.split} split of the record"
         table = Table(title=title, title_justify="left")
         for heading in ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval"):
             table.add_column(heading, justify="left" if heading in ("output", "unit") else "right")

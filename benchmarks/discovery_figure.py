@@ -56,7 +56,7 @@ def truth(effect: dict[str, Any], name: str, driver: FloatArray) -> FloatArray:
 
 @style.styled
 def draw(found: Discovery, answer: dict[str, Any]) -> Figure:
-    """Residual over time, curve of the effect with the truth, error on the report share."""
+    """Residual over time, curve of the effect with the truth, error on the report split."""
     figure = Figure(figsize=(style.WIDTH * 1.35, 3.1))
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.7, 1.5, 0.9))
     _residual(left, found)
@@ -99,7 +99,7 @@ def _errors(ax: Axes, found: Discovery) -> None:
     bars = ax.bar(["before", "after"], values, color=[style.CONSTANT, style.colour(0)], width=0.6)
     ax.bar_label(bars, labels=[f"{v:.2f}" for v in values])
     ax.axhline(1e3 * change.noise, color="black", lw=1.0, ls=(0, (4, 2)), label="noise")
-    ax.set_title("Error, report share")
+    ax.set_title("Error, report split")
     ax.set_ylabel("RMS of grade [10⁻³]")
     ax.legend(loc="upper right")
     ax.margins(y=0.12)

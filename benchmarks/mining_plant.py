@@ -75,7 +75,7 @@ def attribution(model: Model, train: Dataset) -> tuple[Fit, Fit]:
 
 
 def _refitted(problem: Problem, base: Fit, best: Fit) -> tuple[Fit, Fit]:
-    """Both once more, on all shares of the first part."""
+    """Both once more, on all splits of the first part."""
     fitter = Fitter(problem, ("estimate", "confirm", "report"))
     before = fitter.fit(base.model, like=base, rounds=2) or base
     return before, fitter.fit(best.model, best.names, like=best, rounds=2) or best

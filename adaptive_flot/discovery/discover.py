@@ -12,15 +12,15 @@ from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
 from adaptive_flot.discovery.assessment.verification import changes, whiteness
 from adaptive_flot.discovery.candidates.direction import against, listed
-from adaptive_flot.discovery.fitting.base_fit import prepare, shared
+from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
-from adaptive_flot.discovery.record.screening import Gate, gate
+from adaptive_flot.discovery.record.screening import Screening, screen
 from adaptive_flot.discovery.search.alternatives import Alternative
-from adaptive_flot.discovery.search.common_nuisance import contest
+from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
 from adaptive_flot.discovery.search.search import Search, search
 from adaptive_flot.discovery.test_design.experiment import leading, plan_experiment
@@ -31,9 +31,9 @@ from adaptive_flot.discovery.verdict.verdict import (
     Judgement,
     NamedEffect,
     Verdict,
-    disputed,
     held_up,
     judge,
+    undecided_rivals,
 )
 from adaptive_flot.discovery.verdict.wording import drift_words, reason_words
 from adaptive_flot.errors import ModelError
@@ -53,15 +53,15 @@ class Discovery:
         What to tell.
     model
         The model with what was named (or the unnamed curve) added, fitted; the plain fitted model else.
-    gate, problem, search, judgement
+    screening, problem, search, judgement
         The stages; None from the one that was not reached.
     before, after
-        Fits of the plain and of the extended model to the estimation and confirm shares.
+        Fits of the plain and of the extended model to the estimation and confirm splits.
     """
 
     verdict: Verdict
     model: Model
-    gate: Gate
+    screening: Screening
     problem: Problem | None = None
     search: Search | None = None
     judgement: Judgement | None = None
@@ -118,11 +118,11 @@ def discover(
         input_range(record.inputs, model.inputs, limits)  # a wrong limit is told before the search
     names = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
     progress("check the data")
-    checked = gate(record, model)
+    checked = screen(record, model)
     if checked.reasons:
         return Discovery(_insufficient(checked, began), model, checked)
     progress("fit the model as it is")
-    problem, checked = shared(checked, model, names, CYCLE if report_record is None else WITHOUT_REPORT)
+    problem, checked = split_record(checked, model, names, CYCLE if report_record is None else WITHOUT_REPORT)
     if checked.reasons:
         return Discovery(_insufficient(checked, began), model, checked)
     prepared = prepare(problem, model)
@@ -141,11 +141,11 @@ def discover(
     if wants_joint(problem, found):
         problem, found = search_jointly(problem, found, processes=processes, progress=progress)
         base = found.base
-    if problem.whiten and (rivals := disputed(found)):
-        progress("grant each what is left")
-        found = contest(problem, found, rivals, processes)
+    if problem.whiten and (rivals := undecided_rivals(found)):
+        progress("compare with a common nuisance")
+        found = adjust_for_common_nuisance(problem, found, rivals, processes)
     found, judgement = held_up(problem, found, judge(found))
-    progress("fit once more, without the report share")
+    progress("fit once more, without the report split")
     before, after = _final(problem, base, judgement.best)
     verdict = _verdict(problem, checked, found, judgement, before, after, report_record)
     verdict = replace(verdict, detection=detection, location=locate(detection, found.rounds[0].scores))
@@ -163,9 +163,9 @@ def discover(
 
 
 def _final(problem: Problem, base: Fit, best: Alternative | None) -> tuple[Fit, Fit]:
-    """Fits to all rows but the report share, run at every row: of the model as it is, and of the best alternative."""
-    shares = ("estimate", "confirm")
-    fitter, every = Fitter(problem, shares), Fitter(replace(problem, nodes=None), shares)
+    """Fits to all rows but the report split, run at every row: of the model as it is, and of the best alternative."""
+    splits = ("estimate", "confirm")
+    fitter, every = Fitter(problem, splits), Fitter(replace(problem, nodes=None), splits)
 
     def final(fit: Fit) -> Fit:
         again = fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit
@@ -180,7 +180,7 @@ def on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tup
     n, columns = len(record), list(problem.columns)
     everywhere = np.full(n, "report", dtype="<U8")
     weights = np.ones((n, len(columns)))
-    there = replace(problem, record=record, blocks=everywhere, weights=weights)
+    there = replace(problem, record=record, splits=everywhere, weights=weights)
 
     def run(fit: Fit) -> Fit:
         free = RecordSimulator(fit.model, record.dt).outputs(record, fit.initial_state, fit.model.parameter_values)
@@ -189,14 +189,14 @@ def on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tup
     return there, run(before), run(after)
 
 
-def _insufficient(checked: Gate, began: float) -> Verdict:
+def _insufficient(checked: Screening, began: float) -> Verdict:
     reason = "The record does not say enough: " + "; ".join(checked.reasons) + "."
     return Verdict("insufficient", reason, notes=checked.notes, seconds=time.perf_counter() - began)
 
 
 def _verdict(
     problem: Problem,
-    checked: Gate,
+    checked: Screening,
     found: Search,
     judgement: Judgement,
     before: Fit,
@@ -232,15 +232,15 @@ def _verdict(
         parameters=dict(zip(labels, map(float, final.values[:count]), strict=True)),
         drift=drift,
         absorbed=absorbed,
-        notes=checked.notes + _granted_words(found),
+        notes=checked.notes + _common_nuisance_note(found),
     )
 
 
-def _granted_words(found: Search) -> tuple[str, ...]:
-    if found.granted is None:
+def _common_nuisance_note(found: Search) -> tuple[str, ...]:
+    if found.common_nuisance is None:
         return ()
-    site, driver = found.granted
-    return (f"close alternatives were compared with what they leave, {site} by {driver}, granted to each",)
+    site, driver = found.common_nuisance
+    return (f"close alternatives were compared with what they leave, {site} by {driver}, added to each",)
 
 
 def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
@@ -251,7 +251,7 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
         others = tuple(
-            (*instead[0], a.worse_than(best), a.doubt)
+            (*instead[0], a.worse_than(best), a.loglik_difference_sd)
             for a in judgement.rivals
             if len(instead := [n for n in a.names if n not in best.names]) == 1
             and set(best.names) - set(a.names) == {own}

@@ -8,7 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.assessment.verification import Verification, changes, doubts, verify, whiteness
+from adaptive_flot.discovery.assessment.verification import (
+    Verification,
+    changes,
+    loglik_difference_sds,
+    verify,
+    whiteness,
+)
 from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.fitting.fit import row_losses
 from adaptive_flot.discovery.search.alternatives import Alternative
@@ -64,16 +70,16 @@ def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, f
     assert all(rival is not judged.best for rival in judged.rivals)
 
 
-@pytest.mark.parametrize(("granted", "word"), [(None, "none"), (("heating", "time"), "abstain")])
-def test_a_drift_is_all_there_is_only_where_nothing_was_granted_beside_it(
-    draught: Discovery, granted: tuple[str, str] | None, word: str
+@pytest.mark.parametrize(("nuisance", "word"), [(None, "none"), (("heating", "time"), "abstain")])
+def test_a_drift_is_all_there_is_only_where_nothing_was_added_beside_it(
+    draught: Discovery, nuisance: tuple[str, str] | None, word: str
 ) -> None:
     found = _search(draught, (BY_TIME, True, 0.0), (BY_FAN, True, 5.0))
     drift = Effect("heat_loss", "time", "ramp", {"amplitude": 0.2, "onset": 0.0, "duration": 9000.0})
     own = found.alternatives[0]
     model = heated_tank().with_effects([drift])
     alternatives = (replace(own, fit=replace(own.fit, model=model)), found.alternatives[1])
-    found = replace(found, alternatives=alternatives, granted=granted, adapted_sites=("heat_loss",))
+    found = replace(found, alternatives=alternatives, common_nuisance=nuisance, adapted_sites=("heat_loss",))
     judged = judge(found)
     assert judged.word == word and judged.best is alternatives[0]
 
@@ -83,21 +89,21 @@ def test_a_rival_that_could_as_well_have_been_better_is_not_told_apart(draught: 
     found = _search(draught, (BY_FAN, True, 0.0), (BY_HEATER, True, 50.0))
     best, rival = found.alternatives
     assert judge(found).word == "named"
-    unsure = judge(replace(found, alternatives=(best, replace(rival, doubt=30.0))))
+    unsure = judge(replace(found, alternatives=(best, replace(rival, loglik_difference_sd=30.0))))
     assert unsure.word == "class" and unsure.near(rival) is False and unsure.near(unsure.rivals[0])
 
 
 def test_evidence_of_correlated_innovations_counts_once(draught: Discovery) -> None:
     found = _search(draught, (BY_FAN, True, 0.0), (BY_HEATER, True, 50.0))
-    assert judge(replace(found, together=4.0)).word == "named"
-    assert judge(replace(found, together=6.0)).word == "class"
+    assert judge(replace(found, rows_per_effective_sample=4.0)).word == "named"
+    assert judge(replace(found, rows_per_effective_sample=6.0)).word == "class"
 
 
-def test_doubt_is_the_spread_of_the_difference_over_blocks(draught: Discovery) -> None:
+def test_the_loglik_difference_sd_is_the_spread_of_the_difference_over_blocks(draught: Discovery) -> None:
     """Against itself none; against the model without the effect far less than what that one is worse by."""
     problem, before, after = draught.problem, draught.before, draught.after
     assert problem is not None and before is not None and after is not None
-    same, other = doubts(problem, after, [after, before])
+    same, other = loglik_difference_sds(problem, after, [after, before])
     assert same == 0.0
     rows = problem.rows("estimate")
     difference = float(np.sum(row_losses(problem, before, rows) - row_losses(problem, after, rows)))
@@ -122,7 +128,7 @@ def test_verify_tells_better_from_the_same_and_the_worse(draught: Discovery) -> 
     assert not back.confirmed and back.worse == ("temperature",)
 
 
-def test_the_error_is_that_of_the_share_and_the_interval_holds_it(draught: Discovery) -> None:
+def test_the_error_is_that_of_the_split_and_the_interval_holds_it(draught: Discovery) -> None:
     problem, before, after = draught.problem, draught.before, draught.after
     assert problem is not None and before is not None and after is not None
     (change,) = changes(problem, before, after, "report")
@@ -178,12 +184,12 @@ def test_the_curve_shows_the_shape_where_a_constant_is_an_adapted_parameter(drau
     assert np.mean((curve.low - 1e-9 <= truth) & (truth <= curve.high + 1e-9)) > 0.9
 
 
-@pytest.mark.parametrize(("course", "said"), [([0.0, 0.1, 0.2], "+22 %"), ([0.2, 0.1, 0.0], "-18 %")])
-def test_a_drift_is_told_with_its_direction(draught: Discovery, course: list[float], said: str) -> None:
+@pytest.mark.parametrize(("profile", "said"), [([0.0, 0.1, 0.2], "+22 %"), ([0.2, 0.1, 0.0], "-18 %")])
+def test_a_drift_is_told_with_its_direction(draught: Discovery, profile: list[float], said: str) -> None:
     """A fall is no rise: the sign is that of the larger extreme coming last."""
     assert draught.judgement is not None and draught.judgement.best is not None and draught.after is not None
     knots = {"knots": (0.0, 1.0, 2.0)}
-    effect = Effect("heat_loss", "time", "curve", {f"value_{k + 1}": v for k, v in enumerate(course)}, knots)
+    effect = Effect("heat_loss", "time", "curve", {f"value_{k + 1}": v for k, v in enumerate(profile)}, knots)
     after = replace(draught.after, model=heated_tank().with_effects([effect]))
     assert said in drift_words(draught.judgement, after)[0]
 
@@ -195,7 +201,9 @@ def test_a_name_is_confirmed_for_what_it_names(draught: Discovery) -> None:
     stands, judged = held_up(draught.problem, found, judge(found))
     assert judged.word == "named" and stands.verification is not None and stands.verification != found.verification
     nothing = replace(found.alternatives[1], fit=draught.search.base)
-    found = replace(found, alternatives=(found.alternatives[0], replace(nothing, told=None)))
-    found = replace(found, alternatives=tuple(replace(a, told=5.0 * k) for k, a in enumerate(found.alternatives)))
+    found = replace(found, alternatives=(found.alternatives[0], replace(nothing, adjusted_bic=None)))
+    found = replace(
+        found, alternatives=tuple(replace(a, adjusted_bic=5.0 * k) for k, a in enumerate(found.alternatives))
+    )
     assert judge(found).word == "named"
     assert held_up(draught.problem, found, judge(found))[1].word == "abstain"

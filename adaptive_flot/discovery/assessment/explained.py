@@ -2,7 +2,7 @@
 
 Two ways, so that neither a poor model nor a poor regression decides alone: the free run of the fitted model, and a
 ridge regression on every input at every time scale (the inputs through first-order filters), both judged on rows that
-they were not fitted to. Like the data gate this takes all rows, those of the report too: it says whether there is
+they were not fitted to. Like the data screening this takes all rows, those of the report too: it says whether there is
 anything to search for, and chooses no effect. On fewer rows a slow process passes for unexplained by chance.
 """
 

@@ -16,13 +16,13 @@ from adaptive_flot.greybox.model import FloatArray
 
 BLOCK_ROWS = 20
 """Rows of a block of the paired block bootstrap: longer than the noise remembers."""
-DOUBT_ROWS = 60
+COMPARISON_BLOCK_ROWS = 60
 """Rows of a block in which two fits are compared: what both lack is slower than the noise."""
 SURE = 2.0
 """Standard deviations by which an alternative must be worse to be told apart."""
 SHORTEST_BLOCK = 4
 MANY_BLOCKS = 8
-"""A share too short for so many blocks gets shorter ones."""
+"""A split too short for so many blocks gets shorter ones."""
 DRAWS = 500
 WORSE = 0.02
 """Share by which no output's error may grow."""
@@ -31,7 +31,7 @@ LAGS = 20
 
 @dataclass(frozen=True)
 class OutputChange:
-    """Free-run error of one output on one share: before, after, its noise, and a 95 % interval of the reduction."""
+    """Free-run error of one output on one split: before, after, its noise, and a 95 % interval of the reduction."""
 
     output: str
     unit: str
@@ -68,7 +68,7 @@ class Verification:
     reduction95: tuple[float, float]
     worse: tuple[str, ...]
     confirmed: bool
-    where: str = "on the confirm share"
+    where: str = "on the confirm split"
 
     def __str__(self) -> str:
         low, high = (100 * r for r in self.reduction95)
@@ -77,7 +77,7 @@ class Verification:
 
 
 def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
-    """Compare two fits of the estimation share on the confirm share, in units of the noise of the better one."""
+    """Compare two fits of the estimation split on the confirm split, in units of the noise of the better one."""
     rows = problem.rows("confirm")
     size = problem.weights * after.noise.stationary_std()
     old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
@@ -90,14 +90,14 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)
 
 
-def doubts(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
+def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
     """Standard deviation of the difference between each fit's minus two log-likelihood and that of the best.
 
     By resampling blocks of rows with the fits as they are: Kishino & Hasegawa, J. Mol. Evol. 29 (1989) 170. A fit that
     is worse by less than `SURE` of these would be the better one in some records like this.
     """
     rows = problem.rows("estimate")
-    length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, DOUBT_ROWS))
+    length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, COMPARISON_BLOCK_ROWS))
     count = int(rows.sum()) // length
     if count < MANY_BLOCKS:
         return tuple(0.0 for _ in others)
@@ -109,8 +109,8 @@ def doubts(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, .
     return tuple(found)
 
 
-def together(problem: Problem, before: Fit, after: Fit) -> float:
-    """Innovations of a fit that tell one story, averaged over the outputs by what it gained in each on another fit.
+def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> float:
+    """Rows for each effective sample of a fit's innovations, averaged by what it gained in each output on another fit.
 
     A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
     """
@@ -125,20 +125,20 @@ def together(problem: Problem, before: Fit, after: Fit) -> float:
 
 
 def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
-    """Whether what a freer form gains pays for its further coefficients, evidence counted once a story.
+    """Whether what a freer form gains pays for its further coefficients, evidence counted once an effective sample.
 
-    Where something else is still missing, neighbouring rows err alike, and a criterion that counts them all would take
-    any freedom it can get.
+    Where something else is still missing, neighbouring rows err alike, and a criterion that counts them all would
+    take any freedom it can get.
     """
-    alike = together(problem, before, after)
+    rows_each = rows_per_effective_sample(problem, before, after)
     further = len(after.names) - len(before.names)
-    stories = max(problem.count(problem.rows("estimate")) / alike, 2.0)
-    return (before.loss - after.loss) / alike > further * float(np.log(stories))
+    samples = max(problem.count(problem.rows("estimate")) / rows_each, 2.0)
+    return (before.loss - after.loss) / rows_each > further * float(np.log(samples))
 
 
-def changes(problem: Problem, before: Fit, after: Fit, share: str) -> tuple[OutputChange, ...]:
-    """Free-run error of each measured output on one share of the record, before and after."""
-    rows = problem.rows(share)
+def changes(problem: Problem, before: Fit, after: Fit, split: str) -> tuple[OutputChange, ...]:
+    """Free-run error of each measured output on one split of the record, before and after."""
+    rows = problem.rows(split)
     ones = np.ones_like(problem.weights)
     old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
     noise = after.noise.stationary_std()

@@ -4,11 +4,11 @@ Map
 ---
 catalogue.py    For each site and driver, what scores it and what is fitted.
 variant.py      One way to score and fit a candidate.
-responses.py    How outputs answer to a small change at each site.
+responses.py    How outputs respond to a small change at each site.
 score_test.py   The efficient score statistic of every candidate.
 spline.py       Free curves over a driver.
 knots.py        Knots that a curve does not need.
 step_events.py  Steps, ramps and washouts in time.
-dynamics.py     Sensors that answer late; actuators that follow late, stick or reach a limit.
+dynamics.py     Sensors that respond late; actuators that follow late, stick or reach a limit.
 direction.py    Which way a physical cause goes.
 """

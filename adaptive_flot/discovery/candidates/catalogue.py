@@ -1,4 +1,4 @@
-"""The catalogue of a search: for each site and driver the courses that score it and the effects to fit."""
+"""The catalogue of a search: for each site and driver the profiles that score it and the effects to fit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.candidates.dynamics import late, limited
-from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.spline import knots_of, spline_values, through
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.record.screening import LEAST_RANGE
@@ -71,7 +71,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
 def _makes_sense(site: Site, driver: str) -> bool:
     if driver in ("lag", "delay"):
         return site.role in ("sensor", "actuator", "feed") and site.passed == 1
-    if driver == "saturation":  # a sensor at its limit shows in the data gate
+    if driver == "saturation":  # a sensor at its limit shows in the data screening
         return site.role == "actuator" and site.passed == 1
     return True
 
@@ -92,11 +92,11 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
     offset = site.mode == "offset"
     ones = np.ones(len(time))
 
-    def course(values: FloatArray) -> Course:
-        return Course(site.name, values, offset)
+    def profile(values: FloatArray) -> TimeProfile:
+        return TimeProfile(site.name, values, offset)
 
     if driver == "constant":
-        yield Variant(Effect(site.name, driver, "shift"), (course(ones),), ("amplitude",))
+        yield Variant(Effect(site.name, driver, "shift"), (profile(ones),), ("amplitude",))
     elif driver == "time":
         yield from _in_time(site, time, offset)
     elif driver in ("lag", "delay"):
@@ -108,10 +108,10 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
 
 
 def _otherwise(variant: Variant, site: Site) -> Variant:
-    """The same course as a factor where the site's own way is an offset, and the other way round."""
+    """The same profile as a factor where the site's own way is an offset, and the other way round."""
     effect = replace(variant.effect, mode="factor" if site.mode == "offset" else "offset")
-    courses = tuple(replace(c, offset=not c.offset) for c in variant.courses)
-    return replace(variant, effect=effect, courses=courses)
+    profiles = tuple(replace(c, offset=not c.offset) for c in variant.profiles)
+    return replace(variant, effect=effect, profiles=profiles)
 
 
 def _in_time(site: Site, time: FloatArray, offset: bool) -> Iterator[Variant]:
@@ -144,7 +144,7 @@ def event(site: Site, form: str, time: FloatArray, onset: float, length: float, 
         values = 1 - np.exp(-since / length)
         start += (("time_constant", length),)
     effect = Effect(site.name, "time", form, settings=settings)
-    return Variant(effect, (Course(site.name, values, offset),), ("amplitude",), start)
+    return Variant(effect, (TimeProfile(site.name, values, offset),), ("amplitude",), start)
 
 
 def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states: Sequence[str]) -> Iterator[Variant]:
@@ -158,7 +158,7 @@ def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states
     ones = np.ones(len(values))
     logs = np.log(np.maximum(values / reference, 1e-6))
     settings = {"reference": reference}
-    columns = Course(site.name, ones, offset), Course(site.name, logs, offset)
+    columns = TimeProfile(site.name, ones, offset), TimeProfile(site.name, logs, offset)
     yield Variant(Effect(site.name, driver, "power", settings=settings), columns, ("amplitude", "exponent"))
     knots = _knots(values)
     if knots is not None:
@@ -184,8 +184,8 @@ def _spills(site: Site, driver: str, values: FloatArray) -> Iterator[Variant]:
     for share in SPILL_QUANTILES:
         edge = float(np.quantile(values, share))
         above = np.maximum(values - edge, 0)
-        courses = Course(site.name, values, True), Course(site.name, above, True)
-        yield Variant(effect, courses, ("slope", "gain"), (("threshold", edge),))
+        profiles = TimeProfile(site.name, values, True), TimeProfile(site.name, above, True)
+        yield Variant(effect, profiles, ("slope", "gain"), (("threshold", edge),))
 
 
 def _knots(values: FloatArray) -> tuple[float, ...] | None:
@@ -214,4 +214,4 @@ def _curve(site: Site, driver: str, values: FloatArray, knots: tuple[float, ...]
     effect = Effect(site.name, driver, "curve", settings={"knots": knots})
     basis = spline_values(values, knots)
     names = tuple(f"value_{k + 1}" for k in range(len(knots)))
-    return Variant(effect, tuple(Course(site.name, b, offset) for b in basis.T), names)
+    return Variant(effect, tuple(TimeProfile(site.name, b, offset) for b in basis.T), names)

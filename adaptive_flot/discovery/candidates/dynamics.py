@@ -1,4 +1,4 @@
-"""Sensors that answer late, actuators that follow late, stick or reach a limit: what each does to the value there."""
+"""Sensors that respond late, actuators that follow late, stick or reach a limit: what each does to the value there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.record.screening import LEAST_RANGE
 from adaptive_flot.greybox.effects import Effect
@@ -31,7 +31,7 @@ BANDS = (0.3, 1.0)
 
 
 def late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
-    """Variants of what answers late: lags or dead times of several lengths, for an actuator a wide dead band."""
+    """Variants of what responds late: lags or dead times of several lengths, for an actuator a wide dead band."""
     if not _moves(responses.site_values[site.name]):
         return
     if driver == "delay":
@@ -43,12 +43,12 @@ def late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
         once = _first_order(v, float(np.exp(-dt / constant)))
         effect = Effect(site.name, "lag", "lag", settings={"scale": scale})
         start = (("time_constant", constant),)
-        yield Variant(effect, (Course(site.name, once - v, True),), ("amplitude",), start)
+        yield Variant(effect, (TimeProfile(site.name, once - v, True),), ("amplitude",), start)
         second = SECOND_LAG * constant
         twice = _first_order(once, float(np.exp(-dt / second)))
         effect = Effect(site.name, "lag", "lags", settings={"scale": scale})
         yield Variant(
-            effect, (Course(site.name, twice - v, True),), ("amplitude",), (*start, ("time_constant_2", second))
+            effect, (TimeProfile(site.name, twice - v, True),), ("amplitude",), (*start, ("time_constant_2", second))
         )
     if site.role == "actuator":
         yield from _sticking(site, responses)
@@ -70,7 +70,7 @@ def _delayed(site: Site, responses: Responses) -> Iterator[Variant]:
     for dead_time in (d for d in DELAYS_S if d <= LONGEST_DELAY * (time[-1] - time[0])):
         rows = max(1, round(dead_time / responses.problem.record.dt))
         delayed = np.concatenate([np.full(rows, v[0]), v[:-rows]])
-        yield Variant(effect, (Course(site.name, delayed - v, True),), ("amplitude",), (("dead_time", dead_time),))
+        yield Variant(effect, (TimeProfile(site.name, delayed - v, True),), ("amplitude",), (("dead_time", dead_time),))
 
 
 def limited(site: Site, responses: Responses) -> Iterator[Variant]:
@@ -83,8 +83,8 @@ def limited(site: Site, responses: Responses) -> Iterator[Variant]:
     for share in LIMIT_QUANTILES:
         limit = float(np.quantile(v, share))
         if limit < float(np.max(v)):
-            course = Course(site.name, -np.maximum(v - limit, 0.0), True)
-            yield Variant(effect, (course,), ("amplitude",), (("limit", limit),))
+            profile = TimeProfile(site.name, -np.maximum(v - limit, 0.0), True)
+            yield Variant(effect, (profile,), ("amplitude",), (("limit", limit),))
 
 
 def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
@@ -94,9 +94,9 @@ def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
     for share in BANDS:
         band = share * float(np.std(v))
         if band > 0:
-            course = Course(site.name, dragged(v, band) - v, True)
+            profile = TimeProfile(site.name, dragged(v, band) - v, True)
             effect = Effect(site.name, "lag", "stiction", settings=settings)
-            yield Variant(effect, (course,), ("amplitude",), (("band", band),))
+            yield Variant(effect, (profile,), ("amplitude",), (("band", band),))
 
 
 def dragged(v: FloatArray, band: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Knots of a fitted curve that it does not need: the true cause draws the simplest course, others must mimic its run.
+"""Knots of a fitted curve that it does not need: the true cause draws the simplest profile, others must mimic its run.
 
 Backward elimination on the grid of knots that was fitted, by what the loss of each adds to minus two log-likelihood to
 second order (Wald's test): Smith 1982, NASA CR-166034, knots of a regression spline as a choice of variables.
@@ -86,7 +86,7 @@ def _without(
 
 
 def is_even(knots: list[float]) -> bool:
-    """Whether knots are evenly spread, or what trimming has left of the even knots of a course in time."""
+    """Whether knots are evenly spread, or what trimming has left of the even knots of a time profile."""
     places = (np.array(knots) - knots[0]) / (knots[-1] - knots[0])
     for count in (len(knots), TIME_KNOTS, FINE_TIME_KNOTS, MOST_KNOTS):
         steps = places * (count - 1)

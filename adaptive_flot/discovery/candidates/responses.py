@@ -1,8 +1,8 @@
-"""How each output would answer to a small change at each site: the model linearised along a fitted free run.
+"""How each output would respond to a small change at each site: the model linearised along a fitted free run.
 
-One pass gives the one-step Jacobians of every row; the answer to *any* time course of *any* site is then a product of
-small matrices. So a whole catalogue of effects is scored for the price of one sensitivity simulation. At amplitude zero
-this is exact: a driver's own feedback is of second order.
+One pass gives the one-step Jacobians of every row. The response to *any* time profile at *any* site is then a product
+of small matrices. So a whole catalogue of effects is scored for the price of one sensitivity simulation. At amplitude
+zero this is exact: a driver's own feedback is of second order.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
 ROWS_AT_ONCE = 500
 FILLED_AT_ONCE = 64
-"""Rows of answers that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
+"""Rows of responses that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
 LEAST_VALUE = 1e-6
 """Share of its largest value below which a site is at zero."""
 
 
 @dataclass(frozen=True)
-class Course:
-    """A time course at a site: change of the logarithm of its value, or of the value itself where `offset`, (N,)."""
+class TimeProfile:
+    """A time profile at a site: change of the logarithm of its value, or of the value itself where `offset`, (N,)."""
 
     site: str
     values: FloatArray
@@ -37,7 +37,7 @@ class Course:
 
 
 class Responses:
-    """Linear answers of the measured outputs along one fitted free run.
+    """Linear responses of the measured outputs along one fitted free run.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Responses:
     site_values
         Series (N,) of the value at each site (the first component), at the times of the rows.
     nuisance
-        Answers (N, m, r) to the parameters that are free already and to the initial state.
+        Responses (N, m, r) to the parameters that are free already and to the initial state.
     """
 
     def __init__(self, problem: Problem, fit: Fit) -> None:
@@ -98,7 +98,7 @@ class Responses:
                 target[rows] = np.array(value).reshape(height, count, width).transpose(1, 0, 2)
         columns = list(self.problem.columns)
         self._C, self._H = self._C[:, columns], self._H[:, columns]
-        # what moves no state acts at once: such answers are worked out at all rows, between the nodes too
+        # what moves no state acts at once: such responses are worked out at all rows, between the nodes too
         self._at_once = np.logical_not(np.any(self._G != 0, axis=(0, 1)))
         self._direct = self._spread(np.concatenate([self._H[:1], self._H]))
 
@@ -138,11 +138,11 @@ class Responses:
         return self._propagate(S, list(range(self._q)), inputs)
 
     def _propagate(
-        self, S: FloatArray, source: list[int], courses: FloatArray, rows: BoolArray | None = None
+        self, S: FloatArray, source: list[int], profiles: FloatArray, rows: BoolArray | None = None
     ) -> FloatArray:
-        """Answers (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, courses (N, r).
+        """Responses (N, m, r): start S (nx, r), column of G and H of the first `len(source)`, profiles (N, r).
 
-        What the courses are in row k acts in the interval that ends there; in the first row the same as in the second.
+        What the profiles are in row k acts in the interval that ends there; in the first row the same as in the second.
         """
         m, r = len(self.problem.columns), S.shape[1]
         where = np.array(source, dtype=np.intp)
@@ -150,7 +150,7 @@ class Responses:
         # those that move a state, then those that only start somewhere: a block is quicker than picked columns
         moving = np.concatenate([slow, np.arange(len(where), r)])
         pushed, source_of = slice(0, len(slow)), where[slow]
-        by_step = (courses[1:] if self._nodes is None else self._nodes.means(courses))[:, slow]
+        by_step = (profiles[1:] if self._nodes is None else self._nodes.means(profiles))[:, slow]
         S, out = S[:, moving], np.empty((len(self._steps) + 1, m, len(moving)))
         for i in range(len(self._steps)):
             np.matmul(self._C[i], S, out=out[i + 1])  # outputs at the end of the interval, by the state at its start
@@ -158,19 +158,19 @@ class Responses:
             S = self._A[i] @ S
             S[:, pushed] += self._G[i][:, source_of] * by_step[i]
         out[0] = out[1]
-        kept = np.arange(len(courses)) if rows is None else np.flatnonzero(rows)
+        kept = np.arange(len(profiles)) if rows is None else np.flatnonzero(rows)
         found = np.empty((len(kept), m, r))
         for first in range(0, len(kept), FILLED_AT_ONCE):
             part, part_of = found[first : first + FILLED_AT_ONCE], kept[first : first + FILLED_AT_ONCE]
             part[:, :, moving] = self._spread(out, part_of)
-            part[:, :, at_once] = self._direct[part_of][:, :, where[at_once]] * courses[part_of][:, None, at_once]
+            part[:, :, at_once] = self._direct[part_of][:, :, where[at_once]] * profiles[part_of][:, None, at_once]
         return found
 
-    def of(self, courses: list[Course], rows: BoolArray | None = None) -> FloatArray:
-        """Answers (N, m, r) of the measured outputs to r courses; of the rows (N,) that are true only, if any given."""
-        source = [self._q + self.sites.index(c.site) for c in courses]
-        table = np.empty((len(self.problem.record), len(courses)))
-        for j, c in enumerate(courses):
+    def of(self, profiles: list[TimeProfile], rows: BoolArray | None = None) -> FloatArray:
+        """Responses (N, m, r) of the measured outputs to r profiles; only of the true rows (N,), if given."""
+        source = [self._q + self.sites.index(c.site) for c in profiles]
+        table = np.empty((len(self.problem.record), len(profiles)))
+        for j, c in enumerate(profiles):
             v = c.values
             default = self._offset[c.site]
             if c.offset and not default:
@@ -179,7 +179,7 @@ class Responses:
                 v = v * self.site_values[c.site]
             table[:, j] = v
         table[0] = table[1]
-        return self._propagate(np.zeros((len(self.fit.initial_state), len(courses))), source, table, rows)
+        return self._propagate(np.zeros((len(self.fit.initial_state), len(profiles))), source, table, rows)
 
     def _inverse(self, site: str) -> FloatArray:
         """One over the value at a site (N,), bounded: a pump that is off has no relative change."""
@@ -196,9 +196,9 @@ class Responses:
         count = len(self.problem.adapted)
         if not count:
             return ()
-        answers = self.of([Course(s, np.ones(len(self.problem.record)), self._offset[s]) for s in self.sites])
-        scale = np.maximum(np.abs(answers).max(axis=(0, 2)), 1e-300)[None, :, None]
-        a = (answers / scale).reshape(-1, len(self.sites))
+        responses = self.of([TimeProfile(s, np.ones(len(self.problem.record)), self._offset[s]) for s in self.sites])
+        scale = np.maximum(np.abs(responses).max(axis=(0, 2)), 1e-300)[None, :, None]
+        a = (responses / scale).reshape(-1, len(self.sites))
         b = (self.nuisance[:, :, :count] / scale).reshape(-1, count)
         a, b = (x / np.maximum(np.linalg.norm(x, axis=0), 1e-300) for x in (a, b))
         alike = np.abs(a.T @ b).max(axis=1)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import ONSETS, Candidate, event
-from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.noise import CLIP, Noise, noise_by_differences, with_rows_before, without_spikes
@@ -27,11 +27,11 @@ LENGTHS = (0.3, 0.55, 1.0, 1.8)
 PRIOR_SHARE = 0.3
 """Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
 DEPENDENT = 1e-12
-"""Share of the strongest combination of a variant's answers below which one is rounding, in squares."""
+"""Share of the strongest combination of a variant's responses below which one is rounding, in squares."""
 AT_ONCE = 100
-"""Rows or columns of a catalogue's answers (150 MB) that are worked on in one go: fresh memory is slow."""
+"""Rows or columns of a catalogue's responses (150 MB) that are worked on in one go: fresh memory is slow."""
 ABSORBED = 1e-7
-"""Share of an answer that must be left after projection; less is rounding, in which anything can be found."""
+"""Share of a response that must be left after projection; less is rounding, in which anything can be found."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Score:
 
 
 class Scorer:
-    """Whitened, projected answers of a whole catalogue along one fit."""
+    """Whitened, projected responses of a whole catalogue along one fit."""
 
     def __init__(self, problem: Problem, fit: Fit, responses: Responses, candidates: list[Candidate]) -> None:
         self.problem, self.fit, self.candidates = problem, fit, candidates
@@ -66,20 +66,20 @@ class Scorer:
         self.rows = problem.rows("estimate")
         self._count = int(np.isfinite(problem.measured[self.rows]).sum())
         variants = [v for c in candidates for v in c.variants]
-        courses = [course for v in variants for course in v.courses]
+        profiles = [profile for v in variants for profile in v.profiles]
         self._reached = with_rows_before(self.rows)
-        answers = self._answers(courses)
+        weighted = self._weighted_responses(profiles)
         nuisance = (responses.nuisance / problem.weights[:, :, None])[self._reached]
         residual = without_spikes(fit.residual(problem) / problem.weights)
-        self._size = np.array([self._prior(c.offset, responses, c.site) for c in courses])
-        self.noise = self._clean_noise(residual, answers, nuisance, variants)
+        self._size = np.array([self._prior(c.offset, responses, c.site) for c in profiles])
+        self.noise = self._clean_noise(residual, weighted, nuisance, variants)
         e = self.noise.whiten(residual)
         present = np.isfinite(e) & self.rows[:, None]
         self._present = present[self._reached]
         base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
         self._base = base
-        columns = self._whitened(answers)
-        del answers  # each is 150 MB for a whole catalogue
+        columns = self._whitened(weighted)
+        del weighted  # each is 150 MB for a whole catalogue
         columns *= self._size  # from here on in standard deviations of the prior
         size = np.einsum("ij,ij->j", columns, columns)
         along = base.T @ columns
@@ -93,8 +93,8 @@ class Scorer:
         self._slices: list[slice] = []
         at = 0
         for v in variants:
-            self._slices.append(slice(at, at + len(v.courses)))
-            at += len(v.courses)
+            self._slices.append(slice(at, at + len(v.profiles)))
+            at += len(v.profiles)
         self._grams = {s.start: columns[:, s].T @ columns[:, s] for s in self._slices}
 
     def in_mode(self, site: str, mode: str | None, wanted: str | None) -> float:
@@ -104,17 +104,17 @@ class Scorer:
         given, found = (mode or own) == "offset", (wanted or own) == "offset"
         return 1.0 if given == found else usual if found else 1 / max(usual, 1e-300)
 
-    def _answers(self, courses: list[Course]) -> FloatArray:
-        """Weighted answers to r courses on the rows of `_reached` (rows, m, r)."""
-        found = self._responses.of(courses, self._reached)
+    def _weighted_responses(self, profiles: list[TimeProfile]) -> FloatArray:
+        """Weighted responses to r profiles on the rows of `_reached` (rows, m, r)."""
+        found = self._responses.of(profiles, self._reached)
         found /= self.problem.weights[self._reached][:, :, None]
         return found
 
-    def _whitened(self, answers: FloatArray) -> FloatArray:
-        """Whitened answers (values present, r); answers (rows, m, r). A few at a time, as fresh memory is slow."""
-        found = np.empty((int(self._present.sum()), answers.shape[2]))
-        for part in _parts(answers.shape[2]):
-            found[:, part] = self.noise.whiten(answers[:, :, part])[self._present]
+    def _whitened(self, weighted: FloatArray) -> FloatArray:
+        """Whitened responses (values present, r) of weighted ones (rows, m, r), a few at a time to save memory."""
+        found = np.empty((int(self._present.sum()), weighted.shape[2]))
+        for part in _parts(weighted.shape[2]):
+            found[:, part] = self.noise.whiten(weighted[:, :, part])[self._present]
         return found
 
     @staticmethod
@@ -126,19 +126,19 @@ class Scorer:
         return projected
 
     def _clean_noise(
-        self, residual: FloatArray, answers: FloatArray, nuisance: FloatArray, variants: list[Variant]
+        self, residual: FloatArray, weighted: FloatArray, nuisance: FloatArray, variants: list[Variant]
     ) -> Noise:
-        """Noise left by a ridge fit of the constant, the slow and the power-law courses of all sites together."""
+        """Noise left by a ridge fit of the constant, the slow and the power-law profiles of all sites together."""
         wanted, at = [], 0
         for v in variants:
             if v.effect.form in ("shift", "power") or (v.effect.form == "curve" and v.effect.driver == "time"):
-                wanted += list(range(at, at + len(v.courses)))
-            at += len(v.courses)
+                wanted += list(range(at, at + len(v.profiles)))
+            at += len(v.profiles)
         std = np.maximum(np.nan_to_num(noise_by_differences(residual)), self.problem.floor)
         r = residual[self.rows] / std
         present = np.isfinite(r)
         inside = self.rows[self._reached]
-        X = answers[np.ix_(inside, np.arange(answers.shape[1]), np.array(wanted, dtype=np.intp))][present]
+        X = weighted[np.ix_(inside, np.arange(weighted.shape[1]), np.array(wanted, dtype=np.intp))][present]
         X *= self._size[wanted]
         X /= np.broadcast_to(std, present.shape)[present][:, None]
         Z = (nuisance[inside] / std[:, None])[present]
@@ -183,7 +183,7 @@ class Scorer:
         beta = np.linalg.solve(A, b)
         gain = float(b @ beta)
         shapes = len(variant.start)
-        penalty = (len(variant.courses) + shapes) * float(np.log(self._count))
+        penalty = (len(variant.profiles) + shapes) * float(np.log(self._count))
         values = beta * self._size[columns]
         start = {n: float(v) for n, v in zip(variant.coefficients, values, strict=True) if n}
         return Score(candidate, variant, gain, gain - penalty, {**start, **dict(variant.start)})
@@ -203,7 +203,7 @@ class Scorer:
             for factor in (LENGTHS if length else (1.0,))
             if time[0] < onset < time[-1]
         ]
-        columns = self._whitened(self._answers([v.courses[0] for v in variants]))
+        columns = self._whitened(self._weighted_responses([v.profiles[0] for v in variants]))
         columns -= self._base @ (self._base.T @ columns)
         gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
         best = int(np.argmax(gains))
@@ -231,7 +231,7 @@ class Scorer:
                 strength, turned = np.linalg.eigh(self._grams[columns.start])
                 good = strength > max(DEPENDENT * strength[-1], 1e-60)
                 gain = np.sum((turned[:, good].T @ along[columns]) ** 2 / strength[good, None], axis=0)
-                penalty = (len(variant.courses) + len(variant.start)) * np.log(self._count)
+                penalty = (len(variant.profiles) + len(variant.start)) * np.log(self._count)
                 best = np.maximum(best, gain - penalty)
         return best
 

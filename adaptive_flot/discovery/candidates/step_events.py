@@ -1,7 +1,7 @@
-"""Events in time: a ramp, a washout or a step, started from what a free curve in time came to, and freer courses.
+"""Events in time: a ramp, a washout or a step, started from what a free curve in time came to, and freer profiles.
 
 The onset of an event has many local optima; a curve has none, as it is linear in its values. So the curve is fitted
-first, and the events start from the shapes that draw it best. Last, the best course gets more freedom: a curve more
+first, and the events start from the shapes that draw it best. Last, the best profile gets more freedom: a curve more
 knots (a slow random drift), a ramp or washout a curve whose knots stand where things happen.
 """
 
@@ -111,7 +111,7 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
 
 
 def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
-    """Whether a course in time is a drift, and not an event: a ramp that lasts, or a curve with even knots.
+    """Whether a time profile is a drift, and not an event: a ramp that lasts, or a curve with even knots.
 
     Such a curve is an event after all where it changes much, and half of that at once: in less than `shortest` [s].
     """
@@ -138,13 +138,13 @@ def _best(form: str, t: FloatArray, values: FloatArray, span: float) -> tuple[fl
         for share in DURATIONS:
             length = share * span
             if form == "ramp":
-                course = np.clip((t - onset) / length, 0, 1)
+                profile = np.clip((t - onset) / length, 0, 1)
             else:
                 length /= 3  # a washout of this time constant is done after about that duration
-                course = 1 - np.exp(-np.maximum(t - onset, 0) / length)
-            course = course - course.mean()
-            amplitude = float(course @ centred / max(course @ course, 1e-300))
-            left = float(np.sum((centred - amplitude * course) ** 2))
+                profile = 1 - np.exp(-np.maximum(t - onset, 0) / length)
+            profile = profile - profile.mean()
+            amplitude = float(profile @ centred / max(profile @ profile, 1e-300))
+            left = float(np.sum((centred - amplitude * profile) ** 2))
             if left < best[0]:
                 best = (left, amplitude, float(onset), length)
     return best[1:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adaptive_flot.discovery.candidates.responses import Course
+from adaptive_flot.discovery.candidates.responses import TimeProfile
 from adaptive_flot.greybox.effects import Effect
 
 
@@ -16,15 +16,15 @@ class Variant:
     ----------
     effect
         The effect at amplitude zero, with its settings.
-    courses
-        Courses at the site (r of them) whose linear combination it is near amplitude zero.
+    profiles
+        Profiles at the site (r of them) whose linear combination it is near amplitude zero.
     coefficients
-        Coefficient that each course is the derivative of; "" where there is none (see `start`).
+        Coefficient that each profile is the derivative of; "" where there is none (see `start`).
     start
         Further values to start a fit from (onset, time constant).
     """
 
     effect: Effect
-    courses: tuple[Course, ...]
+    profiles: tuple[TimeProfile, ...]
     coefficients: tuple[str, ...]
     start: tuple[tuple[str, float], ...] = ()

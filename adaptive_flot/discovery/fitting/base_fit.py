@@ -1,4 +1,4 @@
-"""Before the search: the record in shares, and the fit of the model as it is."""
+"""Before the search: the record in splits, and the fit of the model as it is."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import placements, with_nodes
 from adaptive_flot.discovery.record.noise import proportional
 from adaptive_flot.discovery.record.problem import Problem, make_problem
-from adaptive_flot.discovery.record.screening import Gate
+from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.greybox.model import Model
 
 BURN_IN_ROWS = 30
 GUARD_ROWS = 5
 FEWEST_VALUES = 8
-"""An output with fewer measurements on any share is left out: it could not be fitted, confirmed or reported."""
+"""An output with fewer measurements on any split is left out: it could not be fitted, confirmed or reported."""
 
 
-def shared(checked: Gate, model: Model, adapted: tuple[str, ...], cycle: Sequence[str]) -> tuple[Problem, Gate]:
-    """The record split into shares, and what the gate says with the outputs that one of them does not see."""
+def split_record(
+    checked: Screening, model: Model, adapted: tuple[str, ...], cycle: Sequence[str]
+) -> tuple[Problem, Screening]:
+    """The record split into parts, and what the screening says with the outputs that one of them does not see."""
     record = checked.record
     burn_in = min(BURN_IN_ROWS, len(record) // 20)
     problem = make_problem(record, model, adapted, burn_in=burn_in, guard=GUARD_ROWS, cycle=cycle)
-    counts = np.array([np.isfinite(problem.measured[problem.rows(share)]).sum(axis=0) for share in cycle])
+    counts = np.array([np.isfinite(problem.measured[problem.rows(split)]).sum(axis=0) for split in cycle])
     enough = counts.min(axis=0) >= FEWEST_VALUES
     left = tuple(
         f"{model.outputs[c].name}: too few values in a part of the record, left out"

@@ -34,8 +34,8 @@ KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
 constant change more."""
 
-SHARES = (1.0, 0.3, 0.1)
-"""Shares of the values of a first-order answer that are tried as the start."""
+START_FRACTIONS = (1.0, 0.3, 0.1)
+"""Fractions of a first-order estimate that are tried as the start."""
 ABRUPT = ("step", "lag", "lags", "delay", "stiction")
 """Forms with events or fast states between the nodes of a record, which are simulated at every row."""
 
@@ -74,12 +74,12 @@ class Descent:
     # -- search --------------------------------------------------------------------------------------------------------
 
     def shrink(self, names: Sequence[str]) -> None:
-        """Start from smaller values of these unknowns where these are nearer: a first-order answer may be far off."""
+        """Start from smaller values of these unknowns where these are nearer: a first-order estimate may be far off."""
         where = [self.unknowns.names.index(n) for n in names]
         noise, starts = self._first_noise(), []
-        for share in SHARES:
+        for fraction in START_FRACTIONS:
             z = self.unknowns.centre.copy()
-            z[where] *= share
+            z[where] *= fraction
             z = np.clip(z, self.unknowns.lower, self.unknowns.upper)
             starts.append((self._objective(z, self._predict(z), noise), z))
         self.unknowns.centre = min(starts, key=lambda start: start[0])[1]

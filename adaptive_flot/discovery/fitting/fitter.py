@@ -21,9 +21,9 @@ SETTLED = 1.0
 class Fitter:
     """Fits of alternatives to one problem. Immutable; every call is independent."""
 
-    def __init__(self, problem: Problem, share: tuple[str, ...] = ("estimate",)) -> None:
-        self.problem, self.share = problem, share
-        self.rows = problem.rows(*share)
+    def __init__(self, problem: Problem, splits: tuple[str, ...] = ("estimate",)) -> None:
+        self.problem, self.splits = problem, splits
+        self.rows = problem.rows(*splits)
 
     def fit(
         self,

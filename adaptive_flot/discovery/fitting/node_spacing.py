@@ -45,7 +45,7 @@ def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, flo
     free = run.outputs(problem.record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
     if np.isfinite(free).all() and abs(loss_of(problem, free, fitter.rows)[0] - fit.loss) < NOTICED:
         return fit
-    return Fitter(every, fitter.share).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
+    return Fitter(every, fitter.splits).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
 
 
 def placements(record: Dataset, model: Model) -> list[Nodes]:

@@ -23,7 +23,7 @@ _CLIPPED_VARIANCE = 0.99503
 MOST_LAGS = 3
 IMPULSE = np.eye(1, 501)[0]
 DIED_AWAY = 1e-12
-"""Answer to an impulse after 500 rows below which an autoregression is stable, without a look at its poles."""
+"""Response to an impulse after 500 rows below which an autoregression is stable, without a look at its poles."""
 MEMORY = 2.0
 """Noise is at most this many times as large as its innovations: what is slower and smoother is no measurement noise but
 physics that is missing, and a noise model that may be as slow as it likes would explain it away."""
@@ -184,8 +184,8 @@ def _short(a: FloatArray) -> FloatArray:
     return _pulled(a, low)
 
 
-def _pulled(a: FloatArray, share: float) -> FloatArray:
-    pulled: FloatArray = a * share ** np.arange(1, len(a) + 1)
+def _pulled(a: FloatArray, factor: float) -> FloatArray:
+    pulled: FloatArray = a * factor ** np.arange(1, len(a) + 1)
     return pulled
 
 
@@ -199,7 +199,7 @@ def _memory(a: FloatArray) -> float:
 
 
 def correlation_times(series: FloatArray) -> FloatArray:
-    """Rows that tell one story in each column (m,) of a series (N, m): 1 + 2 x the sum of autocorrelations.
+    """Rows for each effective sample in each column (m,) of a series (N, m): 1 + 2 x the sum of autocorrelations.
 
     Up to the first that is not positive: Sokal, *Monte Carlo methods in statistical mechanics* (1997), eq. (2.16), cut
     at the first zero as by Geyer (1992).

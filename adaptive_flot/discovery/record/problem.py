@@ -1,4 +1,4 @@
-"""The record as discovery sees it: rows in three interleaved shares, measured outputs, unknowns that are no effect."""
+"""The record as discovery sees it: rows in three interleaved splits, measured outputs, unknowns that are no effect."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from adaptive_flot.greybox.stepping.nodes import Nodes
 BoolArray = NDArray[np.bool_]
 
 CYCLE = ("estimate", "estimate", "confirm", "estimate", "report")
-"""Shares of the record, in turn: 60 % to estimate, 20 % to confirm, 20 % to report. Blocks are interleaved in time, so
+"""Splits of the record, in turn: 60 % to estimate, 20 % to confirm, 20 % to report. Blocks are interleaved in time, so
 that an event at any time has rows of each kind around it."""
 WITHOUT_REPORT = ("estimate", "estimate", "confirm", "estimate")
 """The same where a record of its own reports."""
@@ -36,8 +36,8 @@ class Problem:
         Indices of the measured outputs (m,).
     adapted
         Names of the parameters that the estimator adapts; they are free in every alternative.
-    blocks
-        Name of the share of each row (N,): "estimate", "confirm", "report" or "" for rows that are left out.
+    splits
+        Name of the split of each row (N,): "estimate", "confirm", "report" or "" for rows that are left out.
     weights
         Relative size of the noise of each measured output (N, m).
     floor
@@ -52,7 +52,7 @@ class Problem:
     record: Dataset
     columns: tuple[int, ...]
     adapted: tuple[str, ...]
-    blocks: NDArray[np.str_]
+    splits: NDArray[np.str_]
     weights: FloatArray
     floor: FloatArray
     whiten: bool = True
@@ -77,19 +77,19 @@ class Problem:
         y: FloatArray = self.record.outputs[:, self.columns]
         return y
 
-    def rows(self, *shares: str) -> BoolArray:
-        """Mask (N,) of the rows in the named shares; all that are not left out when none is named."""
-        mask: BoolArray = np.isin(self.blocks, shares) if shares else self.blocks != ""
+    def rows(self, *splits: str) -> BoolArray:
+        """Mask (N,) of the rows in the named splits; all that are not left out when none is named."""
+        mask: BoolArray = np.isin(self.splits, splits) if splits else self.splits != ""
         return mask
 
     @property
     def first_row(self) -> int:
-        """First row of any share; those before are left out, since the initial state is not known."""
+        """First row of any split; those before are left out, since the initial state is not known."""
         return int(np.argmax(self.rows()))
 
-    def spans(self, share: str) -> tuple[tuple[float, float], ...]:
-        """First and last time [s] of each contiguous part of a share."""
-        inside = np.concatenate([[False], self.rows(share), [False]]).astype(int)
+    def spans(self, split: str) -> tuple[tuple[float, float], ...]:
+        """First and last time [s] of each contiguous part of a split."""
+        inside = np.concatenate([[False], self.rows(split), [False]]).astype(int)
         starts, stops = (np.flatnonzero(np.diff(inside) == sign) for sign in (1, -1))
         time = self.record.time
         return tuple((float(time[a]), float(time[b - 1])) for a, b in zip(starts, stops, strict=True))
@@ -118,21 +118,21 @@ def make_problem(
     adapted
         Names of the adapted parameters.
     burn_in
-        Rows at the start that no share gets, because the initial state is not known.
+        Rows at the start that no split gets, because the initial state is not known.
     guard
-        Rows left out at each border between shares.
+        Rows left out at each border between splits.
     cycle
-        Shares of one cycle.
+        Splits of one cycle.
     cycles
-        How often the pattern of shares repeats.
+        How often the pattern of splits repeats.
     """
     n = len(record)
     columns = tuple(model.index("outputs", name) for name in record.measured(model))
-    blocks = np.full(n, "", dtype="<U8")
+    splits = np.full(n, "", dtype="<U8")
     edges = np.linspace(burn_in, n, cycles * len(cycle) + 1).round().astype(int)
     for k, (start, stop) in enumerate(pairwise(edges)):
-        share = cycle[k % len(cycle)]
-        same = k > 0 and cycle[(k - 1) % len(cycle)] == share
-        blocks[start + (0 if same or k == 0 else guard) : stop] = share
+        split = cycle[k % len(cycle)]
+        same = k > 0 and cycle[(k - 1) % len(cycle)] == split
+        splits[start + (0 if same or k == 0 else guard) : stop] = split
     scale = np.array([model.outputs[c].scale for c in columns])
-    return Problem(record, columns, adapted, blocks, np.ones((n, len(columns))), 1e-7 * scale)
+    return Problem(record, columns, adapted, splits, np.ones((n, len(columns))), 1e-7 * scale)

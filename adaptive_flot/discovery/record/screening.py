@@ -1,4 +1,4 @@
-"""The data gate: what in a record can not be used, said before anything is fitted."""
+"""The data screening: what in a record can not be used, said before anything is fitted."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ QUARTER = 0.3186
 
 
 @dataclass(frozen=True)
-class Gate:
-    """Result of the data gate.
+class Screening:
+    """Result of the data screening.
 
     Attributes
     ----------
@@ -47,10 +47,10 @@ class Gate:
 
     def __str__(self) -> str:
         state = "insufficient: " + "; ".join(self.reasons) if self.reasons else "usable"
-        return f"data gate: {state}" + "".join(f"\n  {n}" for n in self.notes)
+        return f"data screening: {state}" + "".join(f"\n  {n}" for n in self.notes)
 
 
-def gate(record: Dataset, model: Model) -> Gate:
+def screen(record: Dataset, model: Model) -> Screening:
     """Check a record: length, gaps, frozen and clipped sensors, outliers, inputs that move."""
     outputs = record.outputs.copy()
     notes: list[str] = []
@@ -72,7 +72,7 @@ def gate(record: Dataset, model: Model) -> Gate:
         notes.append(f"{', '.join(still)} hardly moves: no dependence on it can be told")
     if measured and not reasons and all(_flat(outputs[:, j]) for j in range(outputs.shape[1])):
         reasons.append("every measured output is constant")
-    return Gate(replace(record, outputs=outputs), tuple(reasons), tuple(notes))
+    return Screening(replace(record, outputs=outputs), tuple(reasons), tuple(notes))
 
 
 def _moves(u: FloatArray, share: float) -> bool:

@@ -4,10 +4,10 @@ Map
 ---
 search.py              Rounds of score, refit and compare.
 alternatives.py        Which candidates are worth a full fit, and that fit.
-entrants.py            Who enters a round of refits.
+fit_jobs.py            Which fits are made in a round.
 successive_halving.py  Refits in rounds, the worse half left out of the next.
 simplify.py            A dependence that has become flat, tried as a constant.
 joint_search.py        Several effects at once.
 joint_fits.py          Fits of combinations from scattered starts.
-common_nuisance.py     Rivals compared with what all of them lack granted to each.
+common_nuisance.py     Rivals compared with what all of them lack added to each.
 """

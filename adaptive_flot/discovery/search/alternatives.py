@@ -28,7 +28,7 @@ LEAST_SHARE = 0.3
 MOST_CHANGE = float(np.log(10))
 """A physical effect changes a quantity by a factor of ten at most; beyond it is another model, or none with a grip."""
 WORTH_A_RESTART = 10.0
-"""Gain of another start of a free course in time, which has most places to rest in, that is worth yet another."""
+"""Gain of another start of a free time profile, which has most places to rest in, that is worth yet another."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
@@ -49,10 +49,10 @@ class Alternative:
         Drop of minus two log-likelihood against the base model.
     delta_bic
         Its criterion less that of the base model; negative is better.
-    doubt
-        How well the record tells it from the best one: standard deviation of what it is worse by.
-    told
-        Its criterion with what all lack granted to it, where that was worked out (see `contest`).
+    loglik_difference_sd
+        Standard deviation of the difference between its minus two log-likelihood and that of the best one.
+    adjusted_bic
+        Its criterion with the common nuisance added, where that was worked out (see `adjust_for_common_nuisance`).
     """
 
     names: tuple[tuple[str, str], ...]
@@ -60,13 +60,13 @@ class Alternative:
     fit: Fit
     gain: float
     delta_bic: float
-    doubt: float = 0.0
-    told: float | None = None
+    loglik_difference_sd: float = 0.0
+    adjusted_bic: float | None = None
 
     def worse_than(self, best: Alternative) -> float:
-        """By how much its criterion is worse than that of another, with what both lack granted to both if it was."""
-        if self.told is not None and best.told is not None:
-            return self.told - best.told
+        """How much worse its criterion is than that of another, adjusted for a common nuisance where both are."""
+        if self.adjusted_bic is not None and best.adjusted_bic is not None:
+            return self.adjusted_bic - best.adjusted_bic
         return self.fit.bic - best.fit.bic
 
     @property
@@ -175,7 +175,7 @@ def _warmed(start: Fit, warm: Fit) -> Fit:
 
 
 def fixed_coefficients(effect: Effect) -> dict[str, float]:
-    """Coefficients that a search holds: the share of a lag, a dead time or a limit."""
+    """Coefficients that a search holds: the fraction of a lag, a dead time or a limit."""
     return {"amplitude": 1.0} if effect.driver in DYNAMIC_DRIVERS else {}
 
 

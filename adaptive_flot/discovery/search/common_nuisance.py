@@ -1,7 +1,7 @@
-"""Contest: whether rivals stay apart from the best once what all of them lack is granted to each.
+"""Whether rivals stay apart from the best once what all of them lack, a common nuisance, is added to each.
 
 What the best alternative leaves unexplained (a feed that wanders beside the effect that is looked for) makes every
-comparison uncertain by as much. With the same further effect granted to each, that falls away, and they can be told.
+comparison uncertain by as much. With the same further effect in each, that uncertainty falls away.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.assessment.verification import doubts, verify
+from adaptive_flot.discovery.assessment.verification import loglik_difference_sds, verify
 from adaptive_flot.discovery.candidates.catalogue import finer
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
@@ -23,8 +23,10 @@ MINOR = 0.5
 MOST_RIVALS = 8
 
 
-def contest(problem: Problem, found: Search, near: Sequence[Alternative], processes: int = 1) -> Search:
-    """The search with its best and those that are `near` it compared anew, what the best lacks granted to each.
+def adjust_for_common_nuisance(
+    problem: Problem, found: Search, near: Sequence[Alternative], processes: int = 1
+) -> Search:
+    """The search with its best and those that are `near` it compared anew, each with what the best one lacks added.
 
     Unchanged when nothing of the kind is left, when too many are near, or when who wins does not stand on fresh rows.
     """
@@ -34,30 +36,30 @@ def contest(problem: Problem, found: Search, near: Sequence[Alternative], proces
     score = _lacking(scorer_of(problem, best.fit)[0], best)
     if score is None or score.gain > MINOR * best.gain:
         return found
-    granted = score.candidate.name
+    nuisance = score.candidate.name
     fitter = Fitter(problem)
     score = _shaped(fitter, best, score)
     if score is None:
         return found
-    taking = [best, *(a for a in near if granted not in a.names)]
+    taking = [best, *(a for a in near if nuisance not in a.names)]
     fits = parallel_map(lambda k: fit_variant(fitter, taking[k].fit, score, MOST_STEPS), range(len(taking)), processes)
-    told = {a.names: fit for a, fit in zip(taking, fits, strict=True) if fit}
-    if len(told) < len(taking):
+    adjusted = {a.names: fit for a, fit in zip(taking, fits, strict=True) if fit}
+    if len(adjusted) < len(taking):
         return found
-    # who is what was granted is held against the best with it: if that is much better, it alone is not the answer
-    told |= {a.names: a.fit for a in near if granted in a.names}
-    winner = min((best, *near), key=lambda a: told[a.names].bic)
+    # a rival that is the nuisance itself is compared with the best that has it: if that is better, it alone is not all
+    adjusted |= {a.names: a.fit for a in near if nuisance in a.names}
+    winner = min((best, *near), key=lambda a: adjusted[a.names].bic)
     checked = found.verification if winner is best else verify(problem, found.base, winner.fit)
-    if winner.names == (granted,) or checked is None or not checked.confirmed:
+    if winner.names == (nuisance,) or checked is None or not checked.confirmed:
         return found
-    doubt = doubts(problem, told[winner.names], list(told.values()))
-    after = {n: (fit.bic, d) for (n, fit), d in zip(told.items(), doubt, strict=True)}
+    differences = loglik_difference_sds(problem, adjusted[winner.names], list(adjusted.values()))
+    after = {n: (fit.bic, d) for (n, fit), d in zip(adjusted.items(), differences, strict=True)}
     changed = [
-        replace(a, told=after[a.names][0], doubt=after[a.names][1]) if a.names in after else a
+        replace(a, adjusted_bic=after[a.names][0], loglik_difference_sd=after[a.names][1]) if a.names in after else a
         for a in found.alternatives
     ]
-    changed.sort(key=lambda a: (a.told is None, a.fit.bic if a.told is None else a.told))
-    scorer, _ = scorer_of(problem, told[winner.names].with_model(lambda: variant_model(winner.fit, score)))
+    changed.sort(key=lambda a: (a.adjusted_bic is None, a.fit.bic if a.adjusted_bic is None else a.adjusted_bic))
+    scorer, _ = scorer_of(problem, adjusted[winner.names].with_model(lambda: variant_model(winner.fit, score)))
     left, threshold = what_is_left(scorer, threshold_of(scorer))
     return replace(
         found,
@@ -65,12 +67,12 @@ def contest(problem: Problem, found: Search, near: Sequence[Alternative], proces
         verification=checked,
         left=left,
         left_threshold=threshold,
-        granted=granted,
+        common_nuisance=nuisance,
     )
 
 
 def _shaped(fitter: Fitter, best: Alternative, score: Score) -> Score | None:
-    """What is granted, as fine and as large as it comes beside the best; None when that can not be fitted."""
+    """The nuisance, as fine and as large as it comes beside the best; None when that can not be fitted."""
     first = fit_variant(fitter, best.fit, score, MOST_STEPS)
     if first is None:
         return None

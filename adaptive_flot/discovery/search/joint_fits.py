@@ -156,7 +156,7 @@ def _joint_form(scorer: Scorer, score: Score) -> tuple[str, str | None]:
 
 
 def correlation_time(problem: Problem, fit: Fit) -> float:
-    """Rows of the residual that tell one story, in the worst output."""
+    """Rows of the residual for each effective sample, in the worst output."""
     residual: FloatArray = fit.residual(problem)[problem.rows("estimate", "confirm")]
     return float(np.max(correlation_times(residual)))
 
@@ -182,9 +182,9 @@ def cross_validated(problem: Problem, fit: Fit, processes: int) -> Fit:
     blocks = np.array_split(rows, FOLDS)
 
     def without(block: NDArray[np.intp]) -> FloatArray | None:
-        hidden = problem.blocks.copy()
+        hidden = problem.splits.copy()
         hidden[block] = ""
-        found = Fitter(replace(problem, blocks=hidden)).fit(fit.model, fit.names, like=fit, rounds=1)
+        found = Fitter(replace(problem, splits=hidden)).fit(fit.model, fit.names, like=fit, rounds=1)
         return found.predicted[block] if found else None
 
     predicted = fit.predicted.copy()

@@ -66,8 +66,8 @@ def search_jointly(
     """Search combinations of named effects.
 
     Residuals are neither whitened nor clipped: the error of such a model outweighs the noise by far, a noise model
-    would explain it away, and its largest values are what is looked for. As neighbouring errors tell the same
-    story, evidence counts by the number of independent errors. All rows but the report share choose, since events are
+    would explain it away, and its largest values are what is looked for. As neighbouring errors are
+    alike, evidence counts by the number of effective samples. All rows but the report split choose, since events are
     few; the choice is confirmed by predictions of each block from fits that did not see it.
 
     Parameters
@@ -82,8 +82,8 @@ def search_jointly(
     tuple of Problem and Search
         The problem as it was searched, and what was found; both unchanged when no combination brings evidence.
     """
-    chosen = np.where(problem.blocks == "confirm", "estimate", problem.blocks)
-    plain = replace(problem, whiten=False, blocks=chosen, weights=np.ones_like(problem.weights))
+    chosen = np.where(problem.splits == "confirm", "estimate", problem.splits)
+    plain = replace(problem, whiten=False, splits=chosen, weights=np.ones_like(problem.weights))
     base = Fitter(plain).fit(found.base.model, like=found.base, rounds=2, steps=LAST_STEPS) or found.base
     say = "fit several effects at once"
     progress(say)
@@ -91,23 +91,23 @@ def search_jointly(
     rounds = [r for r in JointFits(plain, base, scorer, processes).rounds(MOST_AT_ONCE, lambda: progress(say)) if r]
     if not rounds:
         return problem, found
-    together = correlation_time(plain, min((r[0] for r in rounds), key=lambda a: a.fit.loss).fit)
-    base = discount(plain, base, together)
+    rows_per_effective_sample = correlation_time(plain, min((r[0] for r in rounds), key=lambda a: a.fit.loss).fit)
+    base = discount(plain, base, rows_per_effective_sample)
     scores = tuple(scorer.scores())
-    tables = [Round(scores, LEAST_EVIDENCE, discounted(plain, base, r, together)) for r in rounds]
+    tables = [Round(scores, LEAST_EVIDENCE, discounted(plain, base, r, rows_per_effective_sample)) for r in rounds]
     best: Round | None = None
     for table in tables:
         reference = best.alternatives[0].fit if best else base
         if table.alternatives[0].fit.bic < reference.bic - LEAST_EVIDENCE:
             best = table
-    if best is None or not _better(plain, base, best.alternatives[0].fit, found, together):
+    if best is None or not _better(plain, base, best.alternatives[0].fit, found, rows_per_effective_sample):
         return problem, found
     progress("confirm")
     chosen_fit = best.alternatives[0].fit
-    seen = replace(plain, blocks=np.where(chosen == "estimate", "confirm", chosen))
+    seen = replace(plain, splits=np.where(chosen == "estimate", "confirm", chosen))
     checked = verify(seen, *(cross_validated(plain, fit, processes) for fit in (base, chosen_fit)))
     checked = replace(checked, where="by cross-validation, on rows that also helped to choose the effects")
-    left = _left(plain, chosen_fit, together)
+    left = _left(plain, chosen_fit, rows_per_effective_sample)
     return plain, replace(
         found,
         base=base,
@@ -116,22 +116,22 @@ def search_jointly(
         verification=checked,
         left=left,
         left_threshold=LEAST_EVIDENCE,
-        together=1.0,
+        rows_per_effective_sample=1.0,
     )
 
 
-def _better(problem: Problem, base: Fit, joint: Fit, found: Search, together: float) -> bool:
+def _better(problem: Problem, base: Fit, joint: Fit, found: Search, rows_per_effective_sample: float) -> bool:
     """Whether effects that were found at once beat what one after the other came to, fitted to the same rows."""
     if not found.alternatives:
         return True
     one = found.alternatives[0].fit
     again = Fitter(problem).fit(one.model, one.names, like=one, rounds=2, steps=LAST_STEPS)
-    return again is None or joint.bic < discount(problem, again, together).bic - LEAST_EVIDENCE
+    return again is None or joint.bic < discount(problem, again, rows_per_effective_sample).bic - LEAST_EVIDENCE
 
 
-def _left(problem: Problem, fit: Fit, together: float) -> float:
-    """First-order gain that one more effect would bring, in terms of what the fit leaves, by independent errors."""
+def _left(problem: Problem, fit: Fit, rows_per_effective_sample: float) -> float:
+    """First-order gain that one more effect would bring, in terms of what the fit leaves, by effective samples."""
     scorer, _ = scorer_of(problem, fit)
     gain, _ = what_is_left(scorer, LEAST_EVIDENCE)
-    share = min(gain / max(float(np.sum(scorer.residual**2)), 1e-300), 0.99)
-    return -problem.count(problem.rows("estimate")) * float(np.log(1 - share)) / together
+    explained = min(gain / max(float(np.sum(scorer.residual**2)), 1e-300), 0.99)
+    return -problem.count(problem.rows("estimate")) * float(np.log(1 - explained)) / rows_per_effective_sample

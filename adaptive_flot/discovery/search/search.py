@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import Verification, doubts, together, verify
+from adaptive_flot.discovery.assessment.verification import (
+    Verification,
+    loglik_difference_sds,
+    rows_per_effective_sample,
+    verify,
+)
 from adaptive_flot.discovery.candidates.catalogue import catalogue
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
@@ -16,7 +21,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.search.alternatives import SHORTLIST, Alternative, shortlist
-from adaptive_flot.discovery.search.entrants import Lane
+from adaptive_flot.discovery.search.fit_jobs import Linearisation
 from adaptive_flot.discovery.search.simplify import simpler
 from adaptive_flot.discovery.search.successive_halving import refit
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
@@ -71,17 +76,17 @@ class Search:
     alternatives
         All full fits of the accepted number of effects, best first; empty when nothing was found.
     verification
-        Of the best of them, on the confirm share.
+        Of the best of them, on the confirm split.
     left
         First-order gain that the best alternative leaves on the table: what it still lacks.
     left_threshold
         The same quantity that noise alone would show once in a hundred records.
     adapted_sites
         Sites whose constant change is that of an adapted parameter.
-    together
-        Innovations of the best alternative that tell one story: evidence counts once for so many.
-    granted
-        Site and driver of what the leading alternatives were granted when they were compared, if anything.
+    rows_per_effective_sample
+        Rows of the best alternative's innovations for each effective sample: evidence counts once for so many.
+    common_nuisance
+        Site and driver of the effect that was added to the leading alternatives to compare them, if any.
     slow_s
         Seconds from which a change of an adapted parameter is a drift.
     """
@@ -93,8 +98,8 @@ class Search:
     left: float
     left_threshold: float
     adapted_sites: tuple[str, ...]
-    together: float = 1.0
-    granted: tuple[str, str] | None = None
+    rows_per_effective_sample: float = 1.0
+    common_nuisance: tuple[str, str] | None = None
     slow_s: float = SLOW_S
 
 
@@ -111,7 +116,7 @@ def search(
     Parameters
     ----------
     problem, base
-        The record and the fit of the model as it is, on the estimation share.
+        The record and the fit of the model as it is, on the estimation split.
     nominal
         The model with the parameter values it came with.
     processes
@@ -145,7 +150,7 @@ def search(
 def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
     """A fit whose adapted parameters stay near the model's own, where those of the base fit have run away.
 
-    A missing effect can drive them far off; the answers along such a run say little about the effects of the plant.
+    A missing effect can drive them far off; the responses along such a run say little about the effects of the plant.
     """
     names = fitter.problem.adapted
     own = {n: nominal.parameters[nominal.index("parameters", n)].value for n in names}
@@ -157,17 +162,21 @@ def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
 
 
 def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:
-    """Keep the largest model that stands on the confirm share; failing that, the first, with what it left."""
+    """Keep the largest model that stands on the confirm split; failing that, the first, with what it left."""
     for r in reversed(accepted):
         verification = verify(problem, found.base, r.alternatives[0].fit)
         if verification.confirmed or r is accepted[0]:
             last = r is accepted[-1]
             left = found.left if last else max(found.left, r.alternatives[0].fit.bic - _best_bic(accepted))
             best = r.alternatives[0].fit
-            alike = together(problem, found.base, best)
-            doubt = doubts(problem, best, [a.fit for a in r.alternatives])
-            told = tuple(replace(a, doubt=d) for a, d in zip(r.alternatives, doubt, strict=True))
-            return replace(found, alternatives=told, verification=verification, left=left, together=alike)
+            rows_each = rows_per_effective_sample(problem, found.base, best)
+            differences = loglik_difference_sds(problem, best, [a.fit for a in r.alternatives])
+            compared = tuple(
+                replace(a, loglik_difference_sd=d) for a, d in zip(r.alternatives, differences, strict=True)
+            )
+            return replace(
+                found, alternatives=compared, verification=verification, left=left, rows_per_effective_sample=rows_each
+            )
     return found
 
 
@@ -207,15 +216,15 @@ def _round(
     for k, before in enumerate(beam):
         if before is not None and k:
             scorers = [scorer_of(problem, before.fit)[0]]
-        lanes = []
+        linearisations = []
         most = SHORTLIST_FURTHER if before else SHORTLIST if len(scorers) == 1 else SHORTLIST_NEAR
         for scorer in scorers:
             wanted = shortlist(scorer, most)
             # a further effect must have a name: a pair of curves without one would explain anything
             wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
-            lanes.append(Lane(scorer, wanted))
+            linearisations.append(Linearisation(scorer, wanted))
         progress("fit")
-        found += refit(fitter, base, lanes, before, processes, lambda: progress("fit"))
+        found += refit(fitter, base, linearisations, before, processes, lambda: progress("fit"))
     if found and beam[0] is not None:
         found += simpler(fitter, base, min(found, key=lambda a: a.fit.bic))
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}

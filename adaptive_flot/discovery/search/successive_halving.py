@@ -1,4 +1,4 @@
-"""Refit the best-scored candidates in two heats, each with its own noise model, and rank them.
+"""Successive halving: refit the best-scored candidates in two rungs, each with its own noise model, and rank them.
 
 First all of them in their best form with a few steps, then the finalists in several forms to the end; last, what only a
 finished fit can start: events in time, and the constant that a dependence may have come to.
@@ -19,10 +19,10 @@ from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.search.alternatives import Alternative, effect_bounds, fit_variant, variant_model
-from adaptive_flot.discovery.search.entrants import (
+from adaptive_flot.discovery.search.fit_jobs import (
+    FittedJob,
     Job,
-    Lane,
-    Run,
+    Linearisation,
     best_of_each,
     constants,
     events,
@@ -37,7 +37,7 @@ from adaptive_flot.discovery.search.entrants import (
 )
 
 FIRST_STEPS = 6
-"""Steps of the first heat, in which every candidate runs."""
+"""Steps of the first rung, in which every candidate jobs."""
 FINALISTS = 4
 SURE_FINALISTS = 3
 NEAR_FINALIST = 0.5
@@ -49,129 +49,148 @@ LEADERS = 4
 CLOSE_GAIN = 0.7
 """Share of the best gain from which a curve in time is tried as an event as well."""
 FREED, MOST_FREED = 2, 8
-"""Names whose course in time gets more freedom in the end; further ones where that was worth its price to the first."""
+"""Names whose time profile gets more freedom in the end; further ones where that was worth its price to the first."""
 
 
 def refit(
     fitter: Fitter,
     base: Fit,
-    lanes: Sequence[Lane],
+    linearisations: Sequence[Linearisation],
     before: Alternative | None = None,
     processes: int = 1,
     done: Callable[[], None] = lambda: None,
 ) -> list[Alternative]:
     """Fit each shortlisted candidate on top of `before` (the base model by default), best first.
 
-    A candidate may start in several lanes; only the lane in which it comes furthest in the first heat goes on.
+    A candidate may start from several linearisations; only that in which it comes furthest in the first rung goes on.
     """
-    heats = _Heats(fitter, base, lanes, before, processes, done)
-    first = heats.first()
-    last = heats.last(first)
-    followers = heats.followers(last)
-    bent = heats.bent(followers, last)
-    found = best_of_each([*heats.steps(followers, last), *bent, *followers, *last, *first])
-    found = best_of_each([*heats.trimmed(found[:MOST_FREED]), *found])
-    ranked = [run.alternative for run in best_of_each([*heats.freed(found, last), *found])]
+    halving = _SuccessiveHalving(fitter, base, linearisations, before, processes, done)
+    first = halving.first()
+    last = halving.last(first)
+    followers = halving.followers(last)
+    bent = halving.bent(followers, last)
+    found = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
+    found = best_of_each([*halving.trimmed(found[:MOST_FREED]), *found])
+    ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(found, last), *found])]
     exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
     return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
 
 
-class _Heats:
-    """The heats of one refit, in their order; each takes what the earlier ones came to."""
+class _SuccessiveHalving:
+    """The rungs of one refit, in their order; each takes what the earlier ones came to."""
 
     def __init__(
         self,
         fitter: Fitter,
         base: Fit,
-        lanes: Sequence[Lane],
+        linearisations: Sequence[Linearisation],
         before: Alternative | None,
         processes: int,
         done: Callable[[], None],
     ) -> None:
         self.fitter, self.base, self.before, self.processes, self.done = fitter, base, before, processes, done
-        self.lanes = [replace(lane, scores=[lane.scorer.refined(s) for s in lane.scores]) for lane in lanes]
+        self.linearisations = [
+            replace(linearisation, scores=[linearisation.scorer.refined(s) for s in linearisation.scores])
+            for linearisation in linearisations
+        ]
         time = fitter.problem.record.time
         self.low, self.high = float(time[0]), float(time[-1])
 
-    def _run(self, jobs: list[Job], steps: int = MOST_STEPS) -> list[Run]:
+    def _run(self, jobs: list[Job], steps: int = MOST_STEPS) -> list[FittedJob]:
         def work(k: int) -> Fit | None:
             job = jobs[k]
-            return fit_variant(self.fitter, self._start(job.lane), job.score, steps, job.warm, job.drawn)
+            return fit_variant(self.fitter, self._start(job.linearisation), job.score, steps, job.warm, job.drawn)
 
         fits = parallel_map(work, range(len(jobs)), self.processes, self.done)
         found = [
-            Run(job.lane, job.score, _alternative(self.base, self._start(job.lane), job.score, fit, self.before))
+            FittedJob(
+                job.linearisation,
+                job.score,
+                _alternative(self.base, self._start(job.linearisation), job.score, fit, self.before),
+            )
             for job, fit in zip(jobs, fits, strict=True)
             if fit
         ]
-        return sorted(found, key=lambda run: run.alternative.fit.bic)
+        return sorted(found, key=lambda fitted: fitted.alternative.fit.bic)
 
-    def _start(self, lane: int) -> Fit:
-        return self.lanes[lane].scorer.fit
+    def _start(self, linearisation: int) -> Fit:
+        return self.linearisations[linearisation].scorer.fit
 
-    def first(self) -> list[Run]:
+    def first(self) -> list[FittedJob]:
         """Everyone, a few steps."""
-        entries = [Job(i, f) for i, lane in enumerate(self.lanes) for s in lane.scores for f in first_forms(lane, s)]
+        entries = [
+            Job(i, f)
+            for i, linearisation in enumerate(self.linearisations)
+            for s in linearisation.scores
+            for f in first_forms(linearisation, s)
+        ]
         return self._run(entries, FIRST_STEPS)
 
-    def last(self, first: list[Run]) -> list[Run]:
+    def last(self, first: list[FittedJob]) -> list[FittedJob]:
         """The finalists in several forms, to the end."""
-        furthest: dict[tuple[str, str], Run] = {}
-        for run in first:
-            furthest.setdefault(run.score.candidate.name, run)
-        tied = {s.candidate.name for lane in self.lanes for s in lane.scores if s.gain > TIED * lane.scores[0].gain}
+        furthest: dict[tuple[str, str], FittedJob] = {}
+        for fitted in first:
+            furthest.setdefault(fitted.score.candidate.name, fitted)
+        tied = {
+            s.candidate.name
+            for linearisation in self.linearisations
+            for s in linearisation.scores
+            if s.gain > TIED * linearisation.scores[0].gain
+        }
         finalists = _finalists(self._start(0).loss, list(furthest.values()), tied)
-        drawn = {(run.lane, run.score.candidate.name): run for run in reversed(first) if is_curve(run)}
-        coarse = [drawn.get((run.lane, run.score.candidate.name), run) for run in finalists]
-        return self._run([job for run in coarse for job in forms(self.lanes[run.lane], run)])
+        drawn = {(f.linearisation, f.score.candidate.name): f for f in reversed(first) if is_curve(f)}
+        coarse = [drawn.get((f.linearisation, f.score.candidate.name), f) for f in finalists]
+        return self._run([job for f in coarse for job in forms(self.linearisations[f.linearisation], f)])
 
-    def followers(self, last: list[Run]) -> list[Run]:
+    def followers(self, last: list[FittedJob]) -> list[FittedJob]:
         """Constants and events, which only a finished fit can start."""
         jobs: list[Job] = []
-        for i, lane in enumerate(self.lanes):
-            own = [run.alternative for run in last if run.lane == i]
-            jobs += (Job(i, s, warm) for s, warm in constants(lane.scorer, own))
-            jobs += (Job(i, s) for s in events(lane.scores, _close(own)))
+        for i, linearisation in enumerate(self.linearisations):
+            own = [fitted.alternative for fitted in last if fitted.linearisation == i]
+            jobs += (Job(i, s, warm) for s, warm in constants(linearisation.scorer, own))
+            jobs += (Job(i, s) for s in events(linearisation.scores, _close(own)))
         return self._run(jobs)
 
-    def bent(self, followers: list[Run], last: list[Run]) -> list[Run]:
+    def bent(self, followers: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
         """Dependences that came to no more than the constant at their site, which they contain: again, from there."""
         ended = best_of_each(last)
-        return self._run([job for run in followers for job in unbent(run, ended, self.lanes[run.lane].scorer)])
+        return self._run(
+            [job for f in followers for job in unbent(f, ended, self.linearisations[f.linearisation].scorer)]
+        )
 
-    def steps(self, followers: list[Run], last: list[Run]) -> list[Run]:
+    def steps(self, followers: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
         """Steps, which are simulated at every row: only where an event near the best came to be as short as one."""
-        most = max((run.alternative.gain for run in (*followers, *last)), default=0.0)
-        near = [run for run in best_of_each(followers) if run.alternative.gain > CLOSE_GAIN * most]
-        return self._run([job for run in near for job in step(run, self.high - self.low)])
+        most = max((fitted.alternative.gain for fitted in (*followers, *last)), default=0.0)
+        near = [fitted for fitted in best_of_each(followers) if fitted.alternative.gain > CLOSE_GAIN * most]
+        return self._run([job for fitted in near for job in step(fitted, self.high - self.low)])
 
-    def freed(self, found: list[Run], last: list[Run]) -> list[Run]:
-        """Courses in time with more freedom where that pays; whom a rough course is to tell apart must all have it."""
+    def freed(self, found: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
+        """Time profiles with more freedom where that pays; whom a rough profile is to tell apart must all have it."""
         freed = self._freer(found[:FREED], found, last)
         if freed:
-            ended = {run.alternative.names for run in last}
-            others = [run for run in found[FREED:MOST_FREED] if run.alternative.names in ended]
+            ended = {fitted.alternative.names for fitted in last}
+            others = [fitted for fitted in found[FREED:MOST_FREED] if fitted.alternative.names in ended]
             freed += self._freer(others, found, last)
         return freed
 
-    def trimmed(self, runs: list[Run]) -> list[Run]:
-        """Curves without the knots that they do not need, so that no course loses for a freedom it did not use."""
-        return self._run(self._fewer(runs))
+    def trimmed(self, jobs: list[FittedJob]) -> list[FittedJob]:
+        """Curves without the knots that they do not need, so that no profile loses for a freedom it did not use."""
+        return self._run(self._fewer(jobs))
 
-    def _fewer(self, runs: list[Run]) -> list[Job]:
-        most = max((run.alternative.gain for run in runs), default=0.0)
-        near = [run for run in runs if run.alternative.gain > CLOSE_GAIN * most]
+    def _fewer(self, jobs: list[FittedJob]) -> list[Job]:
+        most = max((fitted.alternative.gain for fitted in jobs), default=0.0)
+        near = [fitted for fitted in jobs if fitted.alternative.gain > CLOSE_GAIN * most]
         count = self.fitter.problem.count(self.fitter.rows)
         return fewer_knots(near, float(np.log(max(count, 2))))
 
-    def _freer(self, runs: list[Run], found: list[Run], last: list[Run]) -> list[Run]:
-        names = {run.alternative.names for run in runs}
-        curves = best_of_each([run for run in last if run.alternative.names in names and is_curve(run)])
-        both = [*(run for run in runs if not is_curve(run)), *curves]
-        free = self._run([job for run in both for job in more_freedom(run, self.low, self.high)])
+    def _freer(self, jobs: list[FittedJob], found: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
+        names = {fitted.alternative.names for fitted in jobs}
+        curves = best_of_each([fitted for fitted in last if fitted.alternative.names in names and is_curve(fitted)])
+        both = [*(fitted for fitted in jobs if not is_curve(fitted)), *curves]
+        free = self._run([job for fitted in both for job in more_freedom(fitted, self.low, self.high)])
         fewer = self._fewer(free)
         free += self._run([*fewer, *from_scratch(fewer)])
-        bound = {run.alternative.names: run.alternative.fit for run in found}
+        bound = {fitted.alternative.names: fitted.alternative.fit for fitted in found}
         problem = self.fitter.problem
         return [r for r in free if worth_its_freedom(problem, bound[r.alternative.names], r.alternative.fit)]
 
@@ -189,16 +208,16 @@ def _exact(fitter: Fitter, base: Fit, a: Alternative) -> Alternative:
     return replace(a, fit=fit, gain=base.loss - fit.loss, delta_bic=fit.bic - base.bic)
 
 
-def _finalists(loss: float, ranked: list[Run], tied: set[tuple[str, str]]) -> list[Run]:
+def _finalists(loss: float, ranked: list[FittedJob], tied: set[tuple[str, str]]) -> list[FittedJob]:
     """Who goes on: the first few, more that come near them or tie with them to first order (few steps tell little).
 
     `loss` is that of the model as it is.
     """
-    gains = [max(loss - run.alternative.fit.loss, 0.0) for run in ranked]
+    gains = [max(loss - fitted.alternative.fit.loss, 0.0) for fitted in ranked]
     chosen = [
-        run
-        for i, (run, gain) in enumerate(zip(ranked, gains, strict=True))
-        if i < SURE_FINALISTS or (i < FINALISTS and gain > NEAR_FINALIST * gains[0]) or run.score.candidate.name in tied
+        f
+        for i, (f, gain) in enumerate(zip(ranked, gains, strict=True))
+        if i < SURE_FINALISTS or (i < FINALISTS and gain > NEAR_FINALIST * gains[0]) or f.score.candidate.name in tied
     ]
     return chosen[:MOST_FINALISTS]
 

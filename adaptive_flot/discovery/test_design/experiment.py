@@ -207,7 +207,10 @@ def leading(best: Alternative, others: Sequence[Alternative], margin: float) -> 
     seen = {frozenset(best.names)}
     close = [best]
     for a in others:
-        if abs(a.worse_than(best)) < max(margin, CLOSE, SURE * a.doubt) and frozenset(a.names) not in seen:
+        if (
+            abs(a.worse_than(best)) < max(margin, CLOSE, SURE * a.loglik_difference_sd)
+            and frozenset(a.names) not in seen
+        ):
             seen.add(frozenset(a.names))
             close.append(a)
     return tuple(close[:MOST_COMPARED])

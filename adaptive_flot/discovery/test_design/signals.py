@@ -97,9 +97,9 @@ def candidate_tests(names: Sequence[str], where: Range, rows: int) -> Iterator[T
             )
         yield TestSignal(f"binary sequence of {words}", _moved(at_rest, where, {j: _binary(rows)}))
     if len(moving) > 1:
-        courses = {j: _binary(rows, k, len(moving)) for k, j in enumerate(moving)}
+        profiles = {j: _binary(rows, k, len(moving)) for k, j in enumerate(moving)}
         words = ", ".join(names[j].replace("_", " ") for j in moving)
-        yield TestSignal(f"binary sequences of {words} at once", _moved(at_rest, where, courses))
+        yield TestSignal(f"binary sequences of {words} at once", _moved(at_rest, where, profiles))
 
 
 def watching(last: FloatArray, rows: int) -> TestSignal:
@@ -107,9 +107,9 @@ def watching(last: FloatArray, rows: int) -> TestSignal:
     return TestSignal(WATCHING, np.tile(last, (rows, 1)))
 
 
-def _moved(at_rest: FloatArray, where: Range, courses: Mapping[int, FloatArray]) -> FloatArray:
+def _moved(at_rest: FloatArray, where: Range, profiles: Mapping[int, FloatArray]) -> FloatArray:
     u = at_rest.copy()
-    for j, high in courses.items():
+    for j, high in profiles.items():
         u[:, j] = np.where(high > 0, where.high[j], where.low[j])
     return u
 

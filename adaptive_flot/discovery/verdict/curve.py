@@ -37,7 +37,7 @@ class EffectCurve:
     change, low, high
         The change and its 95 % band (K,), linearised in the coefficients.
     seen
-        Values of the driver on the rows from the first that any share has.
+        Values of the driver on the rows from the first that any split has.
     anchor
         Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
         adapted parameters; None where it can.

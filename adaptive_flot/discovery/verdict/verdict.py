@@ -65,9 +65,9 @@ class Verdict:
     members
         (site, driver) of each member of a class.
     error
-        Free-run error of each output on the share that chose nothing.
+        Free-run error of each output on the split that chose nothing.
     report_times
-        First and last time [s] of each part of the record in that share; empty when another record reported.
+        First and last time [s] of each part of the record in that split; empty when another record reported.
     tests
         Ljung-Box p values of the grade (the first output) before and after, and other tests.
     detection, location
@@ -91,7 +91,7 @@ class Verdict:
     effects: tuple[NamedEffect, ...] = ()
     members: tuple[tuple[str, str], ...] = ()
     error: tuple[OutputChange, ...] = ()
-    block: str = "report"
+    split: str = "report"
     report_times: tuple[tuple[float, float], ...] = ()
     tests: Mapping[str, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -117,7 +117,7 @@ class Verdict:
                     "after": c.after,
                     "noise": c.noise,
                     "reduction95": list(c.reduction95),
-                    "block": self.block,
+                    "block": self.split,
                 }
                 for c in self.error
             },
@@ -156,8 +156,8 @@ class Judgement:
 def judge(found: Search) -> Judgement:
     """Turn the ranked alternatives into a word.
 
-    The margin of a name is what noise can give (10 for each independent story that the innovations tell) or, if larger,
-    what the best alternative itself still leaves unexplained: an alternative that is worse by less than the best one's
+    The margin of a name is what noise can give (10 times the rows of an effective sample) or, if larger, what the best
+    alternative itself still leaves unexplained: an alternative that is worse by less than the best one's
     own shortcoming is not told apart from it.
     """
     if not found.alternatives:
@@ -174,13 +174,13 @@ def judge(found: Search) -> Judgement:
     named = [a for a in close if all(a.known)]
     rivals = _others(found, best)
     # a drift of what is adapted is the ordinary explanation: what is hardly better does not replace it
-    alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * found.together)
+    alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * found.rows_per_effective_sample)
     drifting = next((a for a in alike if _only_drift(a, found)), None)
-    if drifting:  # all there is, unless something else had to be granted to all
-        return Judgement("abstain" if found.granted else "none", drifting, (), _others(found, drifting), margin)
+    if drifting:  # all there is, unless something else had to be added to all
+        return Judgement("abstain" if found.common_nuisance else "none", drifting, (), _others(found, drifting), margin)
     if not named:
         return Judgement("unnamed" if len(close) == 1 else "abstain", best, (), rivals, margin)
-    if named[0] is not best and not _near(named[0], best, LEAST_MARGIN * found.together):
+    if named[0] is not best and not _near(named[0], best, LEAST_MARGIN * found.rows_per_effective_sample):
         # what has no name is surely better than what has one, though neither is all there is
         return Judgement("abstain", best, (), rivals, margin)
     best, rivals = named[0], _others(found, named[0])
@@ -206,21 +206,21 @@ def held_up(problem: Problem, found: Search, judged: Judgement) -> tuple[Search,
     return found, Judgement("abstain", found.alternatives[0], (), judged.rivals, judged.margin)
 
 
-def disputed(found: Search) -> tuple[Alternative, ...]:
+def undecided_rivals(found: Search) -> tuple[Alternative, ...]:
     """Rivals that are near the best, where some are so only for what the best leaves unexplained; else none."""
     if not found.alternatives or found.verification is None or not found.verification.confirmed:
         return ()
     best, margin = found.alternatives[0], _margin(found)
     near = tuple(a for a in found.alternatives[1:] if _near(a, best, margin))
-    return near if any(not _near(a, best, LEAST_MARGIN * found.together) for a in near) else ()
+    return near if any(not _near(a, best, LEAST_MARGIN * found.rows_per_effective_sample) for a in near) else ()
 
 
 def _margin(found: Search) -> float:
-    return max(LEAST_MARGIN * found.together, found.left - found.left_threshold)
+    return max(LEAST_MARGIN * found.rows_per_effective_sample, found.left - found.left_threshold)
 
 
 def _near(a: Alternative, best: Alternative, margin: float) -> bool:
-    return a.worse_than(best) < max(margin, SURE * a.doubt)
+    return a.worse_than(best) < max(margin, SURE * a.loglik_difference_sd)
 
 
 def _others(found: Search, best: Alternative) -> tuple[Alternative, ...]:

@@ -24,7 +24,7 @@ def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
 
 
 def _largest_move(values: list[float]) -> float:
-    """Difference of the extremes of a course, negative where the larger comes first."""
+    """Difference of the extremes of a profile, negative where the larger comes first."""
     high, low = int(np.argmax(values)), int(np.argmin(values))
     return (values[high] - values[low]) * (1 if high > low else -1)
 

@@ -63,9 +63,9 @@ def discovery_report(found: Discovery, name: str, command: str = "") -> str:
         contents += [("experiment", "Which input moves would tell")] if content["experiment"] else []
         contents += [("absorbed", "Absorbed")] if content["absorbed"] else []
     made = made_by(command, [("Model", found.model.name), ("Time", f"{found.verdict.seconds:.1f} s")])
-    lead = f"Record: {name}, {len(found.gate.record)} rows, one every {found.gate.record.dt:g} s."
+    lead = f"Record: {name}, {len(found.screening.record)} rows, one every {found.screening.record.dt:g} s."
     title = f"Discovery report: {TITLES[found.verdict.word]}"
-    page = Page(title, lead, [*contents, ("data", "Data gate")], made)
+    page = Page(title, lead, [*contents, ("data", "Data screening")], made)
     return render("discovery.html", page, **content)
 
 
@@ -101,7 +101,7 @@ def _facts(found: Discovery) -> list[str]:
 
 
 def _data(found: Discovery) -> list[str]:
-    said = [f"Insufficient: {r}." for r in found.gate.reasons] + [f"{n}." for n in found.gate.notes]
+    said = [f"Insufficient: {r}." for r in found.screening.reasons] + [f"{n}." for n in found.screening.notes]
     return said or ["Every measured output and every input can be used."]
 
 

@@ -41,7 +41,7 @@ def error_table(found: Discovery) -> Table:
         low, high = (number(100 * r, ".0f") for r in c.reduction95)
         rows.append((words(c.output), unit_text(c.unit, power), *values, f"{low} to {high}"))
     caption = (
-        f"Root mean square error of the free run on the {found.verdict.block} share, which neither chose "
+        f"Root mean square error of the free run on the {found.verdict.split} split, which neither chose "
         "nor fitted anything. Noise: what no model can remove, as fitted. Reduction: 95 % interval of a paired block "
         "bootstrap."
     )
@@ -60,7 +60,7 @@ def coefficient_table(found: Discovery) -> Table:
             unit = unit_text(units.get(name) or "-")
             rows.append((site, named.effect.form, words(name), unit, number(value, ".4g"), interval))
     caption = (
-        "Coefficients of the effect, fitted on the estimation and confirm shares. A factor form multiplies its site by "
+        "Coefficients of the effect, fitted on the estimation and confirm splits. A factor form multiplies its site by "
         "exp(g); coefficients of g are logarithms of that factor."
     )
     return Table(caption, ("Effect", "Form", "Coefficient", "Unit", "Value", "95 % interval"), tuple(rows), words=4)
@@ -72,7 +72,9 @@ def alternative_table(found: Discovery) -> Table:
     rows = []
     for k, a in enumerate(ranked):
         forms = ", and ".join(_form(e) for e in a.effects)
-        worse = number(a.worse_than(ranked[0]), ".1f") + (f" ± {number(a.doubt, '.0f')}" if a.doubt else "")
+        worse = number(a.worse_than(ranked[0]), ".1f") + (
+            f" ± {number(a.loglik_difference_sd, '.0f')}" if a.loglik_difference_sd else ""
+        )
         values = (worse, number(a.delta_bic, ".1f"))
         rows.append((str(k + 1), effect_text(a.names), forms, "yes" if all(a.known) else "no", *values))
     caption = (
@@ -166,7 +168,7 @@ def not_told_apart(found: Discovery) -> list[str]:
     said = []
     for a in judged.rivals:
         if judged.near(a):
-            least = max(judged.margin, SURE * a.doubt)
+            least = max(judged.margin, SURE * a.loglik_difference_sd)
             said.append(
                 f"{effect_text(a.names)} explains the record about as well as {effect_text(best.names)}: its criterion "
                 f"differs by {number(a.worse_than(best), '.1f')}, and {least:.0f} is the least that tells them "

@@ -1,4 +1,4 @@
-"""Knots that a curve does not need: on a linear problem the promise is exact, and what is left draws the course."""
+"""Knots that a curve does not need: on a linear problem the promise is exact, and what is left draws the profile."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def any_fit() -> Fit:
     return fit
 
 
-def _regression(course: FloatArray, noise: float, seed: int) -> tuple[FloatArray, Effect, FloatArray, FloatArray]:
-    """Measurements of a course, and the least-squares curve through all knots of the grid with its covariance."""
-    measured = course + noise * np.random.default_rng(seed).standard_normal(len(TIME))
+def _regression(profile: FloatArray, noise: float, seed: int) -> tuple[FloatArray, Effect, FloatArray, FloatArray]:
+    """Measurements of a profile, and the least-squares curve through all knots of the grid with its covariance."""
+    measured = profile + noise * np.random.default_rng(seed).standard_normal(len(TIME))
     basis = CubicSpline(GRID, np.eye(MOST_KNOTS), bc_type="natural")(TIME)
     covariance: FloatArray = np.array(np.linalg.inv(basis.T @ basis) * noise**2, dtype=float)
     values = covariance @ basis.T @ measured / noise**2

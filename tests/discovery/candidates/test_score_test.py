@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate, catalogue, finer
-from adaptive_flot.discovery.candidates.responses import Course, Responses
+from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.candidates.spline import spline_values
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -43,14 +43,14 @@ def _candidate(scorer: Scorer, site: str, driver: str) -> Candidate:
     return next(c for c in scorer.candidates if c.name == (site, driver))
 
 
-def test_shares_do_not_overlap_and_leave_guards_between_them() -> None:
+def test_splits_do_not_overlap_and_leave_guards_between_them() -> None:
     problem, _ = _fitted(Truth())
-    shares = [problem.rows(s) for s in ("estimate", "confirm", "report")]
-    assert not np.any(np.sum(shares, axis=0) > 1)
-    assert [round(float(s.sum()) / len(problem.record), 1) for s in shares] == [0.5, 0.2, 0.2]
+    splits = [problem.rows(s) for s in ("estimate", "confirm", "report")]
+    assert not np.any(np.sum(splits, axis=0) > 1)
+    assert [round(float(s.sum()) / len(problem.record), 1) for s in splits] == [0.5, 0.2, 0.2]
     assert not problem.rows()[:30].any()
-    changes = np.flatnonzero(problem.blocks[1:] != problem.blocks[:-1])
-    assert all("" in (problem.blocks[k], problem.blocks[k + 1]) for k in changes)
+    changes = np.flatnonzero(problem.splits[1:] != problem.splits[:-1])
+    assert all("" in (problem.splits[k], problem.splits[k + 1]) for k in changes)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -74,12 +74,14 @@ def test_the_exponent_that_made_the_record_comes_back() -> None:
     assert fit.bic < base.bic - 100
 
 
-def test_an_answer_is_what_the_model_does(weak: tuple[Problem, Fit, Scorer]) -> None:
-    """Linear answers against differences of two full simulations."""
+def test_a_response_is_what_the_model_does(weak: tuple[Problem, Fit, Scorer]) -> None:
+    """Linear responses against differences of two full simulations."""
     problem, fit, _ = weak
     responses = Responses(problem, fit)
     fan = problem.record.inputs[:, 1]
-    answer = responses.of([Course("heat_loss", np.log(fan / 10), False), Course("thermometer", np.ones(600), True)])
+    response = responses.of(
+        [TimeProfile("heat_loss", np.log(fan / 10), False), TimeProfile("thermometer", np.ones(600), True)]
+    )
     small = 1e-4
     effects = [
         Effect("heat_loss", "fan_speed", "power", {"exponent": small}, {"reference": 10.0}),
@@ -90,42 +92,42 @@ def test_an_answer_is_what_the_model_does(weak: tuple[Problem, Fit, Scorer]) -> 
         for model in (fit.model, fit.model.with_effects([effect])):
             inputs = problem.record.inputs[1:]
             runs.append(Stepper(model, DT).simulate(fit.initial_state, inputs, model.parameter_values, DT).outputs)
-        np.testing.assert_allclose(answer[1:, :, j], (runs[1] - runs[0]) / small, rtol=2e-3, atol=1e-3)
+        np.testing.assert_allclose(response[1:, :, j], (runs[1] - runs[0]) / small, rtol=2e-3, atol=1e-3)
 
 
 @pytest.mark.parametrize("coarse", [False, True])
 def test_scores_see_the_same_answers_on_the_rows_they_need(weak: tuple[Problem, Fit, Scorer], coarse: bool) -> None:
-    """Answers on the rows fitted, and the few before that whitening looks back to, are the same to the bit."""
+    """Responses on the rows fitted, and the few before that whitening looks back to, are the same to the bit."""
     problem, fit, _ = weak
     if coarse:
         problem = replace(problem, nodes=place_nodes(problem.record, 4))
     responses = Responses(problem, fit)
     fan = problem.record.inputs[:, 1]
-    courses = [Course("heat_loss", np.log(fan / 10), False), Course("thermometer", np.ones(600), True)]
+    profiles = [TimeProfile("heat_loss", np.log(fan / 10), False), TimeProfile("thermometer", np.ones(600), True)]
     rows = problem.rows("estimate")
-    np.testing.assert_array_equal(responses.of(courses, rows), responses.of(courses)[rows])
+    np.testing.assert_array_equal(responses.of(profiles, rows), responses.of(profiles)[rows])
     noise = Noise(np.array([0.1]), np.array([[0.5, 0.2, 0.1]]))
     reached = with_rows_before(rows)
-    every, some = noise.whiten(responses.of(courses)), noise.whiten(responses.of(courses, reached))
+    every, some = noise.whiten(responses.of(profiles)), noise.whiten(responses.of(profiles, reached))
     np.testing.assert_array_equal(some[rows[reached]], every[rows])
 
 
 @pytest.mark.parametrize("coarse", [False, True])
-def test_an_answer_does_not_depend_on_its_company(weak: tuple[Problem, Fit, Scorer], coarse: bool) -> None:
-    """Courses that move the tank and courses that only the sensor shows, mixed, against each alone and against none."""
+def test_a_response_does_not_depend_on_the_others(weak: tuple[Problem, Fit, Scorer], coarse: bool) -> None:
+    """Profiles that move the tank and those that only the sensor shows, mixed, against each alone and against none."""
     problem, fit, _ = weak
     if coarse:
         problem = replace(problem, nodes=place_nodes(problem.record, 4))
     responses, fan, rows = Responses(problem, fit), problem.record.inputs[:, 1], problem.rows("estimate")
-    courses = [
-        Course("thermometer", np.linspace(0, 1, 600), True),
-        Course("heat_loss", np.log(fan / 10), False),
-        Course("thermometer", fan, False),
-        Course("heating", np.ones(600), False),
+    profiles = [
+        TimeProfile("thermometer", np.linspace(0, 1, 600), True),
+        TimeProfile("heat_loss", np.log(fan / 10), False),
+        TimeProfile("thermometer", fan, False),
+        TimeProfile("heating", np.ones(600), False),
     ]
-    together = responses.of(courses, rows)
-    for j, course in enumerate(courses):
-        np.testing.assert_allclose(responses.of([course], rows)[:, :, 0], together[:, :, j], rtol=1e-12, atol=1e-12)
+    together = responses.of(profiles, rows)
+    for j, profile in enumerate(profiles):
+        np.testing.assert_allclose(responses.of([profile], rows)[:, :, 0], together[:, :, j], rtol=1e-12, atol=1e-12)
     assert responses.of([], rows).shape == (rows.sum(), 1, 0)
 
 
@@ -188,7 +190,7 @@ def test_the_catalogue_offers_what_makes_sense_once(weak: tuple[Problem, Fit, Sc
     for c in scorer.candidates:
         for v in c.variants:
             assert all(value == 0 for value in v.effect.coefficients.values())
-            assert len(v.coefficients) == len(v.courses)
+            assert len(v.coefficients) == len(v.profiles)
 
 
 def test_splines_pass_through_their_knots_and_a_finer_one_draws_the_same_curve(

@@ -52,7 +52,7 @@ def test_what_is_over_at_once_is_tried_as_a_step(form: str) -> None:
 
 
 @pytest.mark.parametrize("form", ["ramp", "washout"])
-def test_a_freer_course_starts_as_the_course_it_frees(form: str) -> None:
+def test_a_freer_profile_starts_as_the_profile_it_frees(form: str) -> None:
     """At its knots, which stand around the event."""
     length = "duration" if form == "ramp" else "time_constant"
     event = Effect("froth_recovery", "time", form, {"amplitude": 0.4, "onset": 1000.0, length: 100.0})
@@ -89,7 +89,7 @@ def test_a_washout_is_found_in_its_curve() -> None:
 
 
 def test_a_large_change_at_once_is_an_event_though_its_knots_are_even() -> None:
-    """A plateau by a factor of two, and the same course a tenth as large or spread over the record."""
+    """A plateau by a factor of two, and the same profile a tenth as large or spread over the record."""
     knots = np.linspace(0.0, 3000.0, 28)
 
     def curve(values: np.ndarray) -> Effect:

@@ -12,7 +12,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.search.alternatives import Alternative, fit_variant
-from adaptive_flot.discovery.search.entrants import ADDS, Run, constants, unbent
+from adaptive_flot.discovery.search.fit_jobs import ADDS, FittedJob, constants, unbent
 from adaptive_flot.discovery.search.search import scorer_of
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -31,8 +31,8 @@ def scored() -> tuple[Problem, Fit, Scorer]:
     return problem, fit, scorer_of(problem, fit)[0]
 
 
-def _run(base: Fit, score: Score, fit: Fit, gain: float) -> Run:
-    return Run(0, score, Alternative((score.candidate.name,), (True,), fit, gain, -gain))
+def _run(base: Fit, score: Score, fit: Fit, gain: float) -> FittedJob:
+    return FittedJob(0, score, Alternative((score.candidate.name,), (True,), fit, gain, -gain))
 
 
 def _variants(scorer: Scorer, driver: str, mode: str | None) -> list[Score]:
@@ -86,7 +86,7 @@ def test_only_a_dependence_that_adds_nothing_starts_again(scored: tuple[Problem,
 
 
 @pytest.mark.parametrize(("from_the_start", "tried"), [(True, True), (False, False)])
-def test_a_constant_is_tried_where_it_is_nearly_as_good_as_a_course(from_the_start: bool, tried: bool) -> None:
+def test_a_constant_is_tried_where_it_is_nearly_as_good_as_a_profile(from_the_start: bool, tried: bool) -> None:
     """A thermometer that is off throughout, and one that jumps in the middle: that is no constant, to first order."""
     right = tank_record(Truth(exponent=0.0, offset=0.0 if from_the_start else 4.0))
     record = replace(right, outputs=right.outputs + 4.0) if from_the_start else right

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.fitting.descent import SHARES, Descent
+from adaptive_flot.discovery.fitting.descent import START_FRACTIONS, Descent
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
@@ -39,7 +39,7 @@ def base() -> tuple[Problem, Fit]:
 
 @settings(max_examples=15, deadline=None)
 @given(exponent=st.floats(-9.0, 9.0))
-def test_a_start_is_shrunk_to_the_share_that_is_nearest(base: tuple[Problem, Fit], exponent: float) -> None:
+def test_a_start_is_shrunk_to_the_fraction_that_is_nearest(base: tuple[Problem, Fit], exponent: float) -> None:
     problem, fit = base
     model = fit.model.with_effects([DRAUGHT])
 
@@ -52,7 +52,9 @@ def test_a_start_is_shrunk_to_the_share_that_is_nearest(base: tuple[Problem, Fit
 
     shrunk = descent(exponent)
     shrunk.shrink([EXPONENT_NAME])
-    assert distance(shrunk) == pytest.approx(min(distance(descent(share * exponent)) for share in SHARES))
+    assert distance(shrunk) == pytest.approx(
+        min(distance(descent(fraction * exponent)) for fraction in START_FRACTIONS)
+    )
 
 
 @pytest.mark.parametrize("start", [6.0, -6.0])

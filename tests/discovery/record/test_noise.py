@@ -47,7 +47,7 @@ def test_spread_of_an_autoregression_is_the_closed_form(a: float, expected: floa
 
 @given(poles=st.lists(st.floats(-1.3, 1.3), min_size=3, max_size=3))
 def test_memory_is_infinite_from_the_unit_circle_on(poles: list[float]) -> None:
-    """Whatever the answer to an impulse still shows; else the size is that of a longer answer."""
+    """Whatever the response to an impulse still shows; else the size is that of a longer response."""
     a = np.asarray(-np.poly(poles)[1:], dtype=np.float64)
     reach = np.max(np.abs(poles))
     assume(abs(reach - 1) > 1e-3)

@@ -1,4 +1,4 @@
-"""The data gate: every kind of bad record is told by its reason, and none of them is ever given a name."""
+"""The data screening: every kind of bad record is told by its reason, and none of them is ever given a name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.record.screening import gate
+from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Scope
 from tests.discovery.heated import Truth, changed, heated_tank, tank_record
@@ -55,7 +55,7 @@ def _nothing(y: FloatArray) -> FloatArray:
 @given(st.integers(0, 200), st.integers(250, 900))
 def test_a_good_record_passes_untouched(seed: int, rows: int) -> None:
     record = tank_record(rows=rows, seed=seed)
-    checked = gate(record, heated_tank())
+    checked = screen(record, heated_tank())
     assert checked.reasons == () == checked.notes
     np.testing.assert_array_equal(checked.record.outputs, record.outputs)
 
@@ -85,7 +85,7 @@ def test_what_can_not_be_used_is_left_out_and_the_rest_is_judged(change: Change,
     found = discover(heated_tank(), _record(change))
     assert found.verdict.word == "none", found.verdict
     assert says in " ".join(found.verdict.notes)
-    missing = np.flatnonzero(np.isnan(found.gate.record.outputs[:, 0]))
+    missing = np.flatnonzero(np.isnan(found.screening.record.outputs[:, 0]))
     assert set(lost or ()) <= set(missing.tolist()) and len(missing) > 50
 
 
@@ -100,11 +100,11 @@ def test_a_few_outliers_change_nothing() -> None:
 
 def test_a_signal_that_repeats_itself_is_quantised_and_not_frozen() -> None:
     record = _record(lambda y: np.round(y))
-    assert not gate(record, heated_tank()).notes
+    assert not screen(record, heated_tank()).notes
 
 
 def test_an_input_that_hardly_moves_gives_no_driver(even: Dataset) -> None:
-    checked = gate(even, heated_tank())
+    checked = screen(even, heated_tank())
     assert checked.reasons == () and any("power hardly moves" in n for n in checked.notes)
 
 

@@ -1,4 +1,4 @@
-"""Rivals granted what the best lacks: they are compared anew, and what all lack no longer counts as doubt."""
+"""Rivals with what the best lacks added: they are compared anew, and what all lack no longer makes them uncertain."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
-from adaptive_flot.discovery.search.common_nuisance import MOST_RIVALS, contest
+from adaptive_flot.discovery.search.common_nuisance import MOST_RIVALS, adjust_for_common_nuisance
 from adaptive_flot.discovery.search.search import Search, search
 from adaptive_flot.discovery.verdict.verdict import judge
 from tests.discovery.heated import heated_tank, tank_record
@@ -34,32 +34,32 @@ def _first_round(found: Search) -> Search:
     return replace(found, alternatives=found.rounds[0].alternatives, left=500.0, left_threshold=10.0)
 
 
-def test_what_all_lack_is_granted_to_all(wandering: tuple[Problem, Search]) -> None:
+def test_what_all_lack_is_added_to_all(wandering: tuple[Problem, Search]) -> None:
     problem, found = wandering
     first = _first_round(found)
     near = first.alternatives[1:]
-    after = contest(problem, first, near)
-    assert after.granted is not None and after.granted != first.alternatives[0].names[0]
-    told = [a.told for a in after.alternatives if a.told is not None]
-    assert len(told) == 1 + len(near) and told == sorted(told)
+    after = adjust_for_common_nuisance(problem, first, near)
+    assert after.common_nuisance is not None and after.common_nuisance != first.alternatives[0].names[0]
+    adjusted = [a.adjusted_bic for a in after.alternatives if a.adjusted_bic is not None]
+    assert len(adjusted) == 1 + len(near) and adjusted == sorted(adjusted)
     assert {a.names for a in after.alternatives} == {a.names for a in first.alternatives}
     assert after.left < first.left
     assert after.alternatives[0].names == (("heat_loss", "fan_speed"),)
     best = after.alternatives[0]
-    for a in after.alternatives[1 : len(told)]:
-        assert a.worse_than(best) == pytest.approx((a.told or 0.0) - (best.told or 0.0))
+    for a in after.alternatives[1 : len(adjusted)]:
+        assert a.worse_than(best) == pytest.approx((a.adjusted_bic or 0.0) - (best.adjusted_bic or 0.0))
 
 
-def test_a_contest_settles_what_the_shortcoming_left_open(wandering: tuple[Problem, Search]) -> None:
+def test_the_comparison_settles_what_the_shortcoming_left_open(wandering: tuple[Problem, Search]) -> None:
     problem, found = wandering
     first = _first_round(found)
     assert judge(first).word != "named"
-    verdict = judge(contest(problem, first, first.alternatives[1:]))
+    verdict = judge(adjust_for_common_nuisance(problem, first, first.alternatives[1:]))
     assert verdict.word == "named" and verdict.best is not None
     assert verdict.best.names == (("heat_loss", "fan_speed"),)
 
 
-def test_there_is_no_contest_with_no_one_or_with_too_many(wandering: tuple[Problem, Search]) -> None:
+def test_there_is_no_comparison_with_no_one_or_with_too_many(wandering: tuple[Problem, Search]) -> None:
     problem, found = wandering
-    assert contest(problem, found, ()) is found
-    assert contest(problem, found, found.alternatives[:1] * (MOST_RIVALS + 1)) is found
+    assert adjust_for_common_nuisance(problem, found, ()) is found
+    assert adjust_for_common_nuisance(problem, found, found.alternatives[:1] * (MOST_RIVALS + 1)) is found

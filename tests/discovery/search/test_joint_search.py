@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
-from adaptive_flot.discovery.record.screening import gate
+from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.discovery.search.joint_fits import correlation_time, cross_validated
 from adaptive_flot.discovery.search.joint_search import dominated
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -50,7 +50,7 @@ def test_correlation_time_of_an_autoregression_is_known(white: tuple[Problem, Fi
     rng = np.random.default_rng(5)
     for phi in (0.0, 0.6, 0.9):
         e = np.asarray(lfilter([1.0], [1.0, -phi], rng.standard_normal(200_000)))[:, None]
-        long = replace(problem, record=replace(problem.record, outputs=e), blocks=np.full(len(e), "estimate"))
+        long = replace(problem, record=replace(problem.record, outputs=e), splits=np.full(len(e), "estimate"))
         found = correlation_time(long, replace(fit, predicted=np.zeros_like(e)))
         assert found == pytest.approx((1 + phi) / (1 - phi), rel=0.15)
 
@@ -77,7 +77,7 @@ def test_a_level_that_stays_at_its_highest_is_kept_where_the_process_can_hold_it
     """A tank that overflows is physics; the same series of another model's sensor is clipped."""
     full = record(0.02 * np.random.default_rng(2).standard_normal(400))
     full = replace(full, outputs=np.minimum(full.outputs, np.quantile(full.outputs, 0.9)))
-    kept = gate(full, MODEL)
+    kept = screen(full, MODEL)
     assert np.isfinite(kept.record.outputs).all() and "kept" in " ".join(kept.notes)
-    cut = gate(full, replace(MODEL, edges=()))
+    cut = screen(full, replace(MODEL, edges=()))
     assert np.isnan(cut.record.outputs).sum() >= 30 and "left out" in " ".join(cut.notes)

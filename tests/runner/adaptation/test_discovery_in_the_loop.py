@@ -14,7 +14,7 @@ import pytest
 
 from adaptive_flot.contracts import Setup
 from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.discovery.record.screening import Gate
+from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.verdict.verdict import Verdict, Word
 from adaptive_flot.errors import AdaptiveFlotError, ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -66,7 +66,7 @@ def says(word: Word, *effects: Effect, **parameters: float) -> Stub:
     def discover(model: Model, record: Dataset, *, adapted: tuple[str, ...], processes: int) -> Discovery:
         del adapted, processes
         found = model.with_parameters(parameters).with_effects(effects)
-        return Discovery(Verdict(word, f"stub: {word}"), found, Gate(record, (), ()))
+        return Discovery(Verdict(word, f"stub: {word}"), found, Screening(record, (), ()))
 
     return discover
 

@@ -1,4 +1,4 @@
-"""Who enters a heat: forms, events, constants and freer courses, each from what earlier heats came to."""
+"""Which fits a rung makes: forms, events, constants and freer profiles, each from what earlier rungs came to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Ef
 FORMS_EACH = 3
 MOST_CONSTANTS = 4
 """Alternatives whose sites are tried with a constant."""
-MOST_COURSES = 3
+MOST_PROFILES = 3
 """Curves in time that are tried as events."""
 BENT = 0.3
 """A dependence is surely not flat when to flatten it costs this share of all it gained."""
@@ -28,8 +28,8 @@ ADDS = 0.05
 
 
 @dataclass(frozen=True)
-class Lane:
-    """A linearisation, whose fit the searches start from, and the candidates that are worth one."""
+class Linearisation:
+    """Responses along one fit, from which the searches start, and the candidates that are worth one."""
 
     scorer: Scorer
     scores: list[Score]
@@ -37,38 +37,38 @@ class Lane:
 
 @dataclass(frozen=True)
 class Job:
-    """A fit to be made in one lane, from scratch or from a fit of the same name."""
+    """A fit to be made in one linearisation, from scratch or from a fit of the same name."""
 
-    lane: int
+    linearisation: int
     score: Score
     warm: Fit | None = None
     drawn: bool = False
-    """Whether the start values draw a curve that was fitted, and are no first-order answer."""
+    """Whether the start values draw a curve that was fitted, and are no first-order estimate."""
 
 
 @dataclass(frozen=True)
-class Run:
-    """A fit in one lane."""
+class FittedJob:
+    """A job that was done: the alternative that it came to."""
 
-    lane: int
+    linearisation: int
     score: Score
     alternative: Alternative
 
 
-def first_forms(lane: Lane, score: Score) -> list[Score]:
-    """The forms of the first heat: the best one, and for what depends on time its curve too."""
+def first_forms(linearisation: Linearisation, score: Score) -> list[Score]:
+    """The forms of the first rung: the best one, and for what depends on time its curve too."""
     if score.candidate.driver != "time":
         return [score]
-    curves = [s for s in lane.scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"][:1]
+    curves = [s for s in linearisation.scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"][:1]
     return [score] if score.variant.effect.form == "curve" else [score, *curves]
 
 
-def forms(lane: Lane, run: Run) -> list[Job]:
-    """Best variant of each form (and mode) of a candidate that comes near the best, from where the first heat ended."""
-    name, fitted = run.score.candidate.name, run.alternative
-    score = next(s for s in lane.scores if s.candidate.name == name)
+def forms(linearisation: Linearisation, fitted: FittedJob) -> list[Job]:
+    """Best variant of each form (and mode) of a candidate that comes near the best, from where the first rung ended."""
+    name, ended = fitted.score.candidate.name, fitted.alternative
+    score = next(s for s in linearisation.scores if s.candidate.name == name)
     found: dict[tuple[str, str | None], Score] = {}
-    for s in lane.scorer.variant_scores(score.candidate):
+    for s in linearisation.scorer.variant_scores(score.candidate):
         key = s.variant.effect.form, s.variant.effect.mode
         if key not in found and s.gain > 0.5 * score.gain:
             found[key] = s
@@ -78,17 +78,17 @@ def forms(lane: Lane, run: Run) -> list[Job]:
         kept = [s for k, s in found.items() if k[0] == "curve"] or [score]
     jobs = []
     for s in kept:
-        same = s.variant.effect.form == "curve" and s.variant.effect == run.score.variant.effect
-        warm = None if in_time and not same else fitted.fit
-        fine = finer(s.variant, fitted.effects[-1].coefficients if same else s.start)
+        same = s.variant.effect.form == "curve" and s.variant.effect == fitted.score.variant.effect
+        warm = None if in_time and not same else ended.fit
+        fine = finer(s.variant, ended.effects[-1].coefficients if same else s.start)
         if fine:
-            jobs.append(Job(run.lane, replace(s, variant=fine[0], start=fine[1]), warm))
+            jobs.append(Job(fitted.linearisation, replace(s, variant=fine[0], start=fine[1]), warm))
         else:
-            jobs.append(Job(run.lane, s, warm))
+            jobs.append(Job(fitted.linearisation, s, warm))
     return jobs
 
 
-def constants(scorer: Scorer, fitted: list[Alternative]) -> list[tuple[Score, Fit]]:
+def constants(scorer: Scorer, ended: list[Alternative]) -> list[tuple[Score, Fit]]:
     """The constant change at the sites of the best fits, from what a dependence on a driver or on time came to.
 
     A dependence that turned out flat is that constant, which has the better name. And where the two are as good as the
@@ -97,7 +97,7 @@ def constants(scorer: Scorer, fitted: list[Alternative]) -> list[tuple[Score, Fi
     scores = {s.candidate.name: s.gain for s in scorer.scores()}
     at = {s.candidate.site.name: s for s in scorer.scores() if s.candidate.driver == "constant"}
     found: dict[str, tuple[Score, Fit]] = {}
-    for a in fitted[:MOST_CONSTANTS]:
+    for a in ended[:MOST_CONSTANTS]:
         effect = a.effects[-1]
         site, c = effect.site, effect.coefficients
         values = [v for k, v in c.items() if k.startswith(("value", "amplitude"))]
@@ -111,7 +111,7 @@ def constants(scorer: Scorer, fitted: list[Alternative]) -> list[tuple[Score, Fi
     return list(found.values())
 
 
-def unbent(constant: Run, fitted: list[Run], scorer: Scorer) -> list[Job]:
+def unbent(constant: FittedJob, ended: list[FittedJob], scorer: Scorer) -> list[Job]:
     """Dependences that hardly gained more than a constant at the same site: fits to start from the constant.
 
     The constant is a special case of each, so that one which ends no better may have come to rest elsewhere. `scorer`
@@ -121,14 +121,14 @@ def unbent(constant: Run, fitted: list[Run], scorer: Scorer) -> list[Job]:
     if effect.driver != "constant":
         return []
     jobs = []
-    for run in fitted:
-        own = run.alternative.effects[-1]
+    for fitted in ended:
+        own = fitted.alternative.effects[-1]
         if own.site != effect.site or own.driver in STATELESS_DRIVERS:
             continue
-        if run.alternative.gain < (1 + ADDS) * reached.gain:
+        if fitted.alternative.gain < (1 + ADDS) * reached.gain:
             level = effect.coefficients["amplitude"] * scorer.in_mode(effect.site, effect.mode, own.mode)
             start = {c.name: level if c.name.startswith(("value", "amplitude")) else 0.0 for c in own.terms}
-            jobs.append(Job(constant.lane, replace(run.score, start=start), reached.fit))
+            jobs.append(Job(constant.linearisation, replace(fitted.score, start=start), reached.fit))
     return jobs
 
 
@@ -143,46 +143,53 @@ def _bend(fit: Fit, effect: Effect) -> float:
     return float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)
 
 
-def events(scores: list[Score], fitted: list[Alternative]) -> list[Score]:
+def events(scores: list[Score], ended: list[Alternative]) -> list[Score]:
     """Events at the sites of fitted curves in time, started from the best curve of each."""
     by_name = {s.candidate.name: s for s in scores}
     found: dict[tuple[str, str], list[Score]] = {}
-    for a in fitted:
+    for a in ended:
         effect, name = a.effects[-1], a.names[-1]
         wanted = effect.driver == "time" and effect.form == "curve" and name not in found
-        if wanted and len(found) < MOST_COURSES:
+        if wanted and len(found) < MOST_PROFILES:
             found[name] = event_scores(by_name[name], effect)
     return [s for group in found.values() for s in group]
 
 
-def step(run: Run, span: float) -> list[Job]:
+def step(fitted: FittedJob, span: float) -> list[Job]:
     """A step where a fitted event is over at once; `span` is the length of the record [s]."""
-    score = step_score(run.score, run.alternative.effects[-1], span)
-    return [Job(run.lane, score)] if score else []
+    score = step_score(fitted.score, fitted.alternative.effects[-1], span)
+    return [Job(fitted.linearisation, score)] if score else []
 
 
-def more_freedom(run: Run, low: float, high: float) -> list[Job]:
-    """The same course in time with more freedom, where a curve or a smooth event was the best of its name."""
-    effect = run.alternative.effects[-1]
+def more_freedom(fitted: FittedJob, low: float, high: float) -> list[Job]:
+    """The same time profile with more freedom, where a curve or a smooth event was the best of its name."""
+    effect = fitted.alternative.effects[-1]
     found = freer(effect, low, high) if effect.driver == "time" else None
     if found is None:
         return []
     variant, start = found
-    return [Job(run.lane, replace(run.score, variant=variant, start=start), run.alternative.fit, drawn=True)]
+    return [
+        Job(
+            fitted.linearisation,
+            replace(fitted.score, variant=variant, start=start),
+            fitted.alternative.fit,
+            drawn=True,
+        )
+    ]
 
 
-def fewer_knots(runs: list[Run], price: float) -> list[Job]:
+def fewer_knots(runs: list[FittedJob], price: float) -> list[Job]:
     """For each name the curve that should come out best without the knots that it does not need, from its fit."""
     found: dict[tuple[tuple[str, str], ...], tuple[float, Job]] = {}
-    for run in runs:
-        a = run.alternative
+    for fitted in runs:
+        a = fitted.alternative
         less = trimmed(a.fit, a.effects[-1], price)
         if less is None:
             continue
         promised = a.fit.bic - less.gain
         if a.names not in found or promised < found[a.names][0]:
-            score = replace(run.score, variant=less.variant, start=less.start)
-            found[a.names] = promised, Job(run.lane, score, a.fit, drawn=True)
+            score = replace(fitted.score, variant=less.variant, start=less.start)
+            found[a.names] = promised, Job(fitted.linearisation, score, a.fit, drawn=True)
     return [job for _, job in found.values()]
 
 
@@ -192,14 +199,14 @@ def from_scratch(jobs: list[Job]) -> list[Job]:
     return [replace(j, score=replace(j.score, start=dict.fromkeys(j.score.start, 0.0)), warm=None) for j in short]
 
 
-def is_curve(run: Run) -> bool:
+def is_curve(fitted: FittedJob) -> bool:
     """Whether the form that was fitted is a free curve."""
-    return run.score.variant.effect.form == "curve"
+    return fitted.score.variant.effect.form == "curve"
 
 
-def best_of_each(found: list[Run]) -> list[Run]:
+def best_of_each(found: list[FittedJob]) -> list[FittedJob]:
     """The best fit of each name, best first."""
-    best: dict[tuple[tuple[str, str], ...], Run] = {}
-    for run in sorted(found, key=lambda run: run.alternative.fit.bic):
-        best.setdefault(run.alternative.names, run)
+    best: dict[tuple[tuple[str, str], ...], FittedJob] = {}
+    for fitted in sorted(found, key=lambda fitted: fitted.alternative.fit.bic):
+        best.setdefault(fitted.alternative.names, fitted)
     return list(best.values())
