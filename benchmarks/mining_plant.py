@@ -56,7 +56,7 @@ def main(path: Path) -> int:
 
 
 def attribution(model: Model, train: Dataset) -> tuple[Fit, Fit]:
-    """Residual and search on the first part, also where the gate says that it can tell nothing: what it would find."""
+    """Residual and search on the first part, also where the screening says that it can tell nothing: what it would find."""
     names = model.expand_parameters(p.name for p in model.parameters if p.role == "estimated")
     problem = make_problem(train, model, names, burn_in=30, guard=5)
     base = Fitter(problem).fit(model)
@@ -67,7 +67,7 @@ def attribution(model: Model, train: Dataset) -> tuple[Fit, Fit]:
     began = time.perf_counter()
     found = search(problem, base, model, processes=available_processes())
     judged = judge(found)
-    print(f"search without the gate, {time.perf_counter() - began:.0f} s: {judged.word}; {found.verification}")
+    print(f"search without the screening, {time.perf_counter() - began:.0f} s: {judged.word}; {found.verification}")
     ranked = found.alternatives or found.rounds[0].alternatives
     for a in ranked[:SHOWN]:
         print(f"  {' with '.join(f'{s} by {d}' for s, d in a.names)}: delta BIC {a.delta_bic:.0f}")

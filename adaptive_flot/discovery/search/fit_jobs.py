@@ -28,7 +28,7 @@ ADDS = 0.05
 
 
 @dataclass(frozen=True)
-class Linearisation:
+class ScoredLinearisation:
     """Responses along one fit, from which the searches start, and the candidates that are worth one."""
 
     scorer: Scorer
@@ -55,7 +55,7 @@ class FittedJob:
     alternative: Alternative
 
 
-def first_forms(linearisation: Linearisation, score: Score) -> list[Score]:
+def first_forms(linearisation: ScoredLinearisation, score: Score) -> list[Score]:
     """The forms of the first rung: the best one, and for what depends on time its curve too."""
     if score.candidate.driver != "time":
         return [score]
@@ -63,7 +63,7 @@ def first_forms(linearisation: Linearisation, score: Score) -> list[Score]:
     return [score] if score.variant.effect.form == "curve" else [score, *curves]
 
 
-def forms(linearisation: Linearisation, fitted: FittedJob) -> list[Job]:
+def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
     """Best variant of each form (and mode) of a candidate that comes near the best, from where the first rung ended."""
     name, ended = fitted.score.candidate.name, fitted.alternative
     score = next(s for s in linearisation.scores if s.candidate.name == name)

@@ -21,7 +21,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.search.alternatives import SHORTLIST, Alternative, shortlist
-from adaptive_flot.discovery.search.fit_jobs import Linearisation
+from adaptive_flot.discovery.search.fit_jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.simplify import simpler
 from adaptive_flot.discovery.search.successive_halving import refit
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
@@ -222,7 +222,7 @@ def _round(
             wanted = shortlist(scorer, most)
             # a further effect must have a name: a pair of curves without one would explain anything
             wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
-            linearisations.append(Linearisation(scorer, wanted))
+            linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")
         found += refit(fitter, base, linearisations, before, processes, lambda: progress("fit"))
     if found and beam[0] is not None:

@@ -22,7 +22,7 @@ from adaptive_flot.discovery.search.alternatives import Alternative, effect_boun
 from adaptive_flot.discovery.search.fit_jobs import (
     FittedJob,
     Job,
-    Linearisation,
+    ScoredLinearisation,
     best_of_each,
     constants,
     events,
@@ -55,7 +55,7 @@ FREED, MOST_FREED = 2, 8
 def refit(
     fitter: Fitter,
     base: Fit,
-    linearisations: Sequence[Linearisation],
+    linearisations: Sequence[ScoredLinearisation],
     before: Alternative | None = None,
     processes: int = 1,
     done: Callable[[], None] = lambda: None,
@@ -83,7 +83,7 @@ class _SuccessiveHalving:
         self,
         fitter: Fitter,
         base: Fit,
-        linearisations: Sequence[Linearisation],
+        linearisations: Sequence[ScoredLinearisation],
         before: Alternative | None,
         processes: int,
         done: Callable[[], None],
