@@ -56,7 +56,7 @@ def main(path: Path) -> int:
 
 
 def attribution(model: Model, train: Dataset) -> tuple[Fit, Fit]:
-    """Residual and search on the first part, also where the screening says that it can tell nothing: what it would find."""
+    """Residual and search on the first part, also where the screening finds it insufficient: what it would find."""
     names = model.expand_parameters(p.name for p in model.parameters if p.role == "estimated")
     problem = make_problem(train, model, names, burn_in=30, guard=5)
     base = Fitter(problem).fit(model)
