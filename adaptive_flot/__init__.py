@@ -20,7 +20,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from adaptive_flot.api import discover, estimate, run, simulate
+    from adaptive_flot.api.estimation import estimate
+    from adaptive_flot.api.finding import discover
+    from adaptive_flot.api.runs import run
+    from adaptive_flot.api.simulation import simulate
     from adaptive_flot.errors import AdaptiveFlotError
     from adaptive_flot.greybox.data.dataset import read_dataset
     from adaptive_flot.greybox.effects import Effect
@@ -56,12 +59,12 @@ _HOMES = {
     "Parameter": "greybox.quantities",
     "Quantity": "greybox.quantities",
     "Scope": "greybox.scope",
-    "discover": "api",
-    "estimate": "api",
+    "discover": "api.finding",
+    "estimate": "api.estimation",
     "load_scenario": "runner.scenario.scenario",
     "read_dataset": "greybox.data.dataset",
-    "run": "api",
-    "simulate": "api",
+    "run": "api.runs",
+    "simulate": "api.simulation",
 }
 """Module of each name; imported on first use (PEP 562)."""
 

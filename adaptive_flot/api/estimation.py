@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,9 +12,9 @@ import pandas as pd
 
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.plugins import Choices, plugins
+from adaptive_flot.api.progress import counted
 from adaptive_flot.api.records import AnyRecord, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
-from adaptive_flot.console import progress_bar
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -230,7 +229,7 @@ def estimate(
     if not 0.0 < fit_share < 1.0:
         raise ModelError(f"fit_share = {fit_share:g}; give a number between 0 and 1, as 0.6")
     blocks = cut(data, fit_share, data.name) if isinstance(data, Dataset) else read_blocks(data, made, fit_share)
-    with progress_bar(record_name(data), 1 + len(chosen)) if progress else nullcontext(lambda: None) as advance:
+    with counted(progress, record_name(data), 1 + len(chosen)) as advance:
         result = estimate_record(
             blocks, made, estimators=chosen, fit=parameters, outputs=outputs, folder=Path.cwd(), progress=advance
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +11,9 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from adaptive_flot.api.models import AnyModel, Origin, read_model
+from adaptive_flot.api.progress import staged
 from adaptive_flot.api.records import AnyRecord, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
-from adaptive_flot.console import stage_bar
 from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
@@ -223,7 +222,7 @@ def discover(
     """
     made, origin = read_model(model)
     name, workers = record_name(data), processes or available_processes()
-    with stage_bar(name) if progress else nullcontext(lambda stage: None) as advance:
+    with staged(progress, name) as advance:
         if isinstance(data, Dataset):
             found = search_record(made, data, limits=limits, processes=workers, progress=advance)
         else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +12,8 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from adaptive_flot.api.plugins import Choices, plugins
+from adaptive_flot.api.progress import counted
 from adaptive_flot.api.shown import check_kind, html_of, text_of
-from adaptive_flot.console import progress_bar
 from adaptive_flot.errors import ResultError, ScenarioError, near_match
 from adaptive_flot.report.kit.page import seed_list
 from adaptive_flot.runner.commands.run import Run, run_scenario
@@ -191,7 +190,7 @@ def run(
     numbers = _seeds(seeds) or tuple(loaded.file.seeds)
     who = tuple(chosen), tuple(moved)
     count = len(extended.combinations(*who)) * len(numbers)
-    with progress_bar(loaded.name, count) if progress else nullcontext(lambda: None) as advance:
+    with counted(progress, loaded.name, count) as advance:
         return Runs(extended, tuple(run_scenario(extended, who[0], numbers, advance, who[1])))
 
 

@@ -10,7 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import adaptive_flot as af
-from adaptive_flot.api import Estimation, Simulation
+from adaptive_flot.api.estimation import Estimation
+from adaptive_flot.api.simulation import Simulation
 from adaptive_flot.errors import CellError, ModelError, PluginError, ResultError
 from adaptive_flot.processes.flotation import read_cell
 

@@ -11,7 +11,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 import adaptive_flot as af
-from adaptive_flot.api import Runs
+from adaptive_flot.api.runs import Runs
 from adaptive_flot.errors import AdaptiveFlotError, PluginError, ResultError, ScenarioError
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.runs_table import read_runs
