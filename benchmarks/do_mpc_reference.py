@@ -13,13 +13,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.processes.flotation.economics import Prices, value_rates
 from adaptive_flot.runner.scenario.scenario import Scenario
-from controllers.economic_mpc.controller import VALUE_SCALE
-from controllers.economic_mpc.layout import LEVEL_SLACK_SCALE, MOVE_SCALE, MOVED
-from controllers.economic_mpc.stage import SLACK_SCALE
 
+MOVED = ("air_flow", "level_setpoint")
+MOVE_SCALE = {"air_flow": 1e-3, "level_setpoint": 0.1}
+SLACK_SCALE = LEVEL_SLACK_SCALE = 0.01
+VALUE_SCALE = 1 / Prices.typical_rate
 HORIZON, MOVE_S, BACKOFF, MOVE_COST, PENALTY, TOLERANCE = 20, 30.0, 1e-3, 1e-3, 1e-3, 1e-5
 
 
@@ -49,7 +50,7 @@ class DoMpc:
         model.set_alg("loop", residual / np.array([q.scale for q in cell.algebraic]))
         grade, recovery = (y[cell.index("outputs", name)] for name in ("concentrate_grade", "recovery"))
         rich = p[cell.index("parameters", "feed_concentration.chalcopyrite")]
-        scaled = [VALUE_SCALE * price for price in prices.values()]
+        scaled = [VALUE_SCALE * price for price in prices.prices()]
         earned = value_rates(grade, recovery, u["air_flow"], others["feed_flow"], rich, scaled)
         model.set_rhs("earned", sum(earned.values()))
         model.set_expression("grade", grade)
@@ -73,11 +74,11 @@ class DoMpc:
         mpc.scaling["_x", "earned"] = 100.0
         mpc.set_objective(mterm=-self.model.x["earned"], lterm=ca.SX(0))
         mpc.set_rterm(**dict.fromkeys(MOVED, VALUE_SCALE * MOVE_COST))  # of scaled inputs
-        below = (limits.grade + BACKOFF - self.model.aux["grade"]) / SLACK_SCALE
+        below = (limits.outputs["concentrate_grade"][0] + BACKOFF - self.model.aux["grade"]) / SLACK_SCALE
         weight = VALUE_SCALE * PENALTY * MOVE_S
         mpc.set_nl_cons("grade", below, ub=0, soft_constraint=True, penalty_term_cons=weight)
-        level = self.model.x["level"]
-        for name, off in (("low", limits.level[0] - level), ("high", level - limits.level[1])):
+        level, (low, high) = self.model.x["level"], limits.states["level"]
+        for name, off in (("low", low - level), ("high", level - high)):
             off = off / LEVEL_SLACK_SCALE
             mpc.set_nl_cons(name, off, ub=0, soft_constraint=True, penalty_term_cons=weight)
         for name in MOVED:

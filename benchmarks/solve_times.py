@@ -17,10 +17,10 @@ from typing import Protocol
 import numpy as np
 
 from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status
-from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
 from benchmarks.speed import Figure
@@ -118,7 +118,7 @@ def _move(scenario: Scenario, lane: Lane, step: Stepper, p: FloatArray, k: int) 
     grade, recovery = (run.outputs[:, model.index("outputs", name)] for name in ("concentrate_grade", "recovery"))
     air, feed = (lane.held[model.index("inputs", name)] for name in ("air_flow", "feed_flow"))
     rich = p[model.index("parameters", "feed_concentration.chalcopyrite")]
-    lane.value += float(sum(np.sum(r) for r in value_rates(grade, recovery, air, feed, rich, prices.values()).values()))
+    lane.value += float(sum(np.sum(r) for r in value_rates(grade, recovery, air, feed, rich, prices.prices()).values()))
 
 
 def solver_figures() -> list[Figure]:

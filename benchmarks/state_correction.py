@@ -64,7 +64,7 @@ def estimates(setup: Setup, prior: Prior, samples: list[Sample], correct: Mappin
 
 def main() -> None:
     """Measure and print."""
-    setup = Setup(flotation.make_model(), 1.0)
+    setup = Setup(flotation.make_model(), 1.0, ("growth_exponent", "coalescence_rate"), ("concentrate_grade",))
     columns = ("level, mm", "tails flow, ml/s", "solids, kg", "grade ahead", "C, largest, %")
     title = f"Errors (root mean square) of rpem_full, median over {len(SEEDS)} seeds"
     table = Table("feed flow unknown by", "corrected by", *columns, title=title)

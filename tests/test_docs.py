@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.discovery.verdict.verdict import Word
-from adaptive_flot.economics import Prices
+from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.keys import EconomicsPart
 from tests.discovery.heated import Truth, tank_record
 

@@ -15,6 +15,7 @@ estimator             `Setup`, `Prior`, `Estimate` and the contract `Estimator`.
 track                 Estimates over a whole record, as arrays.
 batch                 The contract of a fit to a whole record at once, and what it returns.
 controller            `ControllerSetup`, `Limits`, `Plan`, `Decision` and the contract `Controller`.
+economics             `Economics`: what running a process earns and costs; `OperatingPoint`, what it reads.
 plant                 `PlantRecord` and the contract `Plant`.
 delayed_measurements  Delayed values put where they belong, for any estimator.
 """
@@ -28,6 +29,7 @@ from adaptive_flot.contracts.controller import (
     Plan,
     TakesOver,
 )
+from adaptive_flot.contracts.economics import Economics, OperatingPoint
 from adaptive_flot.contracts.estimator import AnyEstimator, Estimate, Estimator, Prior, Setup, full_parameters
 from adaptive_flot.contracts.plant import AnyPlant, Plant, PlantRecord
 from adaptive_flot.contracts.sample import DelayedValue, Sample
@@ -41,9 +43,11 @@ __all__ = [
     "ControllerSetup",
     "Decision",
     "DelayedValue",
+    "Economics",
     "Estimate",
     "Estimator",
     "Limits",
+    "OperatingPoint",
     "Plan",
     "Plant",
     "PlantRecord",

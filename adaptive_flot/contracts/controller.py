@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
+from adaptive_flot.contracts.economics import Economics
 from adaptive_flot.contracts.estimator import Estimate
 from adaptive_flot.contracts.sample import Sample
 from adaptive_flot.contracts.status import Status
-from adaptive_flot.economics import Prices
 from adaptive_flot.greybox.model import FloatArray, Model
 
 State = TypeVar("State")
@@ -25,13 +25,14 @@ class Plan:
         End of each move [s] (H,).
     inputs
         Each moved input by name, in its unit: its value held during the move that ends at `time` (H,).
-    grade
-        Concentrate grade expected at `time` [-] (H,), with the controller's correction of the model.
+    outputs
+        Each limited output by name, in its unit: its value expected at `time` (H,), with the controller's correction
+        of the model.
     """
 
     time: FloatArray
     inputs: Mapping[str, FloatArray]
-    grade: FloatArray
+    outputs: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -67,24 +68,26 @@ class Decision:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where a cell may be run.
+    """Where a process may be run.
+
+    The ranges of outputs and states can be left when a disturbance is too large; those of inputs and moves can not.
 
     Attributes
     ----------
-    grade
-        Lowest concentrate grade allowed [-].
-    level
-        Range of the pulp height [m] (2,).
+    outputs
+        Range of each limited output by name, in its unit; an infinite end is no limit. A product's quality, say.
     inputs
-        Range of each moved input by name, in its unit.
+        Range of each moved input by name, in its unit; the other inputs are disturbances.
     moves
         Largest move of each of them from one control move to the next.
+    states
+        Range of each limited state by name, in its unit.
     """
 
-    grade: float
-    level: tuple[float, float]
+    outputs: Mapping[str, tuple[float, float]]
     inputs: Mapping[str, tuple[float, float]]
     moves: Mapping[str, float]
+    states: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -102,8 +105,8 @@ class ControllerSetup:
         move is a disturbance: the plan holds its first value, and `Sample.inputs` what is known of it later.
     parameters
         Names of the adapted parameters, in the order of `Estimate.parameters`.
-    limits, prices
-        For controllers that need them; a scenario without economics has none.
+    limits, economics
+        For controllers that need them; an open loop has none.
     """
 
     model: Model
@@ -111,7 +114,7 @@ class ControllerSetup:
     schedule: FloatArray
     parameters: tuple[str, ...] = ()
     limits: Limits | None = None
-    prices: Prices | None = None
+    economics: Economics | None = None
 
 
 class Controller(Protocol[State]):

@@ -33,8 +33,8 @@ class Setup:
 
     model: Model
     dt: float
-    parameters: tuple[str, ...] = ("growth_exponent", "coalescence_rate")
-    outputs: tuple[str, ...] = ("concentrate_grade",)
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
     truth: FloatArray | None = None
 
 

@@ -72,6 +72,8 @@ class Parameter:
         Standard deviation of the prior in a calibration, in the unit; None for no prior.
     role
         "estimated" where a calibration fits it unless told otherwise, else "fixed".
+    disturbance
+        Whether it varies by itself and may be measured, as a feed grade does.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Parameter:
     scale: float = 1.0
     prior_std: float | None = None
     role: Literal["fixed", "estimated"] = "fixed"
+    disturbance: bool = False
 
     @property
     def label(self) -> str:

@@ -21,11 +21,11 @@ from adaptive_flot.contracts import (
     Setup,
     Status,
 )
-from adaptive_flot.economics import Prices
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
+from adaptive_flot.processes.flotation.economics import Prices
 
 ADAPTED = ("growth_exponent", "coalescence_rate")
 ROWS = 40
@@ -84,12 +84,12 @@ def controller_case(
     factory: Callable[..., AnyController], seed: int = 1, *, model: Model | None = None, **options: Any
 ) -> ControllerCase:
     """Build a case for a controller class or factory, called as `factory(setup, **options)`; `model` as above."""
-    setup = Setup(model or _cell(), dt=1.0)
+    setup = Setup(model or _cell(), 1.0, ADAPTED, ("concentrate_grade",))
     inputs, samples, states = _record(setup, seed)
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     limits = Limits(
-        grade=0.20,
-        level=(0.33, 0.42),
+        outputs={"concentrate_grade": (0.20, np.inf)},
+        states={"level": (0.33, 0.42)},
         inputs={"air_flow": (9.05e-4, 2.17e-3), "level_setpoint": (0.33, 0.42)},
         moves={"air_flow": 2e-4, "level_setpoint": 0.01},
     )

@@ -1,4 +1,4 @@
-"""Economic optimal control of a flotation cell as one parametric NLP: direct collocation, stage by stage.
+"""Economic optimal control of a process as one parametric NLP: direct collocation, stage by stage.
 
 The stages are alike (`stage.py`): the functions of the NLP are those of one stage, mapped over all of them. Only one
 stage is built, in some hundredths of a second for any horizon.
@@ -11,16 +11,17 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.contracts import Economics, Limits
 from adaptive_flot.greybox.model import Model
-from controllers.economic_mpc.layout import Layout
+from controllers.economic_mpc.layout import StageLayout
 from controllers.economic_mpc.stage import write_stage
 
 CSE = {"cse": True}
 """Evaluate common parts of an expression once."""
 
 
-class Problem:
-    """The NLP of one model, horizon and move length; built once.
+class OptimalControlProblem:
+    """The NLP of one model, its economics and limits, horizon and move length; built once.
 
     Attributes
     ----------
@@ -37,31 +38,31 @@ class Problem:
     begin
         Time between now and the begin of each stage [s] (1, horizon).
     terms
-        CasADi function (x, p) -> the cost terms over the horizon, in the order of `stage.TERMS`.
-    grades
-        CasADi function (x, p) -> grade at the end of each move (horizon,), bias included.
+        CasADi function (x, p) -> the cost terms over the horizon, in the order of `Stage.terms`.
+    outputs
+        CasADi function (x, p) -> limited outputs at the end of each move (horizon, outputs), bias included.
     constraints
         CasADi function (x, p) -> g.
     """
 
-    def __init__(self, model: Model, horizon: int, move_s: float) -> None:
+    def __init__(self, model: Model, economics: Economics, limits: Limits, horizon: int, move_s: float) -> None:
         self.model = model
-        self.layout = layout = Layout(model, horizon, move_s)
-        self.stage = stage = write_stage(model, layout)
+        self.layout = layout = StageLayout(model, limits, horizon, move_s)
+        self.stage = stage = write_stage(layout, economics)
         x, p = ca.MX.sym("x", layout.size), ca.MX.sym("p", stage.arguments.vector.numel())
         variables, after = self.split(x)
         self.begin = ca.DM(move_s * np.arange(horizon)).T
         w, vector, begin = stage.variables, stage.arguments.vector, stage.begin
         value = ca.Function("stage_terms", [w, begin, vector], [stage.terms], CSE)
         terms = value.map("terms", "serial", horizon, [2], [0])(variables, self.begin, p)
-        grade = ca.Function("stage_grade", [w, begin, vector], [stage.grade], CSE)
-        grades = grade.map("grades", "serial", horizon, [2], [])(variables, self.begin, p)
+        limited = ca.Function("stage_outputs", [w, begin, vector], [stage.outputs], CSE)
+        outputs = limited.map("outputs", "serial", horizon, [2], [])(variables, self.begin, p)
         each = ca.Function("stage_constraints", [w, stage.after, begin, vector], [stage.constraints], CSE)
         lines = each.map("lines", "serial", horizon, [3], [])(variables, after, self.begin, p)
         g = self.joined(self.initial(x, p), lines)
         self.nlp: dict[str, Any] = {"x": x, "f": -ca.sum1(terms), "g": g, "p": p}
         self.terms = ca.Function("terms", [x, p], [terms])
-        self.grades = ca.Function("grades", [x, p], [grades.T])
+        self.outputs = ca.Function("outputs", [x, p], [outputs.T], ["x", "p"], ["outputs"])
         self.constraints = ca.Function("constraints", [x, p], [g])
         self.names = self._names()
         equations = np.zeros(len(self.names), dtype=bool)

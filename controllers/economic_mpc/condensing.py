@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.layout import MOVED, SLACKS, Layout
-
-INPUTS = len(MOVED)
+from controllers.economic_mpc.layout import StageLayout
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """Functions of each of the K stages at a plan; the variables of a stage are those of `Layout`.
+class LinearisedStages:
+    """Functions of each of the K stages at a plan; the variables of a stage are those of `StageLayout`.
 
     Attributes
     ----------
@@ -45,14 +43,14 @@ class Condensed:
     Attributes
     ----------
     hessian, gradient
-        Of the objective; the Hessian is that of the inputs (K * 2, K * 2), as it is: it need not be convex.
+        Of the objective; the Hessian is that of all inputs, as it is: it need not be convex.
     slack_hessian, slack_gradient
-        Of the slacks, (K * 2,) each: nothing couples them.
+        Of all slacks, one entry each: nothing couples them.
     rows, offsets
-        Inequalities of a stage (moves, grade, level; K * 6) by inputs and slacks, and their values at no change.
+        Inequalities of all stages (moves, outputs, states) by inputs and slacks, and their values at no change.
     """
 
-    def __init__(self, layout: Layout, at: Linearised) -> None:
+    def __init__(self, layout: StageLayout, at: LinearisedStages) -> None:
         self.layout, self.at = layout, at
         self._eliminate_points()
         self._eliminate_states()
@@ -74,49 +72,50 @@ class Condensed:
     def _eliminate_states(self) -> None:
         """States at the begin of each stage by all inputs: dx = X du + xi."""
         layout, at = self.layout, self.at
-        nx, horizon = layout.state_size, layout.horizon
+        nx, horizon, m = layout.state_size, layout.horizon, layout.inputs_size
         gap = at.jacobian[:, :nx]
         moved = -gap @ self.T
         b = -at.constraints[:, :nx] - _times(gap, self.t)
-        self.X, self.xi = np.zeros((horizon, nx, horizon * INPUTS)), np.zeros((horizon, nx))
+        self.X, self.xi = np.zeros((horizon, nx, horizon * m)), np.zeros((horizon, nx))
         self.xi[0] = -at.initial
         for k in range(horizon - 1):
             self.X[k + 1] = moved[k, :, :nx] @ self.X[k]
-            self.X[k + 1, :, k * INPUTS : (k + 1) * INPUTS] += moved[k, :, nx : nx + INPUTS]
+            self.X[k + 1, :, k * m : (k + 1) * m] += moved[k, :, nx : nx + m]
             self.xi[k + 1] = moved[k, :, :nx] @ self.xi[k] + b[k]
 
     def _write(self) -> None:
         layout, at = self.layout, self.at
         nx, horizon = layout.state_size, layout.horizon
-        free = horizon * INPUTS
-        chosen = nx + INPUTS
+        m, slacks = layout.inputs_size, layout.slacks_size
+        free = horizon * m
+        chosen = nx + m
         T, t = self.T[:, :, :chosen], self.t + _times(self.T[:, :, :nx], self.xi)
         choice = np.zeros((horizon, chosen, free))
         choice[:, :nx] = self.X
         for k in range(horizon):
-            choice[k, nx:, k * INPUTS : (k + 1) * INPUTS] = np.eye(INPUTS)
+            choice[k, nx:, k * m : (k + 1) * m] = np.eye(m)
         self.Y, self.y = T @ choice, t  # dw = Y du + y, but for the slacks
         tall = self.Y.reshape(-1, free)
         self.hessian = tall.T @ (at.hessian @ self.Y).reshape(-1, free)
         self.gradient = tall.T @ (at.gradient + _times(at.hessian, self.y)).ravel()
-        slack = slice(chosen, chosen + SLACKS)
+        slack = slice(chosen, chosen + slacks)
         self.slack_gradient = at.gradient[:, slack].ravel()
         self.slack_hessian = np.diagonal(at.hessian[:, slack, slack], axis1=1, axis2=2).ravel()
         kept = slice(nx + layout.block - layout.points, None)
         inequalities = at.jacobian[:, kept]
         self.offsets = (at.constraints[:, kept] + _times(inequalities, self.y)).ravel()
-        of_slacks = np.zeros((horizon, inequalities.shape[1], horizon * SLACKS))
+        of_slacks = np.zeros((horizon, inequalities.shape[1], horizon * slacks))
         for k in range(horizon):
-            of_slacks[k, :, k * SLACKS : (k + 1) * SLACKS] = inequalities[k, :, slack]
-        self.rows = np.concatenate([inequalities @ self.Y, of_slacks], axis=2).reshape(-1, horizon * (INPUTS + SLACKS))
+            of_slacks[k, :, k * slacks : (k + 1) * slacks] = inequalities[k, :, slack]
+        self.rows = np.concatenate([inequalities @ self.Y, of_slacks], axis=2).reshape(-1, horizon * (m + slacks))
 
     def change(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of the stages (K, block) and of the last state (state_size,) from a solution of the programme."""
-        layout, at = self.layout, self.at
-        inputs, slacks = np.split(solution, [layout.horizon * INPUTS])
+        layout, at, m = self.layout, self.at, self.layout.inputs_size
+        inputs, slacks = np.split(solution, [layout.horizon * m])
         dw = self.Y @ inputs + self.y
-        begin = layout.state_size + INPUTS
-        dw[:, begin : begin + SLACKS] = slacks.reshape(-1, SLACKS)
+        begin = layout.state_size + m
+        dw[:, begin : begin + layout.slacks_size] = slacks.reshape(-1, layout.slacks_size)
         last = -at.constraints[-1, : layout.state_size] - at.jacobian[-1, : layout.state_size] @ dw[-1]
         return dw, last
 
@@ -128,16 +127,16 @@ class Condensed:
         layout, at = self.layout, self.at
         nx, points, horizon = layout.state_size, layout.points, layout.horizon
         count = layout.block - points
-        found = np.zeros_like(at.constraints)
-        found[:, nx + count :] = of_rows.reshape(horizon, -1)
-        slope = at.gradient + _times(at.hessian, dw) + _times(at.jacobian.transpose(0, 2, 1), found)
+        multipliers = np.zeros_like(at.constraints)
+        multipliers[:, nx + count :] = of_rows.reshape(horizon, -1)
+        slope = at.gradient + _times(at.hessian, dw) + _times(at.jacobian.transpose(0, 2, 1), multipliers)
         next_x = np.zeros(nx)
         for k in reversed(range(horizon)):
-            found[k, :nx] = -next_x
-            slope[k] += at.jacobian[k, :nx].T @ found[k, :nx]
-            found[k, nx : nx + count] = -self.inverse[k].T @ slope[k, points:]
-            next_x = slope[k, :nx] + at.jacobian[k, nx : nx + count, :nx].T @ found[k, nx : nx + count]
-        return found, -next_x
+            multipliers[k, :nx] = -next_x
+            slope[k] += at.jacobian[k, :nx].T @ multipliers[k, :nx]
+            multipliers[k, nx : nx + count] = -self.inverse[k].T @ slope[k, points:]
+            next_x = slope[k, :nx] + at.jacobian[k, nx : nx + count, :nx].T @ multipliers[k, nx : nx + count]
+        return multipliers, -next_x
 
 
 def _times(matrices: Any, vectors: FloatArray) -> FloatArray:

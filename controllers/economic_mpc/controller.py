@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,58 +22,23 @@ from adaptive_flot.contracts import (
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import Problem
-from controllers.economic_mpc.grade_bias import GradeBias
-from controllers.economic_mpc.layout import MOVED, Bounds
+from controllers.economic_mpc.collocation import OptimalControlProblem
+from controllers.economic_mpc.layout import Bounds, with_further_states
 from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
-from controllers.economic_mpc.probing import AIR, ProbeState, Probing, price
-from controllers.economic_mpc.softening import widened
+from controllers.economic_mpc.output_bias import OutputBias
+from controllers.economic_mpc.probing import ProbeState, Probing, price
 from controllers.economic_mpc.stage import Arguments
-from controllers.economic_mpc.verification import Solution, Solver, Verdict
+from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
 OWN = "economic_mpc"
-VALUE_SCALE = 1000.0
-"""Prices are scaled so that the objective is of order 1 to 100: solvers' tolerances then mean something."""
-
-
-@dataclass(frozen=True)
-class MpcState:
-    """What the next decision needs.
-
-    Attributes
-    ----------
-    row
-        Interval to come, counted from the start.
-    due
-        Time of the next optimisation [s].
-    inputs
-        Inputs held now (nu,); None before the first decision.
-    plan
-        Scaled solution of the last valid optimisation, and its multipliers; None before the first.
-    age
-        Moves of that plan that have been used.
-    bias
-        Filtered measured minus predicted grade: added to every prediction, so that a model that is off does not break
-        the limit for good.
-    heard
-        Time of the newest grade in that filter [s].
-    probe
-        Last dip and what probing has cost; None without probing.
-    """
-
-    row: int
-    due: float
-    inputs: FloatArray | None
-    plan: FloatArray | None
-    multipliers: tuple[FloatArray, FloatArray] | None
-    age: int
-    bias: float
-    heard: float
-    probe: ProbeState | None = None
 
 
 class EconomicMpc:
-    """Moves air flow and level set-point for the best economic value above a grade limit.
+    """Moves inputs for the best economic value within the limits of outputs and states.
+
+    It knows nothing of the process: what is earned is the economics' matter (`ControllerSetup.economics`), and what is
+    moved and limited that of `ControllerSetup.limits`.
 
     Every `move_s` seconds an optimal control problem over `horizon` moves is solved from the estimated state with the
     newest parameter estimate (`collocation.py`). A solution is applied only if it is finite, within its bounds and
@@ -82,7 +48,7 @@ class EconomicMpc:
     Parameters
     ----------
     setup
-        Model, schedule, adapted parameters, limits and prices.
+        Model, schedule, adapted parameters, limits and economics.
     horizon
         Number of moves looked ahead.
     move_s
@@ -90,22 +56,24 @@ class EconomicMpc:
     solver
         `ipopt`, `fatrop` or `rti`.
     move_cost
-        Cost of a move by the whole scale of an input (1e-3 m3/s of air, 0.1 m of level), squared [cu].
-    grade_penalty
-        Cost of a second at one percentage point below the grade limit [cu]; large: the limit is soft, but exact.
+        Cost of a move by the whole scale of an input, squared [cu]; default the typical rate of a second.
+    limit_penalty
+        Cost of a second at a tenth of its scale beyond the limit of an output [cu]; of a state: its square. Large: the
+        limit is soft, but exact. Default the typical rate of a second.
     backoff
-        Kept above the grade limit [-]: what changes between two moves, and what the estimate is off by.
+        Kept from the limits of outputs, in their units: what changes between two moves, and what the estimate is off
+        by. Default a hundredth of each output's scale.
     bias_time_s
-        Time constant of the grade bias filter [s].
+        Time constant of the filters of output biases [s].
     budget_s
         Wall-clock time of a solve; there is no second try when the first took longer.
     probing
-        Options of `Probing`: dips of the air flow that tell the parameters apart; default none.
+        Options of `Probing`: dips of an input that tell the parameters apart; default none.
 
     Raises
     ------
     ModelError
-        Limits or prices are missing, or an option is outside its range.
+        Limits or economics are missing or name what the model lacks, or an option is outside its range.
     """
 
     def __init__(
@@ -115,42 +83,48 @@ class EconomicMpc:
         horizon: int = 20,
         move_s: float = 30.0,
         solver: str = "ipopt",
-        move_cost: float = 1e-3,
-        grade_penalty: float = 1e-3,
-        backoff: float = 0.001,
+        move_cost: float | None = None,
+        limit_penalty: float | None = None,
+        backoff: float | None = None,
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
-        probing: Mapping[str, float] | None = None,
+        probing: Mapping[str, Any] | None = None,
     ) -> None:
-        if setup.limits is None or setup.prices is None:
-            raise ModelError("economic_mpc needs limits and prices; add 'limits' and 'economics' to the scenario")
+        limits, economics = setup.limits, setup.economics
+        if limits is None or economics is None:
+            raise ModelError(
+                "economic_mpc needs limits and economics; give both (in a scenario: the keys of that name)"
+            )
         if horizon < 1 or not move_s >= setup.dt or not budget_s > 0 or not bias_time_s > 0:
             raise ModelError("economic_mpc: horizon, move_s, bias_time_s and budget_s must be positive, move_s >= dt")
-        for name in MOVED:
-            if name not in setup.limits.inputs or name not in setup.limits.moves:
-                raise ModelError(f"economic_mpc moves {name!r}; give its range and its largest move in 'limits'")
+        if not limits.inputs or set(limits.inputs) != set(limits.moves):
+            raise ModelError(
+                f"economic_mpc: limits have ranges of {list(limits.inputs)} and largest moves of {list(limits.moves)}; "
+                "give both for each input that is to be moved"
+            )
         self.setup = setup
-        self.problem = Problem(setup.model, horizon, move_s)
+        self.problem = OptimalControlProblem(setup.model, economics, limits, horizon, move_s)
         self.layout = self.problem.layout
         self.solver: Solver = make_solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
-        self.grade_limit = setup.limits.grade + backoff
-        self._prices = VALUE_SCALE * np.array([*setup.prices.values(), move_cost, grade_penalty])
-        limits = setup.limits
-        self._bounds = Bounds(
-            inputs=np.array([limits.inputs[name] for name in MOVED]),
-            moves=np.array([limits.moves[name] for name in MOVED]),
-            level=np.array(limits.level),
-        )
+        self._limits = self.layout.limit_values(backoff)
+        own = [economics.typical_rate if cost is None else cost for cost in (move_cost, limit_penalty)]
+        self._value_scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
+        self._prices = self._value_scale * np.array([*economics.prices(), *own])
+        self._bounds = Bounds.of(limits, self.layout)
         self._solver_bounds = self.layout.bounds(self._bounds)
-        self._bias = GradeBias(setup.model.index("outputs", "concentrate_grade"), setup.dt, bias_time_s)
-        self.probing = None if probing is None else Probing(limits, move_s, **probing)
+        self._biases = [
+            OutputBias(name, setup.model.index("outputs", name), setup.dt, bias_time_s) for name in self.layout.outputs
+        ]
+        self.probing = None if probing is None else Probing(self.layout, limits, **probing)
         self._ode = FastCall(setup.model.ode)
-        self._grades = FastCall(self.problem.grades)
+        self._outputs = FastCall(self.problem.outputs, matrices=("outputs",))
 
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
-        return MpcState(0, time, None, None, None, 0, 0.0, time, None if self.probing is None else ProbeState(time))
+        unheard = (time,) * len(self._biases)
+        probe = None if self.probing is None else ProbeState(time)
+        return MpcState(0, time, None, None, None, 0, (0.0,) * len(self._biases), unheard, probe)
 
     def with_failing_solver(self) -> EconomicMpc:
         """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
@@ -164,10 +138,11 @@ class EconomicMpc:
         """Go on with the inputs and the plan of the same controller for a smaller model; see `TakesOver.take_over`."""
         if not isinstance(before, EconomicMpc):
             raise ModelError("economic_mpc: only the state of an economic_mpc can be taken over")
-        state = replace(state, bias=state.bias + self._bias.change(known, again))
+        bias = tuple(b + own.change(known, again) for b, own in zip(state.bias, self._biases, strict=True))
+        state = replace(state, bias=bias)
         if state.plan is None or len(self.setup.model.states) == len(before.setup.model.states):
             return state
-        plan = widened(state.plan, before.layout, self.layout, again[-1].state)
+        plan = with_further_states(state.plan, before.layout, self.layout, again[-1].state)
         return replace(state, plan=plan, multipliers=None)
 
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
@@ -188,8 +163,9 @@ class EconomicMpc:
     def _listen(self, state: MpcState, estimate: Estimate | None) -> MpcState:
         if estimate is None:
             return state
-        bias, heard = self._bias.after(state.bias, state.heard, estimate)
-        return replace(state, bias=bias, heard=heard)
+        filters = zip(self._biases, state.bias, state.heard, strict=True)
+        after = [own.after(bias, heard, estimate) for own, bias, heard in filters]
+        return replace(state, bias=tuple(bias for bias, _ in after), heard=tuple(heard for _, heard in after))
 
     def _optimise(
         self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
@@ -198,12 +174,19 @@ class EconomicMpc:
         theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
         others = np.delete(held, moved)
         now = Arguments(
-            estimate.state, held[moved], theta, others, self.grade_limit, state.bias, self._prices, estimate.time
+            estimate.state,
+            held[moved],
+            theta,
+            others,
+            self._limits,
+            np.array(state.bias),
+            self._prices,
+            estimate.time,
         ).vector()
         solution, status = self._solve(state, now, held, estimate, theta)
-        if solution.verdict is Verdict.VALID and self.probing is not None:
+        if solution.validity is Validity.VALID and self.probing is not None:
             state, solution = self._probe(self.probing, state, now, held, estimate, solution)
-        if solution.verdict is Verdict.VALID:
+        if solution.validity is Validity.VALID:
             plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
             expected = self._plan(estimate.time, solution, now)
             first = self.layout.inputs_of(solution.variables)[0]
@@ -218,7 +201,7 @@ class EconomicMpc:
 
     def _solve(
         self, state: MpcState, now: FloatArray, held: FloatArray, estimate: Estimate, theta: FloatArray
-    ) -> tuple[Solution, Status]:
+    ) -> tuple[NlpSolution, Status]:
         """Warm from the last plan, then once cold."""
         z = self._ode(estimate.time, estimate.state, held, theta)[3]
         cold = self.layout.start(estimate.state, held[self.layout.moved], z)
@@ -227,33 +210,46 @@ class EconomicMpc:
         shifted = self.layout.shifted(state.plan)
         multipliers = self.layout.shifted_multipliers(state.multipliers) if state.multipliers else None
         solution = self.solver(now, self._solver_bounds, shifted, multipliers)
-        if solution.verdict is Verdict.VALID or solution.seconds > self.budget_s:
+        if solution.validity is Validity.VALID or solution.seconds > self.budget_s:
             return solution, Status.OK
         return self.solver(now, self._solver_bounds, cold), Status.RETRIED
 
     def _probe(
-        self, probing: Probing, state: MpcState, now: FloatArray, held: FloatArray, estimate: Estimate, free: Solution
-    ) -> tuple[MpcState, Solution]:
+        self,
+        probing: Probing,
+        state: MpcState,
+        now: FloatArray,
+        held: FloatArray,
+        estimate: Estimate,
+        free: NlpSolution,
+    ) -> tuple[MpcState, NlpSolution]:
         """Put a dip in front of a valid plan where one is due, has a valid plan itself, and can be paid."""
-        probe, air = state.probe, float(held[self.layout.moved[AIR]])
-        if probe is None or not probing.is_due(probe, estimate, air):
+        probe, value = state.probe, float(held[self.layout.moved[probing.position]])
+        if probe is None or not probing.is_due(probe, estimate, value):
             return state, free
-        bounds = probing.bounds(air, self.layout, self._solver_bounds)
+        bounds = probing.bounds(value, self._solver_bounds)
         asked = self.solver(now, bounds, free.variables, free.multipliers)
-        if asked.verdict is not Verdict.VALID:
+        if asked.validity is not Validity.VALID:
             return state, free
-        cost = price(self.problem, free.variables, asked.variables, now) / VALUE_SCALE
+        cost = price(self.problem, free.variables, asked.variables, now) / self._value_scale
         probe, paid = probing.pay(probe, cost, estimate.time)
         return replace(state, probe=probe), replace(asked, seconds=free.seconds + asked.seconds) if paid else free
 
-    def _plan(self, time: float, solution: Solution, now: FloatArray) -> Plan:
+    def _plan(self, time: float, solution: NlpSolution, now: FloatArray) -> Plan:
         inputs = self.layout.inputs_of(solution.variables)
         ends = time + self.layout.move_s * np.arange(1.0, self.layout.horizon + 1)
-        (grade,) = self._grades(solution.variables, now)
-        return Plan(ends, {name: inputs[:, i] for i, name in enumerate(MOVED)}, grade)
+        (outputs,) = self._outputs(solution.variables, now)
+        moves = dict(zip(self.layout.moved_names, inputs.T, strict=True))
+        return Plan(ends, moves, dict(zip(self.layout.outputs, outputs.T, strict=True)))
 
     def _apply(
-        self, state: MpcState, held: FloatArray, to: FloatArray, status: Status, by: Solution, plan: Plan | None = None
+        self,
+        state: MpcState,
+        held: FloatArray,
+        to: FloatArray,
+        status: Status,
+        by: NlpSolution,
+        plan: Plan | None = None,
     ) -> tuple[MpcState, Decision]:
         inputs = held.copy()
         low, high = self._bounds.inputs.T

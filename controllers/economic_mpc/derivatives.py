@@ -1,9 +1,10 @@
 """Derivatives of the optimal control problem: those of one stage, mapped over all of them.
 
 The Hessian of the Lagrangian is the dearest: it takes more operations than all other functions together. Half of them
-are the curvature along the fast states, the gas of each bubble class, which follow the air flow within seconds. A move
-of 30 s sees them settled, and the curvature along them hardly changes a solver's steps (7 iterations instead of 6), so
-it is left out. That changes how a solution is found, never what it is: equations, gradient and Jacobian stay exact.
+are the curvature along the fast states, those for which the model gives a decay rate. In a flotation cell these are the
+gas of each bubble class, which follows the air flow within seconds. A move of 30 s sees them settled. The curvature
+along them hardly changes a solver's steps (7 iterations instead of 6), so it is left out. That changes how a solution
+is found, never what it is: equations, gradient and Jacobian stay exact.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.economic_mpc.collocation import CSE, Problem
+from controllers.economic_mpc.collocation import CSE, OptimalControlProblem
 from controllers.economic_mpc.layout import DEGREE
 
 IntArray = NDArray[np.intp]
@@ -51,7 +52,7 @@ class Derivatives:
         (nnz, horizon), both triangles; without the part of the gradient that the next stage's gap adds.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: OptimalControlProblem) -> None:
         self.problem = problem
         stage = problem.stage
         w, p, t = stage.variables, stage.arguments.vector, stage.begin
@@ -105,7 +106,7 @@ class Derivatives:
 class Assembled:
     """The derivatives of the whole problem as CasADi functions that `casadi.nlpsol` takes in place of its own."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: OptimalControlProblem) -> None:
         self.problem, self.of_stages = problem, Derivatives(problem)
         self._x, self._p = problem.nlp["x"], problem.nlp["p"]
         self._lam_f, self._lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", problem.nlp["g"].numel())

@@ -1,28 +1,27 @@
 """Where everything lies in the vectors of the optimal control problem: variables, constraints, scales, bounds.
 
-The order is the one fatrop needs: x0, u0, x1, u1, ..., where x holds the states and the moved inputs before, and u the
-moved inputs, the slacks of the grade limit and of the level range, and the collocation points of the stage.
+The order is the one fatrop needs: x0, u0, x1, u1, ..., where x holds the states and the moved inputs before. u holds
+the moved inputs, the slacks of the limited outputs and of the limited states, and the collocation points of the stage.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adaptive_flot.contracts import Limits
 from adaptive_flot.greybox.model import FloatArray, Model
 
 DEGREE = 2
 """Of the Radau collocation: the last of its points is the end of the move."""
-MOVED = ("air_flow", "level_setpoint")
-"""Inputs that the controller moves; the others are disturbances, held over the horizon."""
-SLACKS = 2
-"""A stage has one slack of the grade limit and one of the level range."""
-LEVEL_SLACK_SCALE = 0.01
-"""m. A drop of the feed pulls the level below its range whatever is done: the range is soft, and never the reason for a
-problem without a solution."""
-MOVE_SCALE = {"air_flow": 1e-3, "level_setpoint": 0.1}
+BACKOFF_PER_SCALE = 100
+"""The default distance to a limit is a hundredth of the scale of its output."""
+SLACKS_PER_SCALE = 10
+"""A slack of 1 is a tenth of the scale of its output or state. Limits of outputs and states are soft: a disturbance may
+pull a level below its range whatever is done, and that must not leave a problem without a solution."""
 
 Multipliers = tuple[FloatArray, FloatArray]
 """Of the bounds (n,) and of the constraints (m,), positive at upper ones (as CasADi has them)."""
@@ -30,37 +29,86 @@ Multipliers = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Bounds:
-    """Ranges of the moved inputs (2, 2), their largest move an interval (2,), and of the level (2,), in SI units."""
+    """Limits as arrays: ranges of the m moved inputs (m, 2), their largest moves (m,), ranges of states (k, 2)."""
 
     inputs: FloatArray
     moves: FloatArray
-    level: FloatArray
+    states: FloatArray
+
+    @classmethod
+    def of(cls, limits: Limits, layout: StageLayout) -> Bounds:
+        """Limits in the order of a layout."""
+        return cls(
+            inputs=np.array([limits.inputs[name] for name in layout.moved_names]),
+            moves=np.array([limits.moves[name] for name in layout.moved_names]),
+            states=np.array([limits.states[name] for name in layout.states]).reshape(-1, 2),
+        )
 
 
-class Layout:
-    """Indices, scales and bounds of the problem of one model, horizon and move length.
+@dataclass(frozen=True)
+class OutputLimit:
+    """One finite end of an output's range: output by name and index, the end, and which one it is."""
+
+    output: str
+    index: int
+    value: float
+    is_upper: bool
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"{'upper' if self.is_upper else 'lower'} limit of {self.output}"
+
+
+class StageLayout:
+    """Indices, scales and bounds of the problem of one model, its limits, horizon and move length.
 
     Attributes
     ----------
+    moved
+        Indices of the m inputs that the controller moves: those with a range, in the model's order. The others are
+        disturbances, held over the horizon.
+    outputs, output_limits
+        Names of the limited outputs, and every finite end of their ranges.
+    states
+        Names of the k limited states.
     state_size, control_size, block, size
         Lengths of x, of u, of a stage (x and u together) and of all variables.
     chosen, points
         Where the moved inputs and slacks lie in a stage, and where its collocation points begin.
     rows
         Constraints by kind, one line a stage: `gap` (to the next stage), `initial` (of the first stage only),
-        `equations` (of the collocation points), `moves`, `grade`, `level`.
+        `equations` (of the collocation points), `moves`, `outputs` (their limits), `states` (their ranges).
+
+    Raises
+    ------
+    ModelError
+        A limit of a quantity that the model does not have.
     """
 
-    def __init__(self, model: Model, horizon: int, move_s: float) -> None:
+    def __init__(self, model: Model, limits: Limits, horizon: int, move_s: float) -> None:
         self.model, self.horizon, self.move_s = model, horizon, move_s
-        self.moved = model.indices("inputs", MOVED)
+        self.moved = sorted(model.indices("inputs", limits.inputs))
+        self.moved_names = tuple(model.inputs[i].name for i in self.moved)
+        self.outputs, self.states = tuple(limits.outputs), tuple(limits.states)
+        self.output_limits = tuple(
+            OutputLimit(name, model.index("outputs", name), value, is_upper)
+            for name, ends in limits.outputs.items()
+            for is_upper, value in zip((False, True), ends, strict=True)
+            if np.isfinite(value)
+        )
         self.x_scale = np.array([q.scale for q in model.states])
         self.z_scale = np.array([q.scale for q in model.algebraic])
-        self.u_scale = np.array([MOVE_SCALE[name] for name in MOVED])
-        self.state_size = len(model.states) + len(MOVED)
-        self.chosen = slice(self.state_size, self.state_size + len(MOVED) + SLACKS)
+        self.u_scale = np.array([model.inputs[i].scale for i in self.moved])
+        self.output_slack_scale = [model.outputs[e.index].scale / SLACKS_PER_SCALE for e in self.output_limits]
+        self.state_slack_scale = np.array(
+            [model.states[i].scale / SLACKS_PER_SCALE for i in model.indices("states", self.states)]
+        )
+        self.inputs_size, self.slacks_size = len(self.moved), len(self.output_limits) + len(self.states)
+        self.state_size = len(model.states) + self.inputs_size
+        self.chosen = slice(self.state_size, self.state_size + self.inputs_size + self.slacks_size)
         self.points = self.chosen.stop
-        self.control_size = len(MOVED) + SLACKS + DEGREE * self.point_size
+        self.control_size = self.inputs_size + self.slacks_size + DEGREE * self.point_size
         self.block = self.state_size + self.control_size
         self.size = horizon * self.block + self.state_size
         self.rows = self._rows()
@@ -79,9 +127,9 @@ class Layout:
             "gap": self.state_size,
             "initial": self.state_size,
             "equations": DEGREE * self.point_size,
-            "moves": len(MOVED),
-            "grade": DEGREE,
-            "level": DEGREE,
+            "moves": self.inputs_size,
+            "outputs": DEGREE * len(self.output_limits),
+            "states": DEGREE * len(self.states),
         }
         rows: dict[str, list[NDArray[np.intp]]] = {kind: [] for kind in sizes}
         begin = 0
@@ -105,9 +153,9 @@ class Layout:
         return vector[: self.horizon * self.block].reshape(self.horizon, self.block)
 
     def inputs_of(self, solution: FloatArray) -> FloatArray:
-        """Moved inputs of the plan (horizon, 2) in SI units."""
+        """Moved inputs of the plan (horizon, m), each in its unit."""
         begin = self.chosen.start
-        return np.asarray(self.stages(solution)[:, begin : begin + len(MOVED)] * self.u_scale)
+        return np.asarray(self.stages(solution)[:, begin : begin + self.inputs_size] * self.u_scale)
 
     def shifted(self, solution: FloatArray) -> FloatArray:
         """The plan one move later, its last stage repeated: the next start."""
@@ -124,11 +172,17 @@ class Layout:
         return self.shifted(bounds), moved
 
     def start(self, state: FloatArray, inputs: FloatArray, algebraic: FloatArray) -> FloatArray:
-        """Cold start: everything stays as it is. State (nx,), moved inputs (2,), algebraic variables (nz,)."""
+        """Cold start: everything stays as it is. State (nx,), moved inputs (m,), algebraic variables (nz,)."""
         x, u, z = state / self.x_scale, inputs / self.u_scale, algebraic / self.z_scale
         points = np.concatenate([np.concatenate([x, z])] * DEGREE)
-        stage = np.concatenate([x, u, u, np.zeros(SLACKS), points])
+        stage = np.concatenate([x, u, u, np.zeros(self.slacks_size), points])
         return np.concatenate([*[stage] * self.horizon, x, u])
+
+    def limit_values(self, backoff: float | None) -> FloatArray:
+        """Values of the output limits, moved inwards by a backoff in the output's unit; default see above."""
+        outputs, ends = self.model.outputs, self.output_limits
+        kept = [outputs[e.index].scale / BACKOFF_PER_SCALE if backoff is None else backoff for e in ends]
+        return np.array([e.value - b if e.is_upper else e.value + b for e, b in zip(ends, kept, strict=True)])
 
     # -- bounds ----------------------------------------------------------------------------------------------------
 
@@ -143,13 +197,14 @@ class Layout:
         u = bounds.inputs / self.u_scale[:, None]
         z = np.array([[max(q.lower, 1e-3 * q.scale) / q.scale, np.inf] for q in self.model.algebraic]).reshape(-1, 2)
         point = np.vstack([np.tile(free, (len(self.model.states), 1)), z])
-        stage = np.vstack([x, u, [[0.0, np.inf], free], *[point] * DEGREE])
+        slacks = np.array([[0.0, np.inf]] * len(self.output_limits) + [free] * len(self.states)).reshape(-1, 2)
+        stage = np.vstack([x, u, slacks, *[point] * DEGREE])
         variables = np.vstack([*[stage] * self.horizon, x])
         g = np.zeros((sum(rows.size for rows in self.rows.values()), 2))
         move = np.asarray(bounds.moves) / self.u_scale
         g[self.rows["moves"]] = np.stack([-move, move], axis=1)
-        g[self.rows["grade"]] = [0.0, np.inf]
-        g[self.rows["level"]] = np.asarray(bounds.level) / LEVEL_SLACK_SCALE
+        g[self.rows["outputs"]] = [0.0, np.inf]
+        g[self.rows["states"]] = np.tile(bounds.states / self.state_slack_scale[:, None], (DEGREE, 1))
         return {"lbx": variables[:, 0], "ubx": variables[:, 1], "lbg": g[:, 0], "ubg": g[:, 1]}
 
     def physical(self) -> tuple[FloatArray, FloatArray]:
@@ -161,3 +216,29 @@ class Layout:
             begin = k * self.block + self.points
             ranges[begin : begin + DEGREE * self.point_size] = np.tile(point, (DEGREE, 1))
         return ranges[:, 0], ranges[:, 1]
+
+
+def with_further_states(solution: FloatArray, before: StageLayout, after: StageLayout, state: FloatArray) -> FloatArray:
+    """Variables of `after` (n,) from those of `before`: the same inputs and states, the further states as in `state`.
+
+    Parameters
+    ----------
+    solution
+        Scaled variables of `before`.
+    before, after
+        Of the problems; the states of `after` are those of `before` and then further ones.
+    state
+        State of the model of `after` (nx,), whose further states stay as they are over the horizon.
+    """
+    nx, nu, nz = len(before.x_scale), before.inputs_size, len(after.z_scale)
+    further = (state / after.x_scale)[nx:]
+
+    def extended(variables: FloatArray, sizes: Sequence[int]) -> FloatArray:
+        parts = np.split(variables, np.cumsum(sizes)[:-1])
+        holding_states = {0, *range(4, len(sizes), 2)}
+        return np.concatenate([np.concatenate([p, further]) if i in holding_states else p for i, p in enumerate(parts)])
+
+    block = before.block
+    stage = [nx, nu, nu, before.slacks_size, *[nx, nz] * DEGREE]
+    stages = [extended(solution[k * block : (k + 1) * block], stage) for k in range(before.horizon)]
+    return np.concatenate([*stages, extended(solution[before.horizon * block :], [nx, nu])])

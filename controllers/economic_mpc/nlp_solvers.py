@@ -17,19 +17,19 @@ import numpy as np
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.derivatives import Assembled
 from controllers.economic_mpc.layout import Multipliers
 from controllers.economic_mpc.real_time_iteration import RealTimeIteration
-from controllers.economic_mpc.verification import Solution, Solver, Verifier, no_solution
+from controllers.economic_mpc.verification import NlpSolution, Solver, Verifier, no_solution
 
 BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
-"""Barrier parameter in units of the objective (see `VALUE_SCALE` of the controller). A larger one for fatrop would
-save an iteration, but then plans are not exact enough to tell what a dip of the air flow costs (`probing.py`)."""
+"""Barrier parameter in units of the objective (see `Economics.typical_rate`). A larger one for fatrop would save
+an iteration, but then plans are not exact enough to tell what a dip of an input costs (`probing.py`)."""
 SOLVERS = ("ipopt", "fatrop", "rti")
 
 
-def make_solver(problem: Problem, name: str, budget_s: float) -> Solver:
+def make_solver(problem: OptimalControlProblem, name: str, budget_s: float) -> Solver:
     """Build a solver by its name.
 
     Raises
@@ -57,7 +57,7 @@ class InteriorPoint:
         Wall-clock time after which ipopt stops (soft: ipopt checks it between iterations; fatrop counts iterations).
     """
 
-    def __init__(self, problem: Problem, name: str, budget_s: float) -> None:
+    def __init__(self, problem: OptimalControlProblem, name: str, budget_s: float) -> None:
         self.problem = problem
         self.name = name
         options = _ipopt(budget_s) if name == "ipopt" else _fatrop(problem)
@@ -76,8 +76,8 @@ class InteriorPoint:
         bounds: dict[str, FloatArray],
         start: FloatArray,
         multipliers: Multipliers | None = None,
-    ) -> Solution:
-        """Solve from a start (n,), warm if multipliers are given. Never raises: a failure is a verdict."""
+    ) -> NlpSolution:
+        """Solve from a start (n,), warm if multipliers are given. Never raises: a failure is a value."""
         m = len(bounds["lbg"])
         if not (np.isfinite(arguments).all() and np.isfinite(start).all()):  # fatrop would not come back from a NaN
             return no_solution(len(start), m, "state or estimate is not finite")
@@ -87,9 +87,9 @@ class InteriorPoint:
             start, arguments, bounds["lbx"], bounds["ubx"], bounds["lbg"], bounds["ubg"], lam_x, lam_g
         )
         seconds = time.perf_counter() - begin
-        verdict, message = self._verify(x, arguments, bounds)
+        validity, message = self._verify(x, arguments, bounds)
         iterations = int(self._solve.stats().get("iter_count", 0))
-        return Solution(x, (lam_x, lam_g), verdict, message, iterations, seconds, self.name)
+        return NlpSolution(x, (lam_x, lam_g), validity, message, iterations, seconds, self.name)
 
 
 class FailingSolver:
@@ -101,13 +101,13 @@ class FailingSolver:
         bounds: dict[str, FloatArray],
         start: FloatArray,
         multipliers: Multipliers | None = None,
-    ) -> Solution:
+    ) -> NlpSolution:
         """Fail; see `Solver`."""
         del arguments, multipliers
         return no_solution(len(start), len(bounds["lbg"]), "the solver was made to fail")
 
 
-def _fatrop(problem: Problem) -> dict[str, Any]:
+def _fatrop(problem: OptimalControlProblem) -> dict[str, Any]:
     return {
         "structure_detection": "auto",
         "equality": problem.equality,

@@ -18,11 +18,11 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import Problem
-from controllers.economic_mpc.condensing import INPUTS, Condensed, Linearised
+from controllers.economic_mpc.collocation import OptimalControlProblem
+from controllers.economic_mpc.condensing import Condensed, LinearisedStages
 from controllers.economic_mpc.derivatives import Derivatives
-from controllers.economic_mpc.layout import SLACKS, Multipliers
-from controllers.economic_mpc.verification import Solution, Solver, Verdict, Verifier, no_solution
+from controllers.economic_mpc.layout import Multipliers
+from controllers.economic_mpc.verification import NlpSolution, Solver, Validity, Verifier, no_solution
 
 MOST_STEPS = 4
 LEAST_CURVATURE = 1e-3
@@ -43,12 +43,12 @@ class RealTimeIteration:
         Solver of cold starts.
     """
 
-    def __init__(self, problem: Problem, cold: Solver) -> None:
+    def __init__(self, problem: OptimalControlProblem, cold: Solver) -> None:
         self.problem, self.layout, self._cold = problem, problem.layout, cold
         self._derivatives = Derivatives(problem)
         self._linearise = FastCall(self._all(), matrices=RESULTS)
-        self._inequalities = np.hstack([self.layout.rows[kind] for kind in ("moves", "grade", "level")])
-        size, rows = self.layout.horizon * (INPUTS + SLACKS), self._inequalities.size
+        self._inequalities = np.hstack([self.layout.rows[kind] for kind in ("moves", "outputs", "states")])
+        size, rows = self.layout.horizon * (self.layout.inputs_size + self.layout.slacks_size), self._inequalities.size
         dense = {"h": ca.Sparsity.dense(size, size), "a": ca.Sparsity.dense(rows, size)}
         self._programme = FastCall(ca.conic("rti", "daqp", dense))
         self._verify = Verifier(problem)
@@ -69,22 +69,22 @@ class RealTimeIteration:
         bounds: dict[str, FloatArray],
         start: FloatArray,
         multipliers: Multipliers | None = None,
-    ) -> Solution:
+    ) -> NlpSolution:
         """One step from a start (n,) and its multipliers, more where the equations ask for it; see `Solver`."""
         if multipliers is None:
             return self._cold(arguments, bounds, start)
         if not (np.isfinite(arguments).all() and np.isfinite(start).all()):
             return no_solution(len(start), len(bounds["lbg"]), "state or estimate is not finite")
         begin, x, lam, steps = time.perf_counter(), start, multipliers, 0
-        verdict, message = Verdict.VIOLATED, ""
-        while verdict is Verdict.VIOLATED and steps < MOST_STEPS:
+        validity, message = Validity.VIOLATED, ""
+        while validity is Validity.VIOLATED and steps < MOST_STEPS:
             try:
                 x, lam = self._step(x, arguments, bounds, lam[1])
             except np.linalg.LinAlgError as error:  # NaN, or equations that can not be solved for their points
                 return no_solution(len(start), len(bounds["lbg"]), str(error), time.perf_counter() - begin)
             steps += 1
-            verdict, message = self._verify(x, arguments, bounds)
-        return Solution(x, lam, verdict, message, steps, time.perf_counter() - begin, "rti")
+            validity, message = self._verify(x, arguments, bounds)
+        return NlpSolution(x, lam, validity, message, steps, time.perf_counter() - begin, "rti")
 
     def _step(
         self, x: FloatArray, arguments: FloatArray, bounds: dict[str, FloatArray], lam: FloatArray
@@ -92,35 +92,37 @@ class RealTimeIteration:
         layout = self.layout
         small = Condensed(layout, self._linearised(x, arguments, lam))
         stage = layout.stages(x)[:, layout.chosen]
-        box = [_inputs_first(layout.stages(bounds[key])[:, layout.chosen] - stage) for key in ("lbx", "ubx")]
+        box = [self._inputs_first(layout.stages(bounds[key])[:, layout.chosen] - stage) for key in ("lbx", "ubx")]
         lines = [bounds[key][self._inequalities].ravel() - small.offsets for key in ("lbg", "ubg")]
         limits = (np.clip(b, -UNBOUNDED, UNBOUNDED) for b in (*lines, *box))
         gradient = np.concatenate([small.gradient, small.slack_gradient])
         nothing = np.zeros_like(gradient), np.zeros_like(gradient), np.zeros(len(small.rows)), *[np.zeros((0, 0))] * 2
-        found, _, of_rows, of_box = self._programme(_convex(small), gradient, small.rows, *limits, *nothing)
-        dw, last = small.change(found)
+        change, _, of_rows, of_box = self._programme(_convex(small), gradient, small.rows, *limits, *nothing)
+        dw, last = small.change(change)
         new = x.copy()
         layout.stages(new)[:] += dw
         new[layout.horizon * layout.block :] += last
         of_constraints, of_bounds = np.zeros(len(lam)), np.zeros(len(x))
         of_constraints[layout.stage_rows], of_constraints[layout.rows["initial"][0]] = small.multipliers(dw, of_rows)
-        inputs, slacks = (part.reshape(layout.horizon, -1) for part in np.split(of_box, [layout.horizon * INPUTS]))
+        inputs, slacks = (
+            part.reshape(layout.horizon, -1) for part in np.split(of_box, [layout.horizon * layout.inputs_size])
+        )
         layout.stages(of_bounds)[:, layout.chosen] = np.hstack([inputs, slacks])
         return new, (of_bounds, of_constraints)
 
-    def _linearised(self, x: FloatArray, arguments: FloatArray, lam: FloatArray) -> Linearised:
+    def _linearised(self, x: FloatArray, arguments: FloatArray, lam: FloatArray) -> LinearisedStages:
         layout, of = self.layout, self._derivatives
         initial, lines, jacobian, gradient, hessian = self._linearise(x, arguments, lam)
         J = np.zeros((layout.horizon, layout.stage_rows.shape[1], layout.block))
         J[:, of.jacobian_pattern.rows, of.jacobian_pattern.columns] = jacobian.T
         H = np.zeros((layout.horizon, layout.block, layout.block))
         H[:, of.hessian_pattern.rows, of.hessian_pattern.columns] = hessian.T
-        return Linearised(lines.T, J, initial, gradient.T, H)
+        return LinearisedStages(lines.T, J, initial, gradient.T, H)
 
-
-def _inputs_first(chosen: FloatArray) -> FloatArray:
-    """Inputs of all stages, then slacks of all stages, from both of each stage (K, inputs + slacks)."""
-    return np.concatenate([chosen[:, :INPUTS].ravel(), chosen[:, INPUTS:].ravel()])
+    def _inputs_first(self, chosen: FloatArray) -> FloatArray:
+        """Inputs of all stages, then slacks of all stages, from both of each stage (K, inputs + slacks)."""
+        m = self.layout.inputs_size
+        return np.concatenate([chosen[:, :m].ravel(), chosen[:, m:].ravel()])
 
 
 def _convex(small: Condensed) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Multipliers
 
 LARGEST_VIOLATION = 1e-4
@@ -18,7 +18,7 @@ LARGEST_VIOLATION = 1e-4
 WORST_SHOWN = 5
 
 
-class Verdict(Enum):
+class Validity(Enum):
     """What the verification says of a solution."""
 
     VALID = "valid"
@@ -27,7 +27,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True)
-class Solution:
+class NlpSolution:
     """A solution of the NLP, verified.
 
     Attributes
@@ -36,7 +36,7 @@ class Solution:
         (n,), scaled.
     multipliers
         Of bounds (n,) and constraints (m,): the next warm start.
-    verdict
+    validity
         Whether it may be used.
     message
         The most violated constraints by name, worst first; empty for a valid solution.
@@ -50,21 +50,21 @@ class Solution:
 
     variables: FloatArray
     multipliers: Multipliers
-    verdict: Verdict
+    validity: Validity
     message: str
     iterations: int
     seconds: float
     found_by: str = ""
 
 
-def no_solution(size: int, constraints: int, message: str, seconds: float = 0.0) -> Solution:
+def no_solution(size: int, constraints: int, message: str, seconds: float = 0.0) -> NlpSolution:
     """What a solver returns that found nothing: NaN for variables (size,) and multipliers."""
     nothing, lost = np.full(size, np.nan), np.full(constraints, np.nan)
-    return Solution(nothing, (nothing, lost), Verdict.NOT_FINITE, message, 0, seconds)
+    return NlpSolution(nothing, (nothing, lost), Validity.NOT_FINITE, message, 0, seconds)
 
 
 class Solver(Protocol):
-    """Finds a plan. Never raises: a failure is a verdict."""
+    """Finds a plan. Never raises: a failure is a value."""
 
     def __call__(
         self,
@@ -72,7 +72,7 @@ class Solver(Protocol):
         bounds: dict[str, FloatArray],
         start: FloatArray,
         multipliers: Multipliers | None = None,
-    ) -> Solution:
+    ) -> NlpSolution:
         """Solve from a start (n,), warm if multipliers are given; arguments as in `stage.Arguments.vector`."""
         ...
 
@@ -83,25 +83,25 @@ class Verifier:
     Solvers report infeasible and NaN alike and may return inputs far outside their bounds.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: OptimalControlProblem) -> None:
         self.names = problem.names
         self._constraints = FastCall(problem.constraints)
         self._lowest, self._highest = problem.layout.physical()
 
-    def __call__(self, x: FloatArray, arguments: FloatArray, bounds: dict[str, FloatArray]) -> tuple[Verdict, str]:
-        """Verdict on variables (n,), and in words what is wrong."""
+    def __call__(self, x: FloatArray, arguments: FloatArray, bounds: dict[str, FloatArray]) -> tuple[Validity, str]:
+        """Validity of variables (n,), and in words what is wrong."""
         if not np.isfinite(x).all():
-            return Verdict.NOT_FINITE, "the solution is not finite"
+            return Validity.NOT_FINITE, "the solution is not finite"
         (g,) = self._constraints(x, arguments)
         over = np.maximum(bounds["lbg"] - g, g - bounds["ubg"])
         if not np.isfinite(g).all():
-            return Verdict.NOT_FINITE, "a constraint is not finite"
+            return Validity.NOT_FINITE, "a constraint is not finite"
         low, high = np.maximum(bounds["lbx"], self._lowest), np.minimum(bounds["ubx"], self._highest)
         outside = float(np.max(np.maximum(low - x, x - high)))
         if max(float(np.max(over)), outside) <= LARGEST_VIOLATION:
-            return Verdict.VALID, ""
+            return Validity.VALID, ""
         worst = np.argsort(over)[::-1][:WORST_SHOWN]
         parts = [f"{self.names[i]} by {over[i]:.2g}" for i in worst if over[i] > LARGEST_VIOLATION]
         if outside > LARGEST_VIOLATION:
             parts.append(f"a bound by {outside:.2g}")
-        return Verdict.VIOLATED, "violated (scaled): " + "; ".join(parts)
+        return Validity.VIOLATED, "violated (scaled): " + "; ".join(parts)

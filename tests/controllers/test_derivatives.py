@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from adaptive_flot.greybox import Model
-from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.derivatives import Assembled
 from controllers.economic_mpc.layout import DEGREE
-from tests.controllers.test_collocation import MOVE_S, arguments, cold
+from tests.controllers.test_collocation import arguments, cell_problem, cold
 
 
 @pytest.fixture(scope="module")
-def problem(model: Model) -> Problem:
-    return Problem(model, 3, MOVE_S)
+def problem(model: Model) -> OptimalControlProblem:
+    return cell_problem(model, 3)
 
 
 @pytest.mark.parametrize("solver", ["ipopt", "fatrop"])
-def test_derivatives_are_those_of_the_problem(problem: Problem, model: Model, solver: str) -> None:
+def test_derivatives_are_those_of_the_problem(problem: OptimalControlProblem, model: Model, solver: str) -> None:
     """Against CasADi's derivatives of the whole; the curvature is left out along the gas of each class, and only there.
 
     Solvers read every entry of a gradient, so a sparse one would be read beyond its end.

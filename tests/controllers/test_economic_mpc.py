@@ -12,8 +12,9 @@ from adaptive_flot.contracts import ControllerSetup, Decision, Status, full_para
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.economic_mpc.controller import EconomicMpc, MpcState
-from controllers.economic_mpc.verification import Solution, Verdict
+from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.verification import NlpSolution, Validity
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +38,9 @@ def start(case: ControllerCase) -> MpcState:
 
 
 def broken(message: str) -> Any:
-    def solve(arguments: Any, bounds: Any, first: Any, multipliers: Any = None) -> Solution:
+    def solve(arguments: Any, bounds: Any, first: Any, multipliers: Any = None) -> NlpSolution:
         bad = np.full(len(first), np.nan)
-        return Solution(bad, (bad, np.full(len(bounds["lbg"]), np.nan)), Verdict.NOT_FINITE, message, 0, 0.001)
+        return NlpSolution(bad, (bad, np.full(len(bounds["lbg"]), np.nan)), Validity.NOT_FINITE, message, 0, 0.001)
 
     return solve
 
@@ -65,7 +66,7 @@ def test_a_decision_tells_its_plan(case: ControllerCase) -> None:
     estimate = case.estimates[0]
     theta = full_parameters(model, case.setup.parameters, estimate.parameters)
     run_ahead = Stepper(model, 1.0).simulate(estimate.state, np.repeat(held, 30, axis=0), theta)
-    np.testing.assert_allclose(plan.grade, run_ahead.outputs[29::30, 0], rtol=3e-3)
+    np.testing.assert_allclose(plan.outputs["concentrate_grade"], run_ahead.outputs[29::30, 0], rtol=3e-3)
 
 
 def test_a_failed_solve_plays_the_plan_then_holds(case: ControllerCase, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,9 +121,9 @@ def test_a_second_try_is_made_within_the_budget_only(
     state, _ = run(case, start(case), slice(0, 1))
     took, calls, fails = share * controller.budget_s, [], broken("no luck")
 
-    def solve(*given: Any) -> Solution:
+    def solve(*given: Any) -> NlpSolution:
         calls.append(given)
-        failed: Solution = fails(*given)
+        failed: NlpSolution = fails(*given)
         return replace(failed, seconds=took)
 
     monkeypatch.setattr(controller, "solver", solve)
@@ -160,7 +161,7 @@ def test_a_biased_model_is_corrected(case: ControllerCase) -> None:
     state = start(case)
     for sample, estimate in zip(case.samples[:31], estimates[:31], strict=True):
         state, decision = case.controller.decide(state, sample, estimate)
-    assert state.bias == pytest.approx(-0.02, rel=0.25)
+    assert state.bias[0] == pytest.approx(-0.02, rel=0.25)
     assert decision.inputs[0] < plain[-1].inputs[0]
 
 
@@ -173,8 +174,9 @@ def test_it_wants_limits_and_prices(case: ControllerCase) -> None:
     for lacking in (
         replace(limits, inputs={"air_flow": limits.inputs["air_flow"]}),
         replace(limits, moves={"air_flow": limits.moves["air_flow"]}),
+        replace(limits, inputs={}, moves={}),
     ):
-        with pytest.raises(ModelError, match="moves 'level_setpoint'; give its range"):
+        with pytest.raises(ModelError, match="give both for each input that is to be moved"):
             EconomicMpc(replace(case.setup, limits=lacking))
     with pytest.raises(ModelError, match="did you mean 'ipopt'"):
         EconomicMpc(case.setup, solver="ipot")

@@ -7,11 +7,11 @@ import pytest
 
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
 from adaptive_flot.greybox.effects import Effect
-from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
 from controllers.economic_mpc.stage import Arguments
-from controllers.economic_mpc.verification import Verdict
-from tests.controllers.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES
+from controllers.economic_mpc.verification import Validity
+from tests.controllers.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES, cell_problem
 
 NOW = 360.0
 GROWTH = Effect("bubble_size", "air_flow", "power", {"exponent": 0.3}, {"reference": 1.5e-3})
@@ -23,17 +23,21 @@ VALVE = Effect("air_flow", "lag", "stiction", {"amplitude": 1.0, "band": 2e-5}, 
 OFFSET = Effect("grade_sensor", "constant", "shift", {"amplitude": 0.02})
 
 
-def plan(problem: Problem, solver: str, time: float = NOW, bias: float = 0.0) -> tuple[FloatArray, FloatArray]:
+def plan(
+    problem: OptimalControlProblem, solver: str, time: float = NOW, bias: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
     """Moved inputs (H, 2) and grades (H,) of a valid plan from the steady state."""
     model = problem.model
     x0 = steady_state(model, HELD, time=time).state
-    now = Arguments(x0, HELD[[0, 2]], model.parameter_values, HELD[[1]], 0.2, bias, PRICES, time).vector()
+    now = Arguments(
+        x0, HELD[[0, 2]], model.parameter_values, HELD[[1]], np.array([0.2]), np.array([bias]), PRICES, time
+    ).vector()
     gas = np.array([HELD[0] / model.parameter_values[model.index("parameters", "A")]])
     found = make_solver(problem, solver, 10.0)(
         now, problem.layout.bounds(BOUNDS), problem.layout.start(x0, HELD[[0, 2]], gas)
     )
-    assert found.verdict is Verdict.VALID, found.message
-    return problem.layout.inputs_of(found.variables), np.array(problem.grades(found.variables, now)).ravel()
+    assert found.validity is Validity.VALID, found.message
+    return problem.layout.inputs_of(found.variables), np.array(problem.outputs(found.variables, now)).ravel()
 
 
 def simulated(model: Model, inputs: FloatArray) -> FloatArray:
@@ -48,7 +52,7 @@ def simulated(model: Model, inputs: FloatArray) -> FloatArray:
 def test_the_plan_is_what_the_extended_cell_does(model: Model, solver: str) -> None:
     """Against the fast step; the froth changes within the horizon, so a plan that takes another time is wrong."""
     extended = model.with_effects([GROWTH, LATE_FEED, RAMP])
-    problem = Problem(extended, HORIZON, MOVE_S)
+    problem = cell_problem(extended)
     inputs, grades = plan(problem, solver)
     np.testing.assert_allclose(grades, simulated(extended, inputs), rtol=2e-3)
     inputs, grades = plan(problem, solver, time=0.0)
@@ -59,13 +63,13 @@ def test_the_plan_is_what_the_extended_cell_does(model: Model, solver: str) -> N
 def test_a_valve_that_sticks_has_a_plan(model: Model, solver: str) -> None:
     """The dead band of the air valve is round enough for a solver, and the plan still that of the valve."""
     extended = model.with_effects([VALVE])
-    inputs, grades = plan(Problem(extended, HORIZON, MOVE_S), solver)
+    inputs, grades = plan(cell_problem(extended), solver)
     np.testing.assert_allclose(grades, simulated(extended, inputs), rtol=1e-2)
 
 
 def test_a_known_offset_of_the_analyser_changes_no_plan(model: Model) -> None:
     """Limit and prices hold for the concentrate: an analyser that is known to show too much moves nothing."""
-    plain = plan(Problem(model, HORIZON, MOVE_S), "ipopt")
-    known = plan(Problem(model.with_effects([OFFSET]), HORIZON, MOVE_S), "ipopt")
+    plain = plan(cell_problem(model), "ipopt")
+    known = plan(cell_problem(model.with_effects([OFFSET])), "ipopt")
     for a, b in zip(plain, known, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-9)

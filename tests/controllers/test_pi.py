@@ -12,7 +12,7 @@ from adaptive_flot.contracts import Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper, steady_state
 from adaptive_flot.testing import controller_case
-from controllers.economic_mpc.feed_forward import FeedForward, inverse
+from controllers.feed_forward import FeedForward, inverse
 from controllers.hold import Hold
 from controllers.pi import Pi
 
@@ -47,7 +47,7 @@ def test_it_wants_the_range_of_the_air() -> None:
     assert setup.limits is not None
     with pytest.raises(ModelError, match="needs limits"):
         Pi(replace(setup, limits=None))
-    with pytest.raises(ModelError, match="'air_flow'; give its range"):
+    with pytest.raises(ModelError, match="a range of one output and of one input"):
         Pi(replace(setup, limits=replace(setup.limits, inputs={})))
 
 
@@ -62,8 +62,10 @@ def test_hold_holds() -> None:
 @pytest.mark.parametrize(("column", "factor"), [("feed_flow", 0.8), ("feed_grade", 0.8), ("feed_grade", 1.2)])
 def test_a_measured_change_of_the_feed_hardly_moves_the_grade(column: str, factor: float) -> None:
     """The air of the linear inverse alone, on the nonlinear cell: a ninth of what the grade does without it."""
-    model = controller_case(Hold).setup.model
+    setup = controller_case(Hold).setup
+    model = setup.model
     inputs, p = np.array([1.5e-3, 1.67e-4, 0.39]), model.parameter_values
+    ahead = FeedForward(replace(setup, schedule=inputs[None].copy()), ("air_flow", "concentrate_grade"))
     x = steady_state(model, inputs).state
     grade, air = model.index("outputs", "concentrate_grade"), model.index("inputs", "air_flow")
     before = Stepper(model, 1.0).simulate(x, inputs[None], p).outputs[0, grade]
@@ -71,7 +73,6 @@ def test_a_measured_change_of_the_feed_hardly_moves_the_grade(column: str, facto
         inputs[model.index("inputs", "feed_flow")] *= factor
     else:
         p[model.index("parameters", "feed_concentration.chalcopyrite")] *= factor
-    ahead = FeedForward(model, np.array([1.5e-3, 1.67e-4, 0.39]), 1.0)
     alone, feed, helped = x, ahead.start(), x
     call, worst = Stepper(model, 1.0).call, np.zeros(2)
     for k in range(600):

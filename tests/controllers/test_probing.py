@@ -11,15 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adaptive_flot.contracts import Decision, Limits, Sample, Status
-from adaptive_flot.economics import value_rates
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper, steady_state
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.processes import flotation
+from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.testing import ControllerCase, controller_case
 from adaptive_flot.testing.comparing import same
-from controllers.economic_mpc.controller import EconomicMpc, MpcState
+from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.layout import StageLayout
 from controllers.economic_mpc.probing import ProbeState, Probing
-from controllers.economic_mpc.verification import Solution, Verdict
+from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.verification import NlpSolution, Validity
 
 START = np.array([1.77e-3, 1.67e-4, 0.33])
 """Close to where the MPC ends up with nominal parameters: at the lowest level and the grade limit."""
@@ -54,7 +57,7 @@ def probed() -> Loop:
 
 
 def loop(case: ControllerCase) -> Loop:
-    controller, model, prices = case.controller, case.setup.model, case.setup.prices
+    controller, model, prices = case.controller, case.setup.model, case.setup.economics
     assert isinstance(controller, EconomicMpc) and prices is not None
     gradient = Stepper(model, 1.0).one_step_gradient(case.setup.parameters)
     x, p = steady_state(model, START).state, model.parameter_values
@@ -68,7 +71,7 @@ def loop(case: ControllerCase) -> Loop:
         x, y, slope = x.ravel(), y.ravel(), psi[grade] * p[model.indices("parameters", case.setup.parameters)] / 1e-3
         sample = Sample(k + 1.0, u, y)
         estimate = replace(case.estimates[0], time=k + 1.0, state=x, innovation=np.zeros_like(y))
-        rates = value_rates(y[grade], y[recovery], u[0], u[1], feed, prices.values())
+        rates = value_rates(y[grade], y[recovery], u[0], u[1], feed, prices.prices())
         found.grade[k], found.value[k] = y[grade], 3600 * sum(rates.values())
         found.information += np.outer(slope, slope)
         state, decision = controller.decide(state, sample, estimate)
@@ -89,7 +92,7 @@ def test_not_needed_it_is_as_switched_off_to_the_bit() -> None:
         assert same(plain.inputs, other.inputs) and plain.decided_by == other.decided_by == "economic_mpc"
         assert (plain.plan is None) == (other.plan is None)
         if plain.plan is not None and other.plan is not None:
-            assert same(plain.plan.grade, other.plan.grade)
+            assert same(plain.plan.outputs["concentrate_grade"], other.plan.outputs["concentrate_grade"])
     assert same(states[0].plan, states[1].plan) and same(states[0].multipliers, states[1].multipliers)
 
 
@@ -129,7 +132,11 @@ def test_a_dip_is_one_move_within_the_limits_and_never_towards_the_grade_limit(p
 def test_no_sequence_of_prices_spends_more_than_the_wage(prices: list[float], wage: float) -> None:
     """Also when a price is predicted to be negative: that is no income."""
     limits = make_limits()
-    probing, state, before = Probing(limits, 30.0, most_cu_h=wage), ProbeState(0.0), 0.0
+    probing, state, before = (
+        Probing(StageLayout(flotation.make_model(), limits, 2, 30.0), limits, most_cu_h=wage),
+        ProbeState(0.0),
+        0.0,
+    )
     for k, price in enumerate(prices):
         state, _ = probing.pay(state, price, 30.0 * (k + 1))
         assert before <= state.spent <= wage * 30.0 * (k + 1) / 3600 + 1e-12
@@ -153,11 +160,11 @@ def test_without_room_or_without_a_valid_plan_there_is_no_dip(monkeypatch: pytes
     assert controller.probing.is_due(ProbeState(0.0), estimate, low + 3e-4)
     own, calls = controller.solver, 0
 
-    def second_fails(arguments: FloatArray, *others: Any) -> Solution:
+    def second_fails(arguments: FloatArray, *others: Any) -> NlpSolution:
         nonlocal calls
         calls += 1
         found = own(arguments, *others)
-        return found if calls == 1 else replace(found, verdict=Verdict.VIOLATED)
+        return found if calls == 1 else replace(found, validity=Validity.VIOLATED)
 
     monkeypatch.setattr(controller, "solver", second_fails)
     state = replace(controller.init(0.0), inputs=START.copy())
@@ -170,7 +177,7 @@ def test_without_room_or_without_a_valid_plan_there_is_no_dip(monkeypatch: pytes
     [
         ({"most_cu_h": 0.0}, "most_cu_h must be positive"),
         ({"needed_std": -1.0}, "needed_std at least 0"),
-        ({"amplitude_m3_s": 1e-3}, "give at most 0.0002, the largest move"),
+        ({"amplitude": 1e-3}, "give at most 0.0002, the largest move"),
     ],
 )
 def test_options_outside_their_range_are_one_clear_line(options: dict[str, float], message: str) -> None:

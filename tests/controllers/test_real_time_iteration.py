@@ -8,39 +8,39 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from adaptive_flot.economics import value_rates
 from adaptive_flot.greybox import FloatArray, Model, Stepper
+from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.economic_mpc.collocation import Problem
+from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.controller import EconomicMpc
 from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
 from controllers.economic_mpc.real_time_iteration import MOST_STEPS
-from controllers.economic_mpc.verification import Solution, Verdict
-from tests.controllers.test_collocation import BOUNDS, HORIZON, MOVE_S, arguments, cold
+from controllers.economic_mpc.verification import NlpSolution, Validity
+from tests.controllers.test_collocation import BOUNDS, HORIZON, arguments, cell_problem, cold
 
 
 @pytest.fixture(scope="module")
-def problem(model: Model) -> Problem:
-    return Problem(model, HORIZON, MOVE_S)
+def problem(model: Model) -> OptimalControlProblem:
+    return cell_problem(model)
 
 
-def started(problem: Problem, model: Model, now: FloatArray, solver: str = "rti") -> Solution:
-    """Solution for `now`, from the plan for a grade limit of 0.2."""
+def started(problem: OptimalControlProblem, model: Model, now: FloatArray, solver: str = "rti") -> NlpSolution:
+    """NlpSolution for `now`, from the plan for a grade limit of 0.2."""
     bounds = problem.layout.bounds(BOUNDS)
     first = make_solver(problem, "ipopt", 10.0)(arguments(model), bounds, cold(problem, model))
     return make_solver(problem, solver, 10.0)(now, bounds, first.variables, first.multipliers)
 
 
-def test_a_step_follows_the_optimum(problem: Problem, model: Model) -> None:
+def test_a_step_follows_the_optimum(problem: OptimalControlProblem, model: Model) -> None:
     """From the plan for another limit, few steps lead to the plan that ipopt finds for this one."""
-    now = arguments(model, grade_limit=0.203)
+    now = arguments(model, limits=np.array([0.203]))
     ours, theirs = (started(problem, model, now, name) for name in ("rti", "ipopt"))
-    assert ours.verdict is Verdict.VALID and 1 <= ours.iterations <= MOST_STEPS
+    assert ours.validity is Validity.VALID and 1 <= ours.iterations <= MOST_STEPS
     inputs = [problem.layout.inputs_of(found.variables) for found in (ours, theirs)]
     np.testing.assert_allclose(inputs[0] / inputs[1], 1.0, atol=5e-3)
 
 
-def test_multipliers_make_the_lagrangian_stationary(problem: Problem, model: Model) -> None:
+def test_multipliers_make_the_lagrangian_stationary(problem: OptimalControlProblem, model: Model) -> None:
     """At the point where steps no longer move: gradient of the objective + constraints' and bounds' share = 0."""
     now, bounds = arguments(model), problem.layout.bounds(BOUNDS)
     solve, found = make_solver(problem, "rti", 10.0), started(problem, model, now)
@@ -55,15 +55,15 @@ def test_multipliers_make_the_lagrangian_stationary(problem: Problem, model: Mod
     np.testing.assert_allclose(residual, 0.0, atol=1e-6 * np.abs(gradient).max())
 
 
-def test_what_is_not_finite_is_a_verdict(problem: Problem, model: Model) -> None:
+def test_what_is_not_finite_is_a_verdict(problem: OptimalControlProblem, model: Model) -> None:
     bounds, now = problem.layout.bounds(BOUNDS), arguments(model)
     first = make_solver(problem, "ipopt", 10.0)(now, bounds, cold(problem, model))
     solve = make_solver(problem, "rti", 10.0)
     for state in (np.full(9, np.nan), np.zeros(9)):
         found = solve(arguments(model, state=state), bounds, first.variables, first.multipliers)
-        assert found.verdict is not Verdict.VALID or np.isfinite(found.variables).all()
+        assert found.validity is not Validity.VALID or np.isfinite(found.variables).all()
     lost = solve(now, bounds, first.variables, (first.multipliers[0], first.multipliers[1] * np.nan))
-    assert lost.verdict is Verdict.NOT_FINITE and lost.message
+    assert lost.validity is Validity.NOT_FINITE and lost.message
 
 
 def test_solvers_earn_the_same() -> None:
@@ -76,7 +76,7 @@ def test_solvers_earn_the_same() -> None:
 def earned(case: ControllerCase) -> float:
     """Value [cu] of closed loop with the estimator's state and C known."""
     controller, model, setup = case.controller, case.setup.model, case.setup
-    assert setup.prices is not None
+    assert setup.economics is not None
     step, theta, x = Stepper(model, 1.0), model.parameter_values, case.estimates[0].state
     state, adapted = controller.init(0.0), [model.index("parameters", name) for name in setup.parameters]
     feed = theta[model.index("parameters", "feed_concentration.chalcopyrite")]
@@ -94,7 +94,7 @@ def earned(case: ControllerCase) -> float:
         state, decision = controller.decide(state, sample, estimate)
         run = step.simulate(x, np.tile(decision.inputs, (30, 1)), theta, sample.time)
         x, y, u = run.states[-1], run.outputs, decision.inputs
-        rates = value_rates(y[:, grade], y[:, recovery], u[0], u[1], feed, setup.prices.values())
+        rates = value_rates(y[:, grade], y[:, recovery], u[0], u[1], feed, setup.economics.prices())
         value += float(sum(np.sum(rate) for rate in rates.values()))
         sample = replace(sample, time=sample.time + 30.0, inputs=u)
     return value

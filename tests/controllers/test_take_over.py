@@ -9,24 +9,25 @@ from hypothesis import strategies as st
 
 from adaptive_flot.contracts import DelayedValue, Estimate, Status
 from adaptive_flot.greybox import Model, steady_state
-from controllers.economic_mpc.grade_bias import GradeBias
-from controllers.economic_mpc.layout import Layout
-from controllers.economic_mpc.softening import widened
-from tests.controllers.test_collocation import HELD
+from controllers.economic_mpc.layout import StageLayout, with_further_states
+from controllers.economic_mpc.output_bias import OutputBias
+from tests.controllers.test_collocation import HELD, LIMITS
 from tests.controllers.test_extended_models import GROWTH, LATE_FEED
 
 
 def test_a_widened_plan_is_the_same_plan_with_the_further_states_held(model: Model) -> None:
     """Against the layout of the larger problem itself: what it lays out from the larger state."""
     extended = model.with_effects([GROWTH, LATE_FEED])
-    small, large = Layout(model, 3, 30.0), Layout(extended, 3, 30.0)
+    small, large = StageLayout(model, LIMITS, 3, 30.0), StageLayout(extended, LIMITS, 3, 30.0)
     x, gas = steady_state(extended, HELD).state, np.array([0.01])
     moved = HELD[[0, 2]]
     before = small.start(x[: len(model.states)], moved, gas)
     expected = large.start(x, moved, gas)
     assert len(before) < len(expected)
-    np.testing.assert_array_equal(widened(before, small, large, x), expected)
-    np.testing.assert_array_equal(large.inputs_of(widened(before, small, large, x)), small.inputs_of(before))
+    np.testing.assert_array_equal(with_further_states(before, small, large, x), expected)
+    np.testing.assert_array_equal(
+        large.inputs_of(with_further_states(before, small, large, x)), small.inputs_of(before)
+    )
 
 
 def estimate(time: float, innovation: float, delayed: float) -> Estimate:
@@ -45,7 +46,7 @@ def test_the_bias_changes_by_the_filtered_change_of_the_innovations(
 ) -> None:
     """Property: filtering other innovations from the same start on gives the old bias plus `change`; missing and
     delayed values come at the same samples, as they are the plant's."""
-    bias = GradeBias(1, 1.0, 20.0)
+    bias = OutputBias("concentrate_grade", 1, 1.0, 20.0)
     known: list[Estimate] = []
     again: list[Estimate] = []
     for k, (old, new, delayed_old, delayed_new, seen, delayed) in enumerate(rows):

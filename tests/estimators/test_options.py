@@ -11,6 +11,7 @@ from adaptive_flot.errors import ModelError, PluginError
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
 
+ADAPTED, GRADE = ("growth_exponent", "coalescence_rate"), ("concentrate_grade",)
 WRONG_VALUES: list[tuple[str, dict[str, Any], str]] = [
     ("rpem", {"forgetting": 0.0}, "forgetting"),
     ("rpem", {"forgetting": 1.01}, "forgetting"),
@@ -35,7 +36,7 @@ def test_a_value_outside_its_range_is_a_model_error(
 ) -> None:
     factory = load(name, {**ESTIMATORS, **BATCH_ESTIMATORS}, "estimator")
     with pytest.raises(ModelError, match=says) as caught:
-        construct(factory, name, "estimator", Setup(model, 1.0), **options)
+        construct(factory, name, "estimator", Setup(model, 1.0, ADAPTED, GRADE), **options)
     assert "\n" not in str(caught.value)
 
 
@@ -53,7 +54,7 @@ def test_an_option_it_does_not_take_is_a_one_line_plugin_error(
 ) -> None:
     factory = load(name, {**ESTIMATORS, **BATCH_ESTIMATORS}, "estimator")
     with pytest.raises(PluginError, match=f"{name!r}.*{next(iter(options))}") as caught:
-        construct(factory, name, "estimator", Setup(model, 1.0), **options)
+        construct(factory, name, "estimator", Setup(model, 1.0, ADAPTED, GRADE), **options)
     assert "\n" not in str(caught.value)
 
 
@@ -61,10 +62,10 @@ def test_an_option_it_does_not_take_is_a_one_line_plugin_error(
 def test_an_unknown_output_in_the_setup_is_a_model_error(model: Model, name: str) -> None:
     factory = load(name, {**ESTIMATORS, **BATCH_ESTIMATORS}, "estimator")
     with pytest.raises(ModelError, match="did you mean 'recovery'"):
-        factory(Setup(model, 1.0, outputs=("recoverry",)))
+        factory(Setup(model, 1.0, ADAPTED, ("recoverry",)))
 
 
 def test_an_unknown_parameter_in_the_setup_is_a_model_error(model: Model) -> None:
     factory = load("rpem", ESTIMATORS, "estimator")
     with pytest.raises(ModelError, match="did you mean 'growth_exponent'"):
-        factory(Setup(model, 1.0, parameters=("growth_exponnt",)))
+        factory(Setup(model, 1.0, ("growth_exponnt",), GRADE))

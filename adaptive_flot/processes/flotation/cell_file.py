@@ -191,6 +191,7 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
                 scale=scale or abs(value) or 1.0,
                 prior_std=prior,
                 role=entry.role,
+                disturbance=spec.disturbance,
             )
         )
     return found

@@ -13,7 +13,7 @@ from adaptive_flot.greybox.model import Parameter
 
 @dataclass(frozen=True)
 class Spec:
-    """What a cell file must hold under one key: name in the model, unit, physical range, symbol."""
+    """What a cell file must hold under one key: name, unit, physical range, symbol, whether it varies by itself."""
 
     name: str
     unit: str
@@ -21,6 +21,7 @@ class Spec:
     upper: float = np.inf
     symbol: str | None = None
     group: Literal["mineral", "bubble"] | None = None
+    disturbance: bool = False
 
 
 _TINY = 1e-12
@@ -55,7 +56,7 @@ PARAMETERS: dict[str, dict[str, Spec]] = {
         "floatability": Spec("floatability", "-", 0.0, 0.1, group="mineral"),
         "particle_diameter": Spec("particle_diameter", "m", 1e-7, 1e-2, group="mineral"),
         "density": Spec("mineral_density", "kg/m3", 1001.0, 2.5e4, group="mineral"),
-        "feed_concentration": Spec("feed_concentration", "kg/m3", 0.0, 2e4, group="mineral"),
+        "feed_concentration": Spec("feed_concentration", "kg/m3", 0.0, 2e4, group="mineral", disturbance=True),
     },
     "level_loop": {
         "proportional_gain": Spec("proportional_gain", "m2/s", _TINY, 10.0, symbol="k_p"),

@@ -29,7 +29,7 @@ def operation_panels(case: Case) -> list[Panel]:
     panels = [_input_panel(case, q, limits) for q in model.inputs if q.name in limits.inputs]
     panels += _disturbance_panels(case, limits)
     outputs = {q.name: q for q in model.outputs}
-    panels.append(_true_course(case, outputs["concentrate_grade"], 1.3, (limits.grade,)))
+    panels.append(_true_course(case, outputs["concentrate_grade"], 1.3, limits.outputs["concentrate_grade"][:1]))
     panels.append(_true_course(case, outputs["recovery"], 1.0, ()))
     return panels
 
@@ -99,7 +99,9 @@ def plan_panels(case: Case, run: Run) -> list[Panel]:
             panels.append(_planned_panel(table, q, acted(table, q.column), plans, limits.inputs.get(q.name, ()), True))
     grade = next(q for q in case.scenario.model.outputs if q.name == "concentrate_grade")
     plans = _plan_traces(shown, grade.column, table.set_index("time_s")["concentrate_grade_true"])
-    panels.append(_planned_panel(table, grade, "concentrate_grade_true", plans, (limits.grade,), False))
+    panels.append(
+        _planned_panel(table, grade, "concentrate_grade_true", plans, limits.outputs["concentrate_grade"][:1], False)
+    )
     return panels
 
 

@@ -220,5 +220,7 @@ def _accounts(scenario: Scenario, table: pd.DataFrame) -> tuple[dict[str, float]
     if scenario.prices is None or scenario.limits is None:
         return {}, {}
     late = table[table["time_s"] > scenario.fits_after + 1e-9]
-    earned = account(late, scenario.plant_model, scenario.dt, scenario.prices, scenario.limits.grade)
+    earned = account(
+        late, scenario.plant_model, scenario.dt, scenario.prices, scenario.limits.outputs["concentrate_grade"][0]
+    )
     return earned, control_account(late)

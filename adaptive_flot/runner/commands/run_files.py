@@ -46,7 +46,7 @@ def run_summary(scenario: Scenario, runs: Sequence[Run]) -> dict[str, Any]:
     """JSON summary of a scenario; with economics also what `compare` must know to compare like with like."""
     head: dict[str, Any] = {"scenario": scenario.name}
     if scenario.limits is not None and scenario.prices is not None:
-        head |= {"conditions": conditions(scenario), "grade_limit": scenario.limits.grade}
+        head |= {"conditions": conditions(scenario), "grade_limit": scenario.limits.outputs["concentrate_grade"][0]}
     return {**head, "runs": [run.summary() for run in runs]}
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from adaptive_flot.economics import Prices, value_rates
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.processes.flotation.economics import Prices, valuable_feed, value_rates
 
 TOLERATED_DEPTH = 0.002
 """Depth below the grade limit from which a sample counts as a violation."""
@@ -37,7 +37,7 @@ def account(table: pd.DataFrame, model: Model, dt: float, prices: Prices, grade_
         more than 0.002 below the limit), `mean_depth` (mean depth below the limit in that time), `value_cu_h` (economic
         value an hour) and each of its terms `value_<term>_cu_h`.
     """
-    valuable = next(p for p in model.parameters if p.name.startswith("feed_concentration."))
+    valuable = valuable_feed(model)
     moved = f"{valuable.label}_true"
     concentration = table[moved].to_numpy(dtype=float) if moved in table else np.full(len(table), valuable.value)
     grade, recovery = (table[c].to_numpy(dtype=float) for c in ("concentrate_grade_true", "recovery_true"))
@@ -50,7 +50,7 @@ def account(table: pd.DataFrame, model: Model, dt: float, prices: Prices, grade_
     concentrate = float(np.sum(recovery * concentration * feed / grade) * dt)
     depth = grade_limit - grade
     below = depth > TOLERATED_DEPTH
-    rates = value_rates(grade, recovery, air, feed, concentration, prices.values())
+    rates = value_rates(grade, recovery, air, feed, concentration, prices.prices())
     terms = {f"value_{name}_cu_h": float(3600 * np.mean(rate)) for name, rate in rates.items()}
     return {
         "recovery": recovered / fed,

@@ -17,9 +17,10 @@ def plan_table(model: Model, steps: Sequence[Step]) -> pd.DataFrame:
     -------
     DataFrame
         `planned_at_s` (when), `time_s` (end of the move), each moved input during the move by its column, and
-        `concentrate_grade` expected at its end.
+        each limited output by its column, as expected at its end.
     """
     columns = {q.name: q.column for q in model.inputs}
+    shown = {q.name: q.column for q in model.outputs}
     parts = []
     for before, step in zip([None, *steps], steps, strict=False):
         plan = step.decision.plan
@@ -27,5 +28,6 @@ def plan_table(model: Model, steps: Sequence[Step]) -> pd.DataFrame:
             continue
         moves = {columns[name]: values for name, values in plan.inputs.items()}
         head = {"planned_at_s": before.plant.sample.time, "time_s": plan.time}
-        parts.append(pd.DataFrame({**head, **moves, "concentrate_grade": plan.grade}))
+        expected = {shown[name]: values for name, values in plan.outputs.items()}
+        parts.append(pd.DataFrame({**head, **moves, **expected}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()

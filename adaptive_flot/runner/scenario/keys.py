@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
-from adaptive_flot.economics import Prices
 from adaptive_flot.plugins import construct, load
 from adaptive_flot.processes.effect_entry import EffectEntry
+from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.faults import Fault
 from adaptive_flot.runner.scenario.profiles import InputProfile, ParameterProfile

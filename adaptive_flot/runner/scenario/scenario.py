@@ -12,10 +12,10 @@ import yaml
 from pydantic import ValidationError
 
 from adaptive_flot.contracts import Limits, Setup
-from adaptive_flot.economics import Prices
 from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.effect_entry import attach
+from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.scenario.checks import check_scenario
@@ -86,10 +86,10 @@ class Scenario:
             return None
         names = {q.column: q.name for q in self.model.inputs}
         return Limits(
-            part.concentrate_grade,
-            part.level_m,
-            {names[column]: limits for column, limits in part.inputs.items()},
-            {names[column]: move for column, move in part.largest_move.items()},
+            outputs={"concentrate_grade": (part.concentrate_grade, np.inf)},
+            inputs={names[column]: limits for column, limits in part.inputs.items()},
+            moves={names[column]: move for column, move in part.largest_move.items()},
+            states={"level": part.level_m},
         )
 
     @property

@@ -180,7 +180,7 @@ def test_what_a_search_found_becomes_an_extension(model: Model, monkeypatch: pyt
         return replace(found, after=cast(Any, SimpleNamespace(initial_state=state)))
 
     monkeypatch.setattr(extension, "discover", discover)
-    found = search_record(Setup(base, 1.0), record, 1)
+    found = search_record(Setup(base, 1.0, ("growth_exponent", "coalescence_rate"), ("concentrate_grade",)), record, 1)
     assert found.extension.effects == (replace(growth(0.3), coefficients={"amplitude": 0.0, "exponent": 0.3}),)
     assert found.extension.parameters == {"growth_exponent": 1.07, "coalescence_rate": 6.38e-4}
     assert found.extension.initial_state is state

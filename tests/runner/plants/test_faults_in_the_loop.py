@@ -18,7 +18,8 @@ from adaptive_flot.runner.commands.run import Run, run_scenario
 from adaptive_flot.runner.plants.fault_injection import with_faults
 from adaptive_flot.runner.plants.scenario_plant import make_plant
 from adaptive_flot.runner.scenario.scenario import load_scenario
-from controllers.economic_mpc.controller import EconomicMpc, MpcState
+from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.state import MpcState
 from controllers.hold import Hold
 from tests.runner.conftest import WriteScenario
 

@@ -1,4 +1,4 @@
-"""The grade bias: filtered measured minus predicted grade, which a controller adds to its predictions."""
+"""The bias of an output: filtered measured minus predicted value, which a controller adds to its predictions."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from adaptive_flot.contracts import Estimate
 
 
 @dataclass(frozen=True)
-class GradeBias:
-    """A first-order filter of the grade's innovations.
+class OutputBias:
+    """A first-order filter of the innovations of one output.
 
     Attributes
     ----------
-    column
-        Index of the grade among the outputs.
+    output, index
+        Name of the output, and its index among the outputs.
     dt
         Sampling interval [s].
     time_constant
         Of the filter [s].
     """
 
-    column: int
+    output: str
+    index: int
     dt: float
     time_constant: float
 
@@ -44,8 +45,8 @@ class GradeBias:
 
     def _newest(self, estimate: Estimate) -> float:
         """The newest innovation that comes with an estimate; NaN where none does."""
-        innovation = float(estimate.innovation[self.column])
-        delayed = [v.value for v in estimate.delayed if v.output == "concentrate_grade"]
+        innovation = float(estimate.innovation[self.index])
+        delayed = [v.value for v in estimate.delayed if v.output == self.output]
         return delayed[-1] if delayed and not np.isfinite(innovation) else innovation
 
     def _filtered(self, bias: float, heard: float, time: float, innovation: float) -> tuple[float, float]:

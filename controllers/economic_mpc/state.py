@@ -1,0 +1,44 @@
+"""State of the economic MPC, handed from decision to decision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adaptive_flot.greybox.model import FloatArray
+from controllers.economic_mpc.probing import ProbeState
+
+
+@dataclass(frozen=True)
+class MpcState:
+    """What the next decision needs.
+
+    Attributes
+    ----------
+    row
+        Interval to come, counted from the start.
+    due
+        Time of the next optimisation [s].
+    inputs
+        Inputs held now (nu,); None before the first decision.
+    plan
+        Scaled solution of the last valid optimisation, and its multipliers; None before the first.
+    age
+        Moves of that plan that have been used.
+    bias
+        Filtered measured minus predicted value of each limited output. It is added to every prediction, so that a model
+        that is off does not break a limit for good.
+    heard
+        Time of the newest value in each of these filters [s].
+    probe
+        Last dip and what probing has cost; None without probing.
+    """
+
+    row: int
+    due: float
+    inputs: FloatArray | None
+    plan: FloatArray | None
+    multipliers: tuple[FloatArray, FloatArray] | None
+    age: int
+    bias: tuple[float, ...]
+    heard: tuple[float, ...]
+    probe: ProbeState | None = None
