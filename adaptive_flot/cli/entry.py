@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
+from adaptive_flot.child_processes import Terminated, terminable
 from adaptive_flot.cli.commands import app
 from adaptive_flot.errors import AdaptiveFlotError
 
@@ -20,11 +21,15 @@ OWN = ("adaptive_flot", "estimators", "controllers")
 def main() -> None:
     """Run the command line.
 
-    Exit codes: 0 done, 1 a defect of this program, 2 a mistake of the user, 130 interrupted.
+    Exit codes: 0 done, 1 a defect of this program, 2 a mistake of the user, 130 interrupted. A program that a signal
+    ended gives 128 and the number of the signal.
     """
     arguments, debug = _debug_first(sys.argv[1:])
     try:
-        app(arguments)
+        with terminable():
+            app(arguments)
+    except Terminated as end:
+        _end(end, f"ended by {end.number.name}", end.exit_code, debug)
     except AdaptiveFlotError as error:
         _end(error, str(error), USER_ERROR, debug)
     except MemoryError as error:

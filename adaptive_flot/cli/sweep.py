@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from adaptive_flot.child_processes import Terminated
 from adaptive_flot.cli.options import Compile, Out, can_compile, results_folder
 
 INTERRUPTED = 130
@@ -41,8 +42,8 @@ def sweep(
                 compiled=compiled,
                 progress=progress,
             )
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Terminated) as end:
         sys.stderr.write(f"adaptive-flot: interrupted; results so far are in {folder}, the same command goes on\n")
-        sys.exit(INTERRUPTED)
+        sys.exit(end.exit_code if isinstance(end, Terminated) else INTERRUPTED)
     print_study(outcome.table)
     typer.echo(f"{len(outcome.table)} runs, {outcome.found} of them from before: {folder / 'runs.parquet'}")

@@ -113,7 +113,7 @@ def make_model() -> Model:
 """
 
 
-def _write_tank(folder: Path, name: str = "tank.csv", **more: Any) -> pd.DataFrame:
+def write_tank(folder: Path, name: str = "tank.csv", **more: Any) -> pd.DataFrame:
     (folder / "heated.py").write_text(HEATED)
     record = tank_record(**more)
     columns = {"time_s": record.time, "power_W": record.inputs[:, 0], "fan_speed_1_s": record.inputs[:, 1]}
@@ -124,7 +124,7 @@ def _write_tank(folder: Path, name: str = "tank.csv", **more: Any) -> pd.DataFra
 
 def test_a_model_of_the_user_from_record_to_extended_model(call: Call, tmp_path: Path) -> None:
     """Record in; verdict, page and model file out; the model file is accepted by discover, estimate and simulate."""
-    _write_tank(tmp_path)
+    write_tank(tmp_path)
     result = call(
         "discover", "tank.csv", "--model", "heated:make_model", "--processes", "1", "--save-model", "more.yaml"
     )
@@ -138,7 +138,7 @@ def test_a_model_of_the_user_from_record_to_extended_model(call: Call, tmp_path:
     assert verdict["effects"][0]["site"] == "heat_loss"
     assert verdict["error"]["temperature"]["after"] < 0.2 * verdict["error"]["temperature"]["before"]
 
-    _write_tank(tmp_path, "fresh.csv", seed=5)
+    write_tank(tmp_path, "fresh.csv", seed=5)
     again = call("discover", "fresh.csv", "--model", "more.yaml", "--processes", "1")
     assert again.code == 0 and again.out.startswith("none: ")
     replayed = call("estimate", "fresh.csv", "--model", "more.yaml", "--estimator", "fixed", "--json", "e.json")
@@ -179,7 +179,7 @@ def _range(t: pd.DataFrame) -> pd.DataFrame:
 def test_a_bad_record_gets_an_error_or_a_verdict_that_names_the_reason(
     call: Call, tmp_path: Path, change: Callable[[pd.DataFrame], pd.DataFrame], code: int, says: str
 ) -> None:
-    change(_write_tank(tmp_path)).to_csv(tmp_path / "tank.csv", index=False)
+    change(write_tank(tmp_path)).to_csv(tmp_path / "tank.csv", index=False)
     result = call("discover", "tank.csv", "--model", "heated:make_model", "--processes", "1")
     assert result.code == code and says in " ".join((result.out if code == 0 else result.err).split())
     assert (tmp_path / "results").exists() == (code == 0)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from adaptive_flot.child_processes import end_with_parent
+from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.greybox.stepping.rows import core_count
 
 Item = TypeVar("Item")
@@ -42,23 +46,48 @@ def parallel_map(
     """`[function(item) for item in items]`; `done` is called after each.
 
     The function may close over anything (a model's equations do not pickle): workers are forked with it. Items and
-    results must pickle.
+    results must pickle. Workers end with this process, and at once when one of the calls fails.
+
+    Raises
+    ------
+    AdaptiveFlotError
+        A worker was ended from outside.
+    Exception
+        What the function raised.
     """
-    global _work
     if processes < 2 or len(items) < 2 or "fork" not in multiprocessing.get_all_start_methods():
-        found = []
+        results = []
         for item in items:
-            found.append(function(item))
+            results.append(function(item))
             done()
-        return found
-    _work = function
+        return results
     try:
-        with ProcessPoolExecutor(min(processes, len(items)), multiprocessing.get_context("fork")) as pool:
-            results = []
-            for result in pool.map(_call, items):
-                results.append(result)
-                done()
-            return results
+        return _forked_map(function, items, min(processes, len(items)), done)
+    except BrokenProcessPool as error:
+        raise AdaptiveFlotError(
+            "a process of the search ended without a result (not enough memory?); give fewer processes"
+        ) from error
+
+
+def _forked_map(
+    function: Callable[[Item], Result], items: Sequence[Item], processes: int, done: Callable[[], None]
+) -> list[Result]:
+    global _work
+    _work = function
+    others = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("fork")
+    try:
+        with ProcessPoolExecutor(processes, context, initializer=end_with_parent, initargs=(os.getpid(),)) as pool:
+            try:
+                results = []
+                for result in pool.map(_call, items):
+                    results.append(result)
+                    done()
+                return results
+            except BaseException:
+                for worker in set(multiprocessing.active_children()) - others:  # else the pool waits for their calls
+                    worker.terminate()
+                raise
     finally:
         _work = None
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
+from adaptive_flot.child_processes import end_with_parent
 from adaptive_flot.errors import AdaptiveFlotError
 
 Result = TypeVar("Result")
-ORPHAN_CHECK_S = 1.0
-"""How often a search looks whether the run that wants its result is still there [s]."""
 
 
 class Background(Generic[Result]):
@@ -70,7 +68,7 @@ class Background(Generic[Result]):
 
 
 def _call(function: Callable[[], object], sender: Connection, parent: int) -> None:
-    _end_with(parent)
+    end_with_parent(parent)
     try:
         answer: tuple[bool, object] = (True, function())
     except Exception as error:
@@ -79,15 +77,3 @@ def _call(function: Callable[[], object], sender: Connection, parent: int) -> No
         sender.send(answer)
     except Exception as error:  # what does not pickle is said, not waited for
         sender.send((False, AdaptiveFlotError(f"the result of a search can not be sent: {error}")))
-
-
-def _end_with(parent: int) -> None:
-    """End this process when its parent is gone, also one that was killed and could not see to it."""
-
-    def look(signum: int, frame: object) -> None:
-        del signum, frame
-        if os.getppid() != parent:
-            os._exit(1)
-
-    signal.signal(signal.SIGALRM, look)
-    signal.setitimer(signal.ITIMER_REAL, ORPHAN_CHECK_S, ORPHAN_CHECK_S)

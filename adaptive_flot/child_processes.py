@@ -1,0 +1,85 @@
+"""Processes that this program starts end with it, however it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+PARENT_CHECK_S = 1.0
+"""How often a process looks whether the one that started it is still there [s]."""
+ENDING = tuple(signal.Signals[name] for name in ("SIGTERM", "SIGHUP") if name in signal.Signals.__members__)
+"""Signals that ask a program to end."""
+
+
+class Terminated(BaseException):
+    """A signal asks this program to end. It is no `Exception`, so that nobody takes it for a failed fit.
+
+    Attributes
+    ----------
+    number
+        The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = signal.Signals(number)
+
+    @property
+    def exit_code(self) -> int:
+        """What a shell gives for a process that this signal ended."""
+        return 128 + self.number
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Raise `Terminated` in the block when a signal asks for the end, so that what it started is ended first.
+
+    A second signal ends the program at once. Signals that are ignored (`nohup`) stay ignored. Outside the main thread,
+    where Python takes no signals, the block runs as it is.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    former = {number: signal.getsignal(number) for number in ENDING}
+    taken = [number for number, handler in former.items() if handler is signal.SIG_DFL]
+
+    def end(number: int, frame: object) -> None:
+        del frame
+        for one in taken:
+            signal.signal(one, signal.SIG_DFL)
+        raise Terminated(number)
+
+    for number in taken:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def end_with_parent(parent: int) -> None:
+    """End this forked process when its parent is gone, also one that was killed and could not see to it.
+
+    Signals that ask for the end work at once here. Ctrl-C, which a terminal sends to all processes, is left to the
+    parent.
+
+    Parameters
+    ----------
+    parent
+        Process identifier of the parent. It is given, because the parent may be gone when this is called.
+    """
+
+    def look(number: int, frame: object) -> None:
+        del number, frame
+        if os.getppid() != parent:
+            os._exit(1)
+
+    for number in ENDING:
+        signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK_S, PARENT_CHECK_S)
