@@ -61,8 +61,18 @@ def terminable() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL)
 
 
+@contextmanager
+def forking() -> Iterator[None]:
+    """Hold back signals while this process forks: a child would take them as its parent does, until it is set up."""
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, {*ENDING, signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)
+
+
 def end_with_parent(parent: int) -> None:
-    """End this forked process when its parent is gone, also one that was killed and could not see to it.
+    """End this process, forked in `forking`, when its parent is gone, also one that was killed.
 
     Signals that ask for the end work at once here. Ctrl-C, which a terminal sends to all processes, is left to the
     parent.
@@ -81,5 +91,6 @@ def end_with_parent(parent: int) -> None:
     for number in ENDING:
         signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {*ENDING, signal.SIGINT})
     signal.signal(signal.SIGALRM, look)
     signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK_S, PARENT_CHECK_S)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from adaptive_flot.child_processes import end_with_parent
+from adaptive_flot.child_processes import end_with_parent, forking
 from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.greybox.stepping.rows import core_count
 
@@ -79,8 +79,10 @@ def _forked_map(
     try:
         with ProcessPoolExecutor(processes, context, initializer=end_with_parent, initargs=(os.getpid(),)) as pool:
             try:
+                with forking():
+                    coming = pool.map(_call, items)
                 results = []
-                for result in pool.map(_call, items):
+                for result in coming:
                     results.append(result)
                     done()
                 return results

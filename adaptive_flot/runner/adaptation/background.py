@@ -8,7 +8,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
-from adaptive_flot.child_processes import end_with_parent
+from adaptive_flot.child_processes import end_with_parent, forking
 from adaptive_flot.errors import AdaptiveFlotError
 
 Result = TypeVar("Result")
@@ -33,7 +33,8 @@ class Background(Generic[Result]):
             context = multiprocessing.get_context("fork")
             self._receiver, sender = context.Pipe(duplex=False)
             self._process = context.Process(target=_call, args=(function, sender, os.getpid()))
-            self._process.start()
+            with forking():
+                self._process.start()
             sender.close()
 
     def result(self) -> Result:
