@@ -129,8 +129,8 @@ class Pem:
             converged = solution.status > 0
             if not converged or np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
                 break
-        found = self._result(record, problem, unknowns, noise, present, evaluations)
-        return found if converged else replace(found, status=Status.NOT_CONVERGED)
+        fit = self._result(record, problem, unknowns, noise, present, evaluations)
+        return fit if converged else replace(fit, status=Status.NOT_CONVERGED)
 
     # -- the least-squares problem ---------------------------------------------------------------------------------
 
@@ -182,8 +182,8 @@ class Pem:
     def _noise(self, errors: FloatArray) -> FloatArray:
         """Root mean square of each output's error (m,), kept off zero."""
         scale = np.array([self.setup.model.outputs[c].scale for c in self._columns])
-        found = np.array([np.sqrt(np.nanmean(e**2)) for e in errors.T])
-        return cast(FloatArray, np.maximum(found, 1e-12 * scale))
+        rms = np.array([np.sqrt(np.nanmean(e**2)) for e in errors.T])
+        return cast(FloatArray, np.maximum(rms, 1e-12 * scale))
 
     def _errors(self, record: Dataset, problem: _Problem, unknowns: FloatArray, measured: FloatArray) -> FloatArray:
         def simulate() -> FloatArray:
@@ -254,8 +254,8 @@ class Pem:
         # the noise of an output is at most what is left of it after differencing: a start that needs no model
         steps = np.diff(measured, axis=0)
         scale = np.array([self.setup.model.outputs[c].scale for c in self._columns])
-        found = np.array([np.sqrt(np.mean(s[np.isfinite(s)] ** 2) / 2) if np.isfinite(s).any() else 0 for s in steps.T])
-        return cast(FloatArray, np.maximum(found, 1e-6 * scale))
+        std = np.array([np.sqrt(np.mean(s[np.isfinite(s)] ** 2) / 2) if np.isfinite(s).any() else 0 for s in steps.T])
+        return cast(FloatArray, np.maximum(std, 1e-6 * scale))
 
     # -- results ---------------------------------------------------------------------------------------------------
 

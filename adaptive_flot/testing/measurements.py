@@ -55,14 +55,14 @@ def check_delayed_value_is_as_good_as_one_in_time(case: EstimatorCase) -> None:
     value = DelayedValue(output, case.samples[taken].time + 0.3 * setup.dt, float(outputs[j]))
     delayed[arrives] = replace(case.samples[arrives], delayed=(value,))
     estimator = taking_delayed_values(case.estimator, 10 * setup.dt)
-    _, found = run_estimator(estimator, estimator.init(case.prior), delayed)
+    _, estimates = run_estimator(estimator, estimator.init(case.prior), delayed)
     _, expected = run_estimator(case.estimator, case.estimator.init(case.prior), in_time)
-    assert found[arrives].status is Status.DELAYED, (
-        f"status {found[arrives].status.name} where a delayed value was used"
+    assert estimates[arrives].status is Status.DELAYED, (
+        f"status {estimates[arrives].status.name} where a delayed value was used"
     )
-    assert [(v.output, v.time) for v in found[arrives].delayed] == [(output, case.samples[taken].time)]
-    assert np.isclose(found[arrives].delayed[0].value, expected[taken].innovation[j], rtol=1e-6)
-    for a, b in zip(found[arrives:], expected[arrives:], strict=True):
+    assert [(v.output, v.time) for v in estimates[arrives].delayed] == [(output, case.samples[taken].time)]
+    assert np.isclose(estimates[arrives].delayed[0].value, expected[taken].innovation[j], rtol=1e-6)
+    for a, b in zip(estimates[arrives:], expected[arrives:], strict=True):
         for x, y in ((a.parameters, b.parameters), (a.state, b.state), (a.prediction, b.prediction)):
             assert np.allclose(x, y, rtol=1e-6), "the estimate differs from the one with the value in time"
         assert np.allclose(a.covariance, b.covariance, rtol=1e-4, atol=1e-18)
@@ -76,9 +76,11 @@ def check_delayed_value_without_a_sample_is_a_status(case: EstimatorCase) -> Non
     for time in (-1e4, case.samples[5].time + 100.0, float("nan")):
         samples = list(case.samples)
         samples[5] = replace(samples[5], delayed=(DelayedValue(output, time, 0.5),))
-        _, found = run_estimator(estimator, estimator.init(case.prior), samples)
-        assert found[5].status is Status.TOO_OLD and found[5].delayed == (), f"a delayed value of time {time} was taken"
-        assert same(found[5].parameters, expected[5].parameters) and same(found[6:], expected[6:])
+        _, estimates = run_estimator(estimator, estimator.init(case.prior), samples)
+        assert estimates[5].status is Status.TOO_OLD and estimates[5].delayed == (), (
+            f"a delayed value of time {time} was taken"
+        )
+        assert same(estimates[5].parameters, expected[5].parameters) and same(estimates[6:], expected[6:])
 
 
 def _without(sample: Sample, j: int) -> Sample:

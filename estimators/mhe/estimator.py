@@ -13,7 +13,7 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.ekf import Drift, drift_of
 from estimators.mhe.arrival import arrival_step
-from estimators.mhe.problem import SOLVERS, MovingHorizon, Window
+from estimators.mhe.problem import SOLVERS, HorizonWindow, MovingHorizon
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import first_estimate, layout, parameters_of, process_noise
 from estimators.shared.measured import driving_outputs
@@ -49,7 +49,7 @@ class MheState:
     newest_covariance: FloatArray
     z: FloatArray
     w: FloatArray
-    window: Window
+    window: HorizonWindow
     noise_std: FloatArray
 
 
@@ -114,7 +114,7 @@ class Mhe:
         """Start from a prior with an empty window; without a joint covariance the state is taken as known."""
         z, P = first_estimate(prior, self.coordinates, self.layout)
         model, rows, m = self.setup.model, self.rows, len(self.setup.outputs)
-        window = Window(
+        window = HorizonWindow(
             np.full(rows, prior.time),
             np.zeros((rows, len(model.inputs))),
             np.tile(self._p, (rows, 1)),
@@ -145,7 +145,9 @@ class Mhe:
         if not (np.isfinite(z).all() and np.isfinite(P).all() and np.isfinite(prediction).all()):
             moved, status = replace(state, time=sample.time), Status.NOT_FINITE
         else:
-            moved = self._append(state, Window(*(np.asarray(v) for v in (state.time, u, p, taken, weight))), z, P)
+            moved = self._append(
+                state, HorizonWindow(*(np.asarray(v) for v in (state.time, u, p, taken, weight))), z, P
+            )
             moved = replace(moved, time=sample.time, since=state.since + 1)
             if moved.since >= self.every:
                 moved, solved = self._solved(moved)
@@ -164,13 +166,13 @@ class Mhe:
         )
         return moved, estimate
 
-    def _append(self, state: MheState, row: Window, z: FloatArray, P: FloatArray) -> MheState:
+    def _append(self, state: MheState, row: HorizonWindow, z: FloatArray, P: FloatArray) -> MheState:
         """Window with one sample more; a full one gives its oldest sample to the arrival cost."""
         mean, arrival, window, path, noise = state.mean, state.P, state.window, state.z, state.w
         k = state.count
         if k == self.rows:
             mean, arrival = self._advance(mean, arrival, path[0] + noise[0], window, 0)
-            window = Window(
+            window = HorizonWindow(
                 *(np.vstack([a[1:], a[-1:]]) if a.ndim > 1 else np.append(a[1:], a[-1]) for a in _fields(window))
             )
             path, noise = np.vstack([path[1:], path[-1:]]), np.vstack([noise[1:], 0 * noise[-1:]])
@@ -182,11 +184,18 @@ class Mhe:
         path = path.copy()
         path[k + 1 :] = z
         return replace(
-            state, count=k + 1, mean=mean, P=arrival, newest_covariance=P, z=path, w=noise, window=Window(*fields)
+            state,
+            count=k + 1,
+            mean=mean,
+            P=arrival,
+            newest_covariance=P,
+            z=path,
+            w=noise,
+            window=HorizonWindow(*fields),
         )
 
     def _advance(
-        self, mean: FloatArray, P: FloatArray, s: FloatArray, window: Window, k: int
+        self, mean: FloatArray, P: FloatArray, s: FloatArray, window: HorizonWindow, k: int
     ) -> tuple[FloatArray, FloatArray]:
         """Mean and covariance one interval on, linearised at s."""
         mean, P, _, _ = self._step(
@@ -206,15 +215,15 @@ class Mhe:
         """Fit the window; its covariance is that of the filter along it."""
         sizes, directions = np.linalg.eigh(state.P)
         factor = directions * np.sqrt(np.maximum(sizes, 0.0))
-        found = self._horizon.solve(state.window, state.mean, factor, state.z, state.w)
-        if not found.valid:
+        solution = self._horizon.solve(state.window, state.mean, factor, state.z, state.w)
+        if not solution.valid:
             return replace(state, since=0), False
         mean, P = state.mean, state.P
         for k in range(state.count):
-            mean, P = self._advance(mean, P, found.z[k] + found.w[k], state.window, k)
+            mean, P = self._advance(mean, P, solution.z[k] + solution.w[k], state.window, k)
         if not np.isfinite(P).all():
             return replace(state, since=0), False
-        z, w = found.z.copy(), found.w.copy()
+        z, w = solution.z.copy(), solution.w.copy()
         z[state.count + 1 :], w[state.count :] = z[state.count], 0.0
         return replace(state, since=0, newest_covariance=P, z=z, w=w), True
 
@@ -230,5 +239,5 @@ class Mhe:
         return replace(state, z=z), Status.PROJECTED if far and status is Status.OK else status
 
 
-def _fields(window: Window) -> tuple[FloatArray, ...]:
+def _fields(window: HorizonWindow) -> tuple[FloatArray, ...]:
     return window.time, window.inputs, window.parameters, window.measured, window.weight

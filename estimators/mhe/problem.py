@@ -31,7 +31,7 @@ TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
-class Window:
+class HorizonWindow:
     """Data of N intervals: start (N,), inputs (N, nu), parameters (N, np), driving outputs (N, m), 1 / noise (N, m)."""
 
     time: FloatArray
@@ -42,7 +42,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Solution:
+class HorizonSolution:
     """Trajectory z (N + 1, n), noise w (N, n), and whether the solver came to an end that satisfies its equations."""
 
     z: FloatArray
@@ -115,7 +115,9 @@ class MovingHorizon:
             parts += [z[k] / self._scale, omega[k]] + ([xi] if k == 0 else [])
         return np.concatenate([*parts, z[-1] / self._scale])
 
-    def solve(self, window: Window, mean: FloatArray, factor: FloatArray, z: FloatArray, w: FloatArray) -> Solution:
+    def solve(
+        self, window: HorizonWindow, mean: FloatArray, factor: FloatArray, z: FloatArray, w: FloatArray
+    ) -> HorizonSolution:
         """Most likely trajectory of a window, from a guess.
 
         Parameters
@@ -131,20 +133,20 @@ class MovingHorizon:
         omega = w @ np.linalg.pinv(self._noise).T if self._r else np.zeros((self._rows, 0))
         arguments = np.concatenate([data.ravel(), mean, factor.ravel(order="F")])
         if not (np.isfinite(arguments).all() and np.isfinite(z).all()):
-            return Solution(z, w, False)
-        found = self._solve(
+            return HorizonSolution(z, w, False)
+        result = self._solve(
             x0=self._packed(z, omega, np.zeros(self._n)), p=arguments, lbx=self._lower, ubx=self._upper, lbg=0, ubg=0
         )
-        values, gaps = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
+        values, gaps = np.array(result["x"]).ravel(), np.array(result["g"]).ravel()
         valid = bool(np.isfinite(values).all() and np.abs(gaps).max() < 1e-6 and self._solve.stats()["success"])
         return self._unpacked(values, valid)
 
-    def _unpacked(self, values: FloatArray, valid: bool) -> Solution:
+    def _unpacked(self, values: FloatArray, valid: bool) -> HorizonSolution:
         n, r = self._n, self._r
         starts = [k * (n + r) + (n if k else 0) for k in range(self._rows + 1)]
         z = np.array([values[i : i + n] for i in starts]) * self._scale
         omega = np.array([values[i + n : i + n + r] for i in starts[:-1]]).reshape(self._rows, r)
-        return Solution(z, omega @ self._noise.T, valid)
+        return HorizonSolution(z, omega @ self._noise.T, valid)
 
 
 def _interval(

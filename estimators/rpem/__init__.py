@@ -3,6 +3,7 @@
 Map
 ---
 estimator.py  `Rpem`: the recursion of the paper, and its options.
+state.py      `RpemState`: what the next sample needs.
 update.py     One update of estimate and covariance.
 record.py     Many rows in one call, for replays.
 full.py       `rpem_full`: the options that make it the full recursion.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,46 +13,13 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.rpem.record import BLOCK_ROWS, RecordBlock
+from estimators.rpem.state import RpemState
 from estimators.rpem.update import Gradient, UpdateOptions, alternative_covariance, update_function
 from estimators.shared.information import Information
 from estimators.shared.measured import driving_outputs
-from estimators.shared.state_correction import Correction, StateCorrection
+from estimators.shared.state_correction import StateCorrection
 
 GRADIENTS = ("exact", "central", "recursive")
-
-
-@dataclass(frozen=True)
-class RpemState:
-    """What the next step needs.
-
-    Attributes
-    ----------
-    time
-        Time of the model state [s].
-    x
-        Model state (nx,), predicted with the newest estimate.
-    theta
-        Estimate (q,).
-    covariance
-        sigma^2 L (q, q): the paper's inverse Hessian L times the noise variance.
-    noise_std
-        sigma of each output (m,).
-    sensitivity
-        dx/dtheta (nx, q), for the recursive gradient.
-    information
-        Sum of psi psi' / sigma^2 over the last while (q, q), where directions may be frozen.
-    correction
-        Gain of the state correction; None until the first sample, whose operating point it is designed for.
-    """
-
-    time: float
-    x: FloatArray
-    theta: FloatArray
-    covariance: FloatArray
-    noise_std: FloatArray
-    sensitivity: FloatArray
-    information: FloatArray
-    correction: Correction | None
 
 
 class Rpem:
@@ -229,8 +195,8 @@ class Rpem:
         for first in range(0, len(time), BLOCK_ROWS):
             rows = slice(first, first + BLOCK_ROWS)
             block = (time[rows], inputs[rows], outputs[rows])
-            found = None if self._block is None or len(time[rows]) < BLOCK_ROWS else self._block(state, *block)
-            state, part = self._by_samples(state, *block) if found is None else found
+            taken = None if self._block is None or len(time[rows]) < BLOCK_ROWS else self._block(state, *block)
+            state, part = self._by_samples(state, *block) if taken is None else taken
             parts.append(part)
         return Track.joined(parts)
 

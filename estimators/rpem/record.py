@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +11,8 @@ from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.recursion import Recursion
+from estimators.rpem.state import RpemState
 from estimators.rpem.update import UpdateOptions, update_function
-
-if TYPE_CHECKING:
-    from estimators.rpem.estimator import RpemState
 
 BLOCK_ROWS = 200
 """Samples a call takes."""
@@ -67,20 +64,20 @@ class RecordBlock:
             "measured": np.where(present, measured, 0.0),
             "present": present.astype(float),
         }
-        found = self._recursion(carried, each)
-        flags = found["flags"]
+        rows = self._recursion(carried, each)
+        flags = rows["flags"]
         if not np.isfinite(flags[:, 0]).all():
             return None
         track = Track(
             time,
-            found["prediction"],
-            found["expected_std"],
-            found["theta_next"],
-            found["covariance_next"],
-            found["x_next"],
+            rows["prediction"],
+            rows["expected_std"],
+            rows["theta_next"],
+            rows["covariance_next"],
+            rows["x_next"],
             tuple(Status.PROJECTED if f[1] > 0 else Status.OK if f[2] > 0 else Status.MISSING for f in flags.tolist()),
         )
         last = replace(
             state, time=float(time[-1]), x=track.state[-1], theta=track.parameters[-1], covariance=track.covariance[-1]
         )
-        return (replace(last, sensitivity=found["S_next"][-1]) if "S_next" in found else last), track
+        return (replace(last, sensitivity=rows["S_next"][-1]) if "S_next" in rows else last), track

@@ -77,8 +77,10 @@ def most_likely_drift(setup: Setup, prior: Prior, samples: Sequence[Sample]) -> 
         raise DataError("the drift has no likelihood: the model does not get through the record; check its start")
     best = int(np.nanargmin(values))
     bracket = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    found = minimize_scalar(minus, bounds=bracket, method="bounded", options={"xatol": 0.02})
-    peak, value = (float(found.x), float(found.fun)) if found.fun <= values[best] else (float(grid[best]), values[best])
+    minimum = minimize_scalar(minus, bounds=bracket, method="bounded", options={"xatol": 0.02})
+    peak, value = (
+        (float(minimum.x), float(minimum.fun)) if minimum.fun <= values[best] else (float(grid[best]), values[best])
+    )
     allowed = float(value) + float(chi2.ppf(0.95, 1)) / 2
     upper = high
     if minus(high) > allowed:

@@ -107,12 +107,12 @@ def smooth(estimator: Ekf, prior: Prior, samples: Sequence[Sample]) -> Smoothed:
 
 def _result(estimator: Ekf, samples: Sequence[Sample], rows: list[tuple[FloatArray, FloatArray]]) -> Smoothed:
     nx, q = estimator.layout.nx, estimator.layout.q
-    found = [parameters_of(z, P, estimator.coordinates, estimator.layout) for z, P in rows]
+    smoothed = [parameters_of(z, P, estimator.coordinates, estimator.layout) for z, P in rows]
     return Smoothed(
         np.array([s.time for s in samples]),
         np.array([z[:nx] for z, _ in rows]).reshape(len(rows), nx),
-        np.array([theta for theta, _ in found]).reshape(len(rows), q),
-        np.array([covariance for _, covariance in found]).reshape(len(rows), q, q),
+        np.array([theta for theta, _ in smoothed]).reshape(len(rows), q),
+        np.array([covariance for _, covariance in smoothed]).reshape(len(rows), q, q),
     )
 
 

@@ -55,10 +55,10 @@ def test_more_sensors_make_the_estimates_surer(name: str) -> None:
     Better than with the nominal n, which is 2 % off at the end.
     """
     alone, more = (case_of(name, outputs) for outputs in (GRADE, MORE))
-    less, found = (estimates(case, list(case.samples)) for case in (alone, more))
-    surer, sure = (np.diag(run[-1].covariance) / run[-1].parameters ** 2 for run in (found, less))
+    less, tracked = (estimates(case, list(case.samples)) for case in (alone, more))
+    surer, sure = (np.diag(run[-1].covariance) / run[-1].parameters ** 2 for run in (tracked, less))
     assert (surer < sure).all()
     driving = more.estimator.setup.model.indices("outputs", MORE)
     constant = estimates(case_of("fixed", MORE), list(more.samples))
-    wrong, nominal = (np.array([e.innovation[driving] for e in run[-10:]]) for run in (found, constant))
+    wrong, nominal = (np.array([e.innovation[driving] for e in run[-10:]]) for run in (tracked, constant))
     assert (np.abs(wrong).mean(axis=0) < 0.7 * np.abs(nominal).mean(axis=0)).all()

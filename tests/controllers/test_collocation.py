@@ -56,13 +56,17 @@ def cold(problem: OptimalControlProblem, model: Model) -> FloatArray:
 
 def test_the_plan_is_what_the_cell_does(problem: OptimalControlProblem, model: Model) -> None:
     """States of the plan against the fast step under the planned inputs: the collocation error of 30 s moves."""
-    found = make_solver(problem, "ipopt", 10.0)(arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model))
-    assert found.validity is Validity.VALID
-    inputs = problem.layout.inputs_of(found.variables)
+    solution = make_solver(problem, "ipopt", 10.0)(
+        arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model)
+    )
+    assert solution.validity is Validity.VALID
+    inputs = problem.layout.inputs_of(solution.variables)
     held = np.column_stack([inputs[:, 0], np.full(HORIZON, HELD[1]), inputs[:, 1]])
     run = Stepper(model, 1.0).simulate(steady_state(model, HELD).state, np.repeat(held, int(MOVE_S), axis=0))
     block = problem.layout.block
-    planned = np.array([found.variables[k * block : k * block + 9] * problem.layout.x_scale for k in range(1, HORIZON)])
+    planned = np.array(
+        [solution.variables[k * block : k * block + 9] * problem.layout.x_scale for k in range(1, HORIZON)]
+    )
     done = run.states[int(MOVE_S) - 1 :: int(MOVE_S)][: HORIZON - 1]
     np.testing.assert_allclose(planned / done, 1.0, atol=3e-3)
 
@@ -103,8 +107,10 @@ def test_nothing_is_rebuilt_when_an_argument_changes(problem: OptimalControlProb
 
 
 def test_plans_keep_bounds_and_moves(problem: OptimalControlProblem, model: Model) -> None:
-    found = make_solver(problem, "fatrop", 10.0)(arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model))
-    inputs = np.vstack([HELD[[0, 2]], problem.layout.inputs_of(found.variables)])
+    solution = make_solver(problem, "fatrop", 10.0)(
+        arguments(model), problem.layout.bounds(BOUNDS), cold(problem, model)
+    )
+    inputs = np.vstack([HELD[[0, 2]], problem.layout.inputs_of(solution.variables)])
     assert np.all(np.abs(np.diff(inputs, axis=0)) <= BOUNDS.moves * (1 + 1e-3))
     assert np.all(inputs[1:] >= BOUNDS.inputs[:, 0] * (1 - 1e-4)) and np.all(inputs <= BOUNDS.inputs[:, 1] * (1 + 1e-4))
 
@@ -125,11 +131,11 @@ def test_verification_catches_what_a_solver_may_return(problem: OptimalControlPr
 def test_an_infeasible_problem_names_the_worst_constraints(problem: OptimalControlProblem, model: Model) -> None:
     """A range of the set-point that no allowed move reaches: it is not VALID, and the message says what breaks."""
     impossible = Bounds(np.array([BOUNDS.inputs[0], [0.40, 0.42]]), BOUNDS.moves, BOUNDS.states)
-    found = make_solver(problem, "ipopt", 5.0)(
+    solution = make_solver(problem, "ipopt", 5.0)(
         arguments(model), problem.layout.bounds(impossible), cold(problem, model)
     )
-    assert found.validity is Validity.VIOLATED
-    assert "level_setpoint" in found.message and " by " in found.message
+    assert solution.validity is Validity.VIOLATED
+    assert "level_setpoint" in solution.message and " by " in solution.message
 
 
 def test_terms_of_the_objective_add_up(problem: OptimalControlProblem, model: Model) -> None:

@@ -35,11 +35,11 @@ def test_derivatives_are_those_of_the_problem(problem: OptimalControlProblem, mo
     weights = (1.3, rng.normal(size=g.numel()))
     ours = Assembled(problem).functions(solver)
     _, gradient, _, jacobian = first(at, now)
-    found = ours["nlp_grad_f"](x=at, p=now)["grad_f_x"]
-    assert found.is_dense()
-    np.testing.assert_allclose(np.array(found), np.array(gradient), rtol=1e-9, atol=1e-9)
-    found = ours["nlp_jac_g"](x=at, p=now)["jac_g_x"]
-    np.testing.assert_allclose(np.array(found), np.array(jacobian), rtol=1e-9, atol=1e-9)
+    solution = ours["nlp_grad_f"](x=at, p=now)["grad_f_x"]
+    assert solution.is_dense()
+    np.testing.assert_allclose(np.array(solution), np.array(gradient), rtol=1e-9, atol=1e-9)
+    solution = ours["nlp_jac_g"](x=at, p=now)["jac_g_x"]
+    np.testing.assert_allclose(np.array(solution), np.array(jacobian), rtol=1e-9, atol=1e-9)
 
     slope, whole = (np.array(part) for part in hessian(at, now, *weights))
     second = ours["nlp_hess_l"](x=at, p=now, lam_f=weights[0], lam_g=weights[1])

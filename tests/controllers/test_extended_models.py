@@ -33,11 +33,11 @@ def plan(
         x0, HELD[[0, 2]], model.parameter_values, HELD[[1]], np.array([0.2]), np.array([bias]), PRICES, time
     ).vector()
     gas = np.array([HELD[0] / model.parameter_values[model.index("parameters", "A")]])
-    found = make_solver(problem, solver, 10.0)(
+    solution = make_solver(problem, solver, 10.0)(
         now, problem.layout.bounds(BOUNDS), problem.layout.start(x0, HELD[[0, 2]], gas)
     )
-    assert found.validity is Validity.VALID, found.message
-    return problem.layout.inputs_of(found.variables), np.array(problem.outputs(found.variables, now)).ravel()
+    assert solution.validity is Validity.VALID, solution.message
+    return problem.layout.inputs_of(solution.variables), np.array(problem.outputs(solution.variables, now)).ravel()
 
 
 def simulated(model: Model, inputs: FloatArray) -> FloatArray:

@@ -63,7 +63,7 @@ def loop(case: ControllerCase) -> Loop:
     x, p = steady_state(model, START).state, model.parameter_values
     grade, recovery = (model.index("outputs", n) for n in ("concentrate_grade", "recovery"))
     feed = p[model.index("parameters", "feed_concentration.chalcopyrite")]
-    found = Loop([], [], np.empty(LENGTH), np.empty(LENGTH), np.zeros((2, 2)))
+    recorded = Loop([], [], np.empty(LENGTH), np.empty(LENGTH), np.zeros((2, 2)))
     state = replace(controller.init(0.0), inputs=START.copy())
     u = START
     for k in range(LENGTH):
@@ -72,13 +72,13 @@ def loop(case: ControllerCase) -> Loop:
         sample = Sample(k + 1.0, u, y)
         estimate = replace(case.estimates[0], time=k + 1.0, state=x, innovation=np.zeros_like(y))
         rates = value_rates(y[grade], y[recovery], u[0], u[1], feed, prices.prices())
-        found.grade[k], found.value[k] = y[grade], 3600 * sum(rates.values())
-        found.information += np.outer(slope, slope)
+        recorded.grade[k], recorded.value[k] = y[grade], 3600 * sum(rates.values())
+        recorded.information += np.outer(slope, slope)
         state, decision = controller.decide(state, sample, estimate)
         u = decision.inputs
-        found.states.append(state)
-        found.decisions.append(decision)
-    return found
+        recorded.states.append(state)
+        recorded.decisions.append(decision)
+    return recorded
 
 
 def test_not_needed_it_is_as_switched_off_to_the_bit() -> None:
@@ -163,8 +163,8 @@ def test_without_room_or_without_a_valid_plan_there_is_no_dip(monkeypatch: pytes
     def second_fails(arguments: FloatArray, *others: Any) -> NlpSolution:
         nonlocal calls
         calls += 1
-        found = own(arguments, *others)
-        return found if calls == 1 else replace(found, validity=Validity.VIOLATED)
+        solution = own(arguments, *others)
+        return solution if calls == 1 else replace(solution, validity=Validity.VIOLATED)
 
     monkeypatch.setattr(controller, "solver", second_fails)
     state = replace(controller.init(0.0), inputs=START.copy())

@@ -36,20 +36,20 @@ def test_a_step_follows_the_optimum(problem: OptimalControlProblem, model: Model
     now = arguments(model, limits=np.array([0.203]))
     ours, theirs = (started(problem, model, now, name) for name in ("rti", "ipopt"))
     assert ours.validity is Validity.VALID and 1 <= ours.iterations <= MOST_STEPS
-    inputs = [problem.layout.inputs_of(found.variables) for found in (ours, theirs)]
+    inputs = [problem.layout.inputs_of(solution.variables) for solution in (ours, theirs)]
     np.testing.assert_allclose(inputs[0] / inputs[1], 1.0, atol=5e-3)
 
 
 def test_multipliers_make_the_lagrangian_stationary(problem: OptimalControlProblem, model: Model) -> None:
     """At the point where steps no longer move: gradient of the objective + constraints' and bounds' share = 0."""
     now, bounds = arguments(model), problem.layout.bounds(BOUNDS)
-    solve, found = make_solver(problem, "rti", 10.0), started(problem, model, now)
+    solve, solution = make_solver(problem, "rti", 10.0), started(problem, model, now)
     for _ in range(8):
-        found = solve(now, bounds, found.variables, found.multipliers)
+        solution = solve(now, bounds, solution.variables, solution.multipliers)
     x, p, f, g = (problem.nlp[key] for key in ("x", "p", "f", "g"))
     slope = ca.Function("slope", [x, p], [ca.gradient(f, x), ca.jacobian(g, x)])
-    gradient, jacobian = (np.array(part) for part in slope(found.variables, now))
-    of_bounds, of_constraints = found.multipliers
+    gradient, jacobian = (np.array(part) for part in slope(solution.variables, now))
+    of_bounds, of_constraints = solution.multipliers
     residual = gradient.ravel() + jacobian.T @ of_constraints + of_bounds
     assert np.abs(gradient).max() > 1.0
     np.testing.assert_allclose(residual, 0.0, atol=1e-6 * np.abs(gradient).max())
@@ -60,8 +60,8 @@ def test_what_is_not_finite_is_a_verdict(problem: OptimalControlProblem, model: 
     first = make_solver(problem, "ipopt", 10.0)(now, bounds, cold(problem, model))
     solve = make_solver(problem, "rti", 10.0)
     for state in (np.full(9, np.nan), np.zeros(9)):
-        found = solve(arguments(model, state=state), bounds, first.variables, first.multipliers)
-        assert found.validity is not Validity.VALID or np.isfinite(found.variables).all()
+        solution = solve(arguments(model, state=state), bounds, first.variables, first.multipliers)
+        assert solution.validity is not Validity.VALID or np.isfinite(solution.variables).all()
     lost = solve(now, bounds, first.variables, (first.multipliers[0], first.multipliers[1] * np.nan))
     assert lost.validity is Validity.NOT_FINITE and lost.message
 

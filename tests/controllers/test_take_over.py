@@ -50,8 +50,8 @@ def test_the_bias_changes_by_the_filtered_change_of_the_innovations(
     known: list[Estimate] = []
     again: list[Estimate] = []
     for k, (old, new, delayed_old, delayed_new, seen, delayed) in enumerate(rows):
-        for found, now, after in ((known, old, delayed_old), (again, new, delayed_new)):
-            found.append(estimate(1.0 + k, now if seen else np.nan, after if delayed else np.nan))
+        for solution, now, after in ((known, old, delayed_old), (again, new, delayed_new)):
+            solution.append(estimate(1.0 + k, now if seen else np.nan, after if delayed else np.nan))
 
     def filtered(estimates: list[Estimate]) -> float:
         value, heard = 0.3, 0.0

@@ -52,11 +52,11 @@ def cell_case(model: Model, fast: Stepper) -> CellCase:
 
 def replay(estimator: AnyEstimator, prior: Prior, samples: tuple[Sample, ...]) -> list[Estimate]:
     """Estimates of every sample."""
-    state, found = estimator.init(prior), []
+    state, estimates = estimator.init(prior), []
     for sample in samples:
         state, estimate = estimator.update(state, sample)
-        found.append(estimate)
-    return found
+        estimates.append(estimate)
+    return estimates
 
 
 def full(setup: Setup, values: FloatArray) -> FloatArray:

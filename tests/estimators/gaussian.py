@@ -127,8 +127,8 @@ def first_rows(record: LinearRecord, count: int) -> LinearRecord:
 
 def run_estimator(estimator: object, record: LinearRecord) -> list[Estimate]:
     """Estimates of every sample."""
-    state, found = estimator.init(record.prior), []  # type: ignore[attr-defined]
+    state, estimates = estimator.init(record.prior), []  # type: ignore[attr-defined]
     for sample in record.samples:
         state, estimate = estimator.update(state, sample)  # type: ignore[attr-defined]
-        found.append(estimate)
-    return found
+        estimates.append(estimate)
+    return estimates

@@ -24,25 +24,25 @@ def test_estimates_are_conditional_means_and_covariances(walk: str, state_noise:
         state_noise=state_noise,
         outlier_std=np.inf,
     )
-    found = run_estimator(estimator, record)
+    estimates = run_estimator(estimator, record)
     for count in (1, 6, 9, 16, 25):
         means, covariances = posterior(first_rows(record, count), estimator.noise, integrated=integrated)
-        e = found[count - 1]
+        e = estimates[count - 1]
         np.testing.assert_allclose(np.concatenate([e.state, e.parameters]), means[-1][:4], rtol=1e-8, atol=1e-9)
         np.testing.assert_allclose(e.covariance, covariances[-1][2:4, 2:4], rtol=1e-8, atol=1e-10)
-    assert [e.status for e in found[6:11]] == [Status.OK, *[Status.MISSING] * 3, Status.OK]
+    assert [e.status for e in estimates[6:11]] == [Status.OK, *[Status.MISSING] * 3, Status.OK]
 
 
 def test_predictions_and_their_std_are_those_of_the_next_sample_given_the_past() -> None:
     record = linear_record(2)
     estimator = Ekf(record.setup, drift_per_hour=4.0, state_noise=0.1, outlier_std=np.inf)
-    found = run_estimator(estimator, record)
+    estimates = run_estimator(estimator, record)
     means, covariances = posterior(first_rows(record, 12), estimator.noise)
     H = affine_maps(record)[1][12]
-    np.testing.assert_allclose(found[12].prediction, H[:, :-1] @ means[-1] + H[:, -1], rtol=1e-8)
+    np.testing.assert_allclose(estimates[12].prediction, H[:, :-1] @ means[-1] + H[:, -1], rtol=1e-8)
     spread = H[:, :-1] @ (covariances[-1] + estimator.noise) @ H[:, :-1].T
     np.testing.assert_allclose(
-        found[12].innovation_std, np.sqrt(np.diag(spread) + record.prior.noise_std**2), rtol=1e-8
+        estimates[12].innovation_std, np.sqrt(np.diag(spread) + record.prior.noise_std**2), rtol=1e-8
     )
 
 

@@ -11,11 +11,11 @@ from tests.estimators.conftest import CellCase, full, replay
 
 
 def test_predictions_are_the_free_run_and_nothing_is_adapted(cell_case: CellCase, fast: Stepper) -> None:
-    found = replay(Fixed(cell_case.setup), cell_case.prior, cell_case.samples)
+    estimates = replay(Fixed(cell_case.setup), cell_case.prior, cell_case.samples)
     free = fast.simulate(cell_case.x0, cell_case.inputs, full(cell_case.setup, cell_case.prior.parameters))
-    np.testing.assert_allclose([e.prediction for e in found], free.outputs, rtol=1e-12)
-    np.testing.assert_allclose([e.state for e in found], free.states, rtol=1e-12)
-    for e, sample in zip(found, cell_case.samples, strict=True):
+    np.testing.assert_allclose([e.prediction for e in estimates], free.outputs, rtol=1e-12)
+    np.testing.assert_allclose([e.state for e in estimates], free.states, rtol=1e-12)
+    for e, sample in zip(estimates, cell_case.samples, strict=True):
         np.testing.assert_array_equal(e.parameters, cell_case.prior.parameters)
         np.testing.assert_array_equal(e.innovation, sample.outputs - e.prediction)
         assert not e.covariance.any() and e.status is Status.OK and e.time == sample.time

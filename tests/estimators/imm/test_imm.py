@@ -82,9 +82,9 @@ def test_without_changes_it_is_the_filter_of_constant_parameters() -> None:
     """Rest for ever and changes of no size: every mode is the same Kalman filter."""
     record = linear_record(4)
     nothing = {"rate_per_hour": 1e-9, "rate_change_per_hour": 1e-9, "jump": 1e-9, "rest_s": 1e12}
-    found = run_estimator(Imm(record.setup, **nothing, outlier_std=np.inf), record)
+    estimates = run_estimator(Imm(record.setup, **nothing, outlier_std=np.inf), record)
     expected = run_estimator(Ekf(record.setup, drift_per_hour=0.0, outlier_std=np.inf), record)
-    for a, b in zip(found, expected, strict=True):
+    for a, b in zip(estimates, expected, strict=True):
         np.testing.assert_allclose(a.parameters, b.parameters, rtol=1e-6)
         np.testing.assert_allclose(a.state, b.state, rtol=1e-6)
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-6)
@@ -109,8 +109,8 @@ def test_it_finds_which_parameter_changes_and_leaves_the_other_alone(moving: int
     errors = {}
     for name, estimator in (("imm", Imm(setup)), ("ekf", Ekf(setup, drift_per_hour=0.6))):
         samples = tuple(Sample(k + 1.0, inputs[k], outputs[k : k + 1]) for k in range(rows))
-        found = run_estimator(estimator, LinearRecord(setup, prior, samples))
-        errors[name] = np.sqrt(np.mean((np.array([e.parameters for e in found]) - theta)[100:] ** 2, axis=0))
+        estimates = run_estimator(estimator, LinearRecord(setup, prior, samples))
+        errors[name] = np.sqrt(np.mean((np.array([e.parameters for e in estimates]) - theta)[100:] ** 2, axis=0))
     assert errors["imm"][1 - moving] < 0.7 * errors["ekf"][1 - moving]
     assert errors["imm"][moving] < errors["ekf"][moving]
 

@@ -55,10 +55,10 @@ def test_with_a_full_window_and_constant_parameters_it_is_the_batch_fit(solver: 
 def test_two_solvers_with_two_hessians_agree_on_the_cell(cell_case: CellCase) -> None:
     options = {"window_s": 10.0, "solve_every_s": 5.0, "drift_per_hour": 0.5}
     samples = cell_case.samples[:25]
-    found = [
+    estimates = [
         replay(Mhe(cell_case.setup, solver=name, **options), cell_case.prior, samples) for name in ("ipopt", "fatrop")
     ]
-    for a, b in zip(*found, strict=True):
+    for a, b in zip(*estimates, strict=True):
         assert a.status is b.status is Status.OK
         np.testing.assert_allclose(a.parameters, b.parameters, rtol=1e-6)
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-4)

@@ -21,23 +21,23 @@ INPUT = np.random.default_rng(2).uniform(0.5, 2.0, size=40)
 
 def test_a_pair_that_acts_only_as_a_product_is_reported_and_stays_finite() -> None:
     record = toys.record(toys.product(), INPUT, parameters={"a": 2.0, "b": 3.0}, noise=0.1 * NOISE)
-    found = Pem(Setup(toys.product(), 1.0, ("a", "b"), ("y",)), initial_state="given").fit(record)
-    a, b = found.values()
+    result = Pem(Setup(toys.product(), 1.0, ("a", "b"), ("y",)), initial_state="given").fit(record)
+    a, b = result.values()
     assert a * b == pytest.approx(6.0, rel=0.05)
-    assert np.isfinite(found.covariance).all() and np.isfinite(found.noise_std).all()
-    assert [word for _, _, word in found.identifiability.parameters] == ["not identified", "not identified"]
-    assert [{x, y} for x, y, _ in found.identifiability.pairs] == [{"a", "b"}]
-    assert "does not identify a, b" in found.identifiability.verdict
-    assert "hard to tell apart" in found.identifiability.verdict
+    assert np.isfinite(result.covariance).all() and np.isfinite(result.noise_std).all()
+    assert [word for _, _, word in result.identifiability.parameters] == ["not identified", "not identified"]
+    assert [{x, y} for x, y, _ in result.identifiability.pairs] == [{"a", "b"}]
+    assert "does not identify a, b" in result.identifiability.verdict
+    assert "hard to tell apart" in result.identifiability.verdict
 
 
 def test_a_parameter_that_does_nothing_is_not_identified() -> None:
     """Its regressor is zero throughout; the other one is as well known as without it."""
     model = toys.linear(2, value=0.5)
     record = toys.record(model, np.column_stack([INPUT, 0 * INPUT]), parameters={"th0": 1.0}, noise=0.01 * NOISE)
-    found = Pem(Setup(model, 1.0, ("th0", "th1"), ("y0",)), initial_state="given").fit(record)
-    assert [word for _, _, word in found.identifiability.parameters] == ["identified", "not identified"]
-    assert found.values()[0] == pytest.approx(1.0, abs=0.02) and np.isfinite(found.covariance).all()
+    result = Pem(Setup(model, 1.0, ("th0", "th1"), ("y0",)), initial_state="given").fit(record)
+    assert [word for _, _, word in result.identifiability.parameters] == ["identified", "not identified"]
+    assert result.values()[0] == pytest.approx(1.0, abs=0.02) and np.isfinite(result.covariance).all()
 
 
 @pytest.mark.parametrize(("bounds", "bound"), [((0.0, 1.0), 1.0), ((3.0, 9.0), 3.0)])
@@ -48,12 +48,12 @@ def test_a_parameter_on_its_bound_is_projected_and_named(bounds: tuple[float, fl
     start = float(np.mean(bounds))
     model = replace(model, parameters=(a, replace(b, value=start, lower=bounds[0], upper=bounds[1])))
     record = toys.record(toys.decay(), INPUT, parameters={"a": 0.5, "b": 2.0}, noise=0.01 * NOISE)
-    found = Pem(Setup(model, 1.0, ("a", "b"), ("y",)), initial_state="given").fit(record)
-    assert found.status is Status.PROJECTED
-    assert [e.at_bound for e in found.estimates] == [False, True]
-    assert found.estimates[1].value == pytest.approx(bound, abs=1e-5)
-    assert found.identifiability.parameters[1][2] == "on a bound"
-    assert "b ends on a bound" in found.identifiability.verdict
+    result = Pem(Setup(model, 1.0, ("a", "b"), ("y",)), initial_state="given").fit(record)
+    assert result.status is Status.PROJECTED
+    assert [e.at_bound for e in result.estimates] == [False, True]
+    assert result.estimates[1].value == pytest.approx(bound, abs=1e-5)
+    assert result.identifiability.parameters[1][2] == "on a bound"
+    assert "b ends on a bound" in result.identifiability.verdict
 
 
 def test_estimates_never_leave_the_range_not_even_by_rounding_where_the_fit_starts_on_the_bound() -> None:
@@ -62,8 +62,8 @@ def test_estimates_never_leave_the_range_not_even_by_rounding_where_the_fit_star
     a, b = model.parameters
     model = replace(model, parameters=(a, replace(b, value=1.0, lower=1.0, upper=9.0)))
     record = toys.record(toys.decay(), INPUT, parameters={"a": 0.5, "b": 0.3})
-    found = Pem(Setup(model, 1.0, ("a", "b"), ("y",)), initial_state="given").fit(record)
-    model.with_parameters({e.name: e.value for e in found.estimates})
+    result = Pem(Setup(model, 1.0, ("a", "b"), ("y",)), initial_state="given").fit(record)
+    model.with_parameters({e.name: e.value for e in result.estimates})
 
 
 @pytest.mark.parametrize("left", [0, 1, 2])
@@ -88,10 +88,10 @@ def test_a_record_that_the_model_can_not_simulate_is_a_status() -> None:
     inputs = np.full(20, 0.5)
     record = toys.record(toys.square(), inputs, x0=(1.0,))
     record.inputs[5:10] = -10.0
-    found = Pem(Setup(toys.square(), 1.0, ("p",), ("y",)), initial_state="given").fit(record)
-    assert found.status is Status.NOT_FINITE
-    assert np.isnan(found.covariance).all() and found.values()[0] == 1.0
-    assert "can not simulate" in found.identifiability.verdict
+    result = Pem(Setup(toys.square(), 1.0, ("p",), ("y",)), initial_state="given").fit(record)
+    assert result.status is Status.NOT_FINITE
+    assert np.isnan(result.covariance).all() and result.values()[0] == 1.0
+    assert "can not simulate" in result.identifiability.verdict
 
 
 def test_no_steady_state_to_start_from_is_an_error_that_names_the_inputs() -> None:
@@ -106,9 +106,9 @@ def test_a_trial_step_without_a_steady_state_is_taken_back() -> None:
     """From p = 1 a Gauss-Newton step to x = sqrt(0.05) overshoots to p < 0, where there is no steady state."""
     record = toys.record(toys.square(), np.zeros(30), parameters={"p": 0.05}, x0=(0.05**0.5,), given=False)
     noisy = toys.measured_as(record, record.outputs + 0.01 * NOISE[:30])
-    found = Pem(Setup(toys.square(), 1.0, ("p",), ("y",)), initial_state="steady").fit(noisy)
-    assert found.status is Status.OK
-    assert abs(found.values()[0] - 0.05) < 4 * found.estimates[0].std
+    result = Pem(Setup(toys.square(), 1.0, ("p",), ("y",)), initial_state="steady").fit(noisy)
+    assert result.status is Status.OK
+    assert abs(result.values()[0] - 0.05) < 4 * result.estimates[0].std
 
 
 def test_a_group_of_parameters_is_fitted_as_its_members(model: Model, cell_case: CellCase) -> None:
@@ -117,9 +117,9 @@ def test_a_group_of_parameters_is_fitted_as_its_members(model: Model, cell_case:
     assert names == ("floatability.chalcopyrite", "floatability.quartz")
     outputs = np.vstack([s.outputs for s in cell_case.samples])
     record = Dataset("cell", np.arange(1.0, ROWS + 1), 1.0, cell_case.inputs, outputs)
-    found = Pem(Setup(model, 1.0, names, ("concentrate_grade",))).fit(record)
-    assert tuple(e.name for e in found.estimates) == names
-    assert [e.unit for e in found.estimates] == ["-", "-"]
+    result = Pem(Setup(model, 1.0, names, ("concentrate_grade",))).fit(record)
+    assert tuple(e.name for e in result.estimates) == names
+    assert [e.unit for e in result.estimates] == ["-", "-"]
 
 
 def test_a_search_that_runs_out_of_evaluations_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,5 +128,5 @@ def test_a_search_that_runs_out_of_evaluations_says_so(monkeypatch: pytest.Monke
     model = toys.linear(2)
     record = toys.record(model, np.random.default_rng(3).normal(size=(30, 2)), parameters={"th0": 3.0, "th1": -2.0})
     setup = Setup(model, 1.0, model.names("parameters"), model.names("outputs"))
-    found = Pem(setup, initial_state="given").fit(record)
-    assert found.status is Status.NOT_CONVERGED and np.isfinite(found.values()).all()
+    result = Pem(setup, initial_state="given").fit(record)
+    assert result.status is Status.NOT_CONVERGED and np.isfinite(result.values()).all()

@@ -46,24 +46,24 @@ def test_estimates_covariance_and_noise_are_those_of_lstsq(q: int, options: dict
     if "free" in options:
         options = {"initial_state": "estimated", **options}
     record = make_record(1, q)
-    found = fit(toys.linear(q), record, **options)
+    result = fit(toys.linear(q), record, **options)
     theta, covariance, noise = ordinary(record.inputs, record.outputs[:, 0])
-    np.testing.assert_allclose(found.values(), theta, rtol=1e-8)
-    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-6)
-    np.testing.assert_allclose(found.noise_std, noise, rtol=1e-8)
-    np.testing.assert_allclose([e.std for e in found.estimates], np.sqrt(np.diag(covariance)), rtol=1e-6)
-    assert found.status is Status.OK
+    np.testing.assert_allclose(result.values(), theta, rtol=1e-8)
+    np.testing.assert_allclose(result.covariance, covariance, rtol=1e-6)
+    np.testing.assert_allclose(result.noise_std, noise, rtol=1e-8)
+    np.testing.assert_allclose([e.std for e in result.estimates], np.sqrt(np.diag(covariance)), rtol=1e-6)
+    assert result.status is Status.OK
 
 
 @given(seed=st.integers(0, 10**6), q=st.integers(1, 3), rows=st.integers(12, 60))
 def test_any_record_gives_the_estimates_of_lstsq(seed: int, q: int, rows: int) -> None:
     """The covariance is scaled with a noise level that may be 1 % (its stopping rule) from the last one."""
     record = make_record(seed, q, rows=rows)
-    found = fit(toys.linear(q), record, initial_state="given")
+    result = fit(toys.linear(q), record, initial_state="given")
     theta, covariance, noise = ordinary(record.inputs, record.outputs[:, 0])
-    np.testing.assert_allclose(found.values(), theta, rtol=1e-7, atol=1e-8)
-    np.testing.assert_allclose(found.noise_std, noise, rtol=1e-7)
-    np.testing.assert_allclose(found.covariance, covariance, rtol=0.021, atol=1e-3 * covariance.max())
+    np.testing.assert_allclose(result.values(), theta, rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(result.noise_std, noise, rtol=1e-7)
+    np.testing.assert_allclose(result.covariance, covariance, rtol=0.021, atol=1e-3 * covariance.max())
 
 
 def test_missing_measurements_drop_out() -> None:
@@ -71,17 +71,17 @@ def test_missing_measurements_drop_out() -> None:
     record = make_record(2, 3)
     holes = np.zeros(len(record), dtype=bool)
     holes[[0, 3, 4, 5, 40, 79]] = True
-    found = fit(toys.linear(3), toys.measured_as(record, np.where(holes[:, None], np.nan, record.outputs)))
+    result = fit(toys.linear(3), toys.measured_as(record, np.where(holes[:, None], np.nan, record.outputs)))
     theta, covariance, noise = ordinary(record.inputs[~holes], record.outputs[~holes, 0])
-    np.testing.assert_allclose(found.values(), theta, rtol=1e-8)
-    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-6)
-    np.testing.assert_allclose(found.noise_std, noise, rtol=1e-8)
+    np.testing.assert_allclose(result.values(), theta, rtol=1e-8)
+    np.testing.assert_allclose(result.covariance, covariance, rtol=1e-6)
+    np.testing.assert_allclose(result.noise_std, noise, rtol=1e-8)
 
 
 def test_two_outputs_are_weighed_by_the_noise_that_each_of_them_leaves() -> None:
     """Iterated weighted least squares, computed with numpy; the second output is a hundred times noisier."""
     record = make_record(3, 2, m=2, rows=120, noise=(0.02, 2.0))
-    found = fit(toys.linear(2, 2), record, initial_state="given")
+    result = fit(toys.linear(2, 2), record, initial_state="given")
     X = record.inputs.reshape(-1, 2, 2)
     sigma = np.ones(2)
     for _ in range(30):
@@ -90,9 +90,9 @@ def test_two_outputs_are_weighed_by_the_noise_that_each_of_them_leaves() -> None
         sigma = np.sqrt(np.mean((record.outputs - X @ theta) ** 2, axis=0))
     dof = np.sqrt(240 / 238)
     std = dof * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
-    np.testing.assert_allclose(found.values(), theta, atol=float(0.01 * std.min()))
-    np.testing.assert_allclose([e.std for e in found.estimates], std, rtol=0.02)
-    np.testing.assert_allclose(found.noise_std, dof * sigma, rtol=1e-3)
+    np.testing.assert_allclose(result.values(), theta, atol=float(0.01 * std.min()))
+    np.testing.assert_allclose([e.std for e in result.estimates], std, rtol=0.02)
+    np.testing.assert_allclose(result.noise_std, dof * sigma, rtol=1e-3)
 
 
 @pytest.mark.parametrize("prior_std", [1e-3, 0.05, 10.0])
@@ -101,15 +101,15 @@ def test_prior_std_pulls_as_the_bayesian_formula_says(prior_std: float) -> None:
     model, generator = toys.linear(2, value=0.5, prior_std=prior_std), np.random.default_rng(4)
     truth, noise = {"th0": 0.6, "th1": 0.4}, 0.3 * generator.normal(size=(50, 1))
     record = toys.record(model, generator.normal(size=(50, 2)), parameters=truth, noise=noise)
-    found = fit(model, record, initial_state="given")
+    result = fit(model, record, initial_state="given")
     X, y = record.inputs, record.outputs[:, 0]
     sigma = 0.3
     for _ in range(30):
         information = X.T @ X / sigma**2 + np.eye(2) / prior_std**2
         theta = np.linalg.solve(information, X.T @ y / sigma**2 + 0.5 / prior_std**2)
         sigma = float(np.sqrt(np.sum((y - X @ theta) ** 2) / (len(y) - 2)))
-    np.testing.assert_allclose(found.values(), theta, atol=0.02 * np.sqrt(np.linalg.inv(information).max()))
-    np.testing.assert_allclose(found.covariance, np.linalg.inv(information), rtol=0.06, atol=1e-3 * prior_std**2)
+    np.testing.assert_allclose(result.values(), theta, atol=0.02 * np.sqrt(np.linalg.inv(information).max()))
+    np.testing.assert_allclose(result.covariance, np.linalg.inv(information), rtol=0.06, atol=1e-3 * prior_std**2)
 
 
 def test_where_the_record_says_nothing_the_prior_is_the_answer() -> None:
@@ -118,9 +118,9 @@ def test_where_the_record_says_nothing_the_prior_is_the_answer() -> None:
     generator = np.random.default_rng(5)
     inputs = np.column_stack([generator.normal(size=12), np.zeros(12)])
     record = toys.record(model, inputs, parameters={"th0": 1.0}, noise=0.1 * generator.normal(size=(12, 1)))
-    found = fit(model, record, initial_state="given")
-    assert found.estimates[1].value == pytest.approx(0.5)
-    assert found.estimates[1].std == pytest.approx(0.2, rel=0.01)
+    result = fit(model, record, initial_state="given")
+    assert result.estimates[1].value == pytest.approx(0.5)
+    assert result.estimates[1].std == pytest.approx(0.2, rel=0.01)
 
 
 def test_the_fit_does_not_depend_on_the_scale_of_the_unknowns() -> None:
@@ -134,13 +134,13 @@ def test_the_fit_does_not_depend_on_the_scale_of_the_unknowns() -> None:
 def test_the_next_prior_is_the_fit(model: Model) -> None:
     """What a recursive estimator goes on from: last state, values, covariance and noise level of the fit."""
     del model
-    found = fit(toys.linear(2), make_record(7, 2), initial_state="given")
-    prior = found.prior(79.0)
+    result = fit(toys.linear(2), make_record(7, 2), initial_state="given")
+    prior = result.prior(79.0)
     assert prior.time == 79.0
-    np.testing.assert_array_equal(prior.parameters, [e.value for e in found.estimates])
-    np.testing.assert_array_equal(prior.covariance, found.covariance)
-    np.testing.assert_array_equal(prior.noise_std, found.noise_std)
-    np.testing.assert_array_equal(prior.state, found.last_state)
+    np.testing.assert_array_equal(prior.parameters, [e.value for e in result.estimates])
+    np.testing.assert_array_equal(prior.covariance, result.covariance)
+    np.testing.assert_array_equal(prior.noise_std, result.noise_std)
+    np.testing.assert_array_equal(prior.state, result.last_state)
 
 
 def test_the_order_of_the_parameters_is_that_of_the_setup() -> None:
@@ -156,6 +156,6 @@ def test_the_order_of_the_parameters_is_that_of_the_setup() -> None:
 def test_parameters_that_are_not_fitted_stay() -> None:
     model = toys.linear(2, value=0.5)
     record = make_record(9, 2)
-    found = Pem(Setup(model, 1.0, ("th1",), ("y0",)), initial_state="given").fit(replace(record))
+    result = Pem(Setup(model, 1.0, ("th1",), ("y0",)), initial_state="given").fit(replace(record))
     theta, _, _ = ordinary(record.inputs[:, 1:], record.outputs[:, 0] - 0.5 * record.inputs[:, 0])
-    np.testing.assert_allclose(found.parameters, [0.5, theta[0]], rtol=1e-8)
+    np.testing.assert_allclose(result.parameters, [0.5, theta[0]], rtol=1e-8)

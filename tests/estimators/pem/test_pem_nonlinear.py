@@ -33,11 +33,11 @@ def test_noise_free_record_gives_back_parameters_and_initial_state(
     a: float, b: float, initial_state: InitialState
 ) -> None:
     record = toys.record(toys.decay(), INPUT, parameters={"a": a, "b": b}, x0=(0.7,))
-    found = fit_decay(record, initial_state)
+    result = fit_decay(record, initial_state)
     # the initial state has a prior, as wide as its scale, that a record without noise does not feel
-    np.testing.assert_allclose(found.values(), [a, b], rtol=1e-6)
-    np.testing.assert_allclose(found.initial_state, [0.7], rtol=1e-6)
-    np.testing.assert_allclose(found.last_state, record.outputs[-1], rtol=1e-6)
+    np.testing.assert_allclose(result.values(), [a, b], rtol=1e-6)
+    np.testing.assert_allclose(result.initial_state, [0.7], rtol=1e-6)
+    np.testing.assert_allclose(result.last_state, record.outputs[-1], rtol=1e-6)
 
 
 def test_steady_start_moves_with_the_parameters() -> None:
@@ -46,9 +46,9 @@ def test_steady_start_moves_with_the_parameters() -> None:
     record = toys.record(
         toys.decay(), inputs, parameters={"a": 0.8, "b": 2.0}, x0=(2.0 * inputs[0] / 0.8,), given=False
     )
-    found = fit_decay(record, "steady")
-    np.testing.assert_allclose(found.values(), [0.8, 2.0], rtol=1e-6)
-    np.testing.assert_allclose(found.initial_state, [2.0 * inputs[0] / 0.8], rtol=1e-6)
+    result = fit_decay(record, "steady")
+    np.testing.assert_allclose(result.values(), [0.8, 2.0], rtol=1e-6)
+    np.testing.assert_allclose(result.initial_state, [2.0 * inputs[0] / 0.8], rtol=1e-6)
 
 
 def test_spread_of_many_fits_is_the_covariance() -> None:
@@ -100,17 +100,17 @@ def cell_record(cell_case: CellCase, model: Model) -> CellRecord:
 def test_cell_parameters_are_found_within_four_standard_deviations(
     cell_record: CellRecord, initial_state: InitialState
 ) -> None:
-    found = Pem(cell_record.setup, initial_state=initial_state).fit(cell_record.record)
-    assert found.status is Status.OK
-    assert np.all(np.abs(found.values() - cell_record.truth) < 4 * np.sqrt(np.diag(found.covariance)))
-    np.testing.assert_allclose(found.noise_std, NOISE_STD, rtol=0.25)
+    result = Pem(cell_record.setup, initial_state=initial_state).fit(cell_record.record)
+    assert result.status is Status.OK
+    assert np.all(np.abs(result.values() - cell_record.truth) < 4 * np.sqrt(np.diag(result.covariance)))
+    np.testing.assert_allclose(result.noise_std, NOISE_STD, rtol=0.25)
 
 
 @pytest.mark.parametrize("initial_state", ["steady", "estimated"])
 def test_cell_fit_is_as_likely_as_the_truth(cell_record: CellRecord, initial_state: InitialState) -> None:
     """Twice the log-likelihood ratio is chi-squared (3 or 12 unknowns), whatever the shape of the n-C valley."""
     setup, record = cell_record.setup, cell_record.record
-    found = Pem(setup, initial_state=initial_state).fit(record)
+    result = Pem(setup, initial_state=initial_state).fit(record)
     columns = setup.model.indices("outputs", setup.outputs)
 
     def squares(x0: FloatArray, p: FloatArray) -> float:
@@ -119,7 +119,7 @@ def test_cell_fit_is_as_likely_as_the_truth(cell_record: CellRecord, initial_sta
 
     p = full_parameters(setup.model, setup.parameters, cell_record.truth)
     at_truth = squares(steady_state(setup.model, record.inputs[0], p).state, p)
-    assert 0.0 < at_truth - squares(found.initial_state, found.parameters) < 30.0
+    assert 0.0 < at_truth - squares(result.initial_state, result.parameters) < 30.0
 
 
 @pytest.mark.parametrize("initial_state", ["steady", "estimated"])

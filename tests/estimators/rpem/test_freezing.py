@@ -40,12 +40,12 @@ def test_the_starved_direction_is_held_and_the_other_goes_on() -> None:
     The memory is 10 s, so the first samples of that time still know the difference from those before.  What the
     difference still moves by is what is left of them.
     """
-    found = run(starved_record(), freeze_s=10.0)
-    theta = np.array([e.parameters for e in found])
-    assert {e.status for e in found[110:120]} == {Status.LOW_INFORMATION}
+    tracked = run(starved_record(), freeze_s=10.0)
+    theta = np.array([e.parameters for e in tracked])
+    assert {e.status for e in tracked[110:120]} == {Status.LOW_INFORMATION}
     np.testing.assert_allclose(theta[105:120, 0] - theta[105:120, 1], theta[104, 0] - theta[104, 1], atol=1e-4)
     assert np.abs(theta[110:120].sum(axis=1) - (3.0 + np.linspace(0, 1, 180)[110:120])).max() < 0.15
-    assert {e.status for e in found[150:]} == {Status.OK}, "it thaws when the inputs move again"
+    assert {e.status for e in tracked[150:]} == {Status.OK}, "it thaws when the inputs move again"
     assert np.abs(theta[-1] - [1.5, 2.5]).max() < 0.15
 
 
@@ -59,9 +59,9 @@ def test_where_data_say_enough_nothing_changes() -> None:
 
 def test_the_covariance_of_a_held_direction_grows_to_what_is_forgotten_to() -> None:
     """Held is not known: the estimate says that it knows the direction only as well as A."""
-    found = run(starved_record(), freeze_s=10.0)
+    tracked = run(starved_record(), freeze_s=10.0)
     difference = np.array([1.0, -1.0]) / np.sqrt(2)
-    spread = [float(difference @ e.covariance @ difference) for e in found]
+    spread = [float(difference @ e.covariance @ difference) for e in tracked]
     assert spread[119] > 10 * spread[59]
     assert spread[119] <= 0.3**2 * (1 + 1e-9)
 
@@ -90,16 +90,16 @@ def test_a_cell_held_still_freezes_the_ridge_and_keeps_predicting(cell_case: Cel
     for sample, y in zip(still, blind, strict=True):
         sample.outputs[0] = y + 1e-3 * generator.standard_normal()
     estimator = Rpem(setup, gradient="recursive", forgetting=0.9, forget_to=0.05, freeze_s=60.0)
-    found = replay(estimator, prior, tuple(still))
-    assert {e.status for e in found[300:]} == {Status.LOW_INFORMATION}
-    assert np.abs([e.prediction[0] for e in found[300:]] - blind[300:]).max() < 2e-3
+    tracked = replay(estimator, prior, tuple(still))
+    assert {e.status for e in tracked[300:]} == {Status.LOW_INFORMATION}
+    assert np.abs([e.prediction[0] for e in tracked[300:]] - blind[300:]).max() < 2e-3
 
 
 def _predict(setup: Setup, prior: Prior, theta: FloatArray, samples: list[Sample]) -> tuple[list[Estimate], FloatArray]:
     """Free run with the true parameters."""
     sure = Prior(prior.time, prior.state, theta, 1e-24 * prior.covariance, prior.noise_std)
-    found = replay(Rpem(setup), sure, tuple(samples))
-    return found, np.array([e.prediction[0] for e in found])
+    tracked = replay(Rpem(setup), sure, tuple(samples))
+    return tracked, np.array([e.prediction[0] for e in tracked])
 
 
 @pytest.mark.parametrize("seed", [2, 3])
@@ -107,8 +107,8 @@ def test_missing_samples_do_not_thaw_or_starve_by_themselves(seed: int) -> None:
     """The memory is in time: a gap lets information fade, and what comes after it is judged anew."""
     samples = starved_record(seed)[:60]
     gap = [Sample(61.0 + k, np.ones(2), np.full(1, np.nan)) for k in range(200)]
-    found = run([*samples, *gap, Sample(261.0, np.array([1.0, 0.0]), np.array([1.0]))], freeze_s=10.0)
-    assert found[59].status is Status.OK
-    assert {e.status for e in found[60:-1]} == {Status.MISSING}
-    assert found[-1].status is Status.LOW_INFORMATION
-    np.testing.assert_array_equal(found[-1].parameters, found[59].parameters)
+    tracked = run([*samples, *gap, Sample(261.0, np.array([1.0, 0.0]), np.array([1.0]))], freeze_s=10.0)
+    assert tracked[59].status is Status.OK
+    assert {e.status for e in tracked[60:-1]} == {Status.MISSING}
+    assert tracked[-1].status is Status.LOW_INFORMATION
+    np.testing.assert_array_equal(tracked[-1].parameters, tracked[59].parameters)

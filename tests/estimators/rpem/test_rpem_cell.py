@@ -25,13 +25,13 @@ def test_estimates_are_those_of_the_scipy_reference(cell_case: CellCase, gradien
     reference = scipy_reference.rpem(
         case.x0, case.prior.parameters, case.prior.covariance / NOISE_STD**2, case.inputs, grade, forgetting=0.98
     )
-    found = replay(Rpem(case.setup, forgetting=0.98, gradient=gradient), case.prior, case.samples)  # type: ignore[arg-type]
-    np.testing.assert_allclose([e.parameters for e in found], reference.theta, rtol=1e-4)
-    np.testing.assert_allclose([e.prediction[0] for e in found], reference.grade, rtol=1e-4)
-    np.testing.assert_allclose([e.state for e in found], reference.states, rtol=1e-4)
-    np.testing.assert_allclose(found[-1].covariance, NOISE_STD**2 * reference.inverse_hessian, rtol=1e-3)
+    tracked = replay(Rpem(case.setup, forgetting=0.98, gradient=gradient), case.prior, case.samples)  # type: ignore[arg-type]
+    np.testing.assert_allclose([e.parameters for e in tracked], reference.theta, rtol=1e-4)
+    np.testing.assert_allclose([e.prediction[0] for e in tracked], reference.grade, rtol=1e-4)
+    np.testing.assert_allclose([e.state for e in tracked], reference.states, rtol=1e-4)
+    np.testing.assert_allclose(tracked[-1].covariance, NOISE_STD**2 * reference.inverse_hessian, rtol=1e-3)
     # the record moves the estimates by more than the tolerance
-    assert np.all(np.abs(found[-1].parameters / case.prior.parameters - 1) > 1e-3)
+    assert np.all(np.abs(tracked[-1].parameters / case.prior.parameters - 1) > 1e-3)
 
 
 def test_central_differences_and_exact_gradient_agree(cell_case: CellCase) -> None:
@@ -56,9 +56,9 @@ def test_without_prior_uncertainty_it_is_the_fixed_estimator(cell_case: CellCase
 
 def test_prediction_is_the_step_from_the_last_state_with_the_last_estimate(cell_case: CellCase) -> None:
     """What (thetaupdate) means by the one-step prediction, re-done with the fixed estimator sample by sample."""
-    found = replay(Rpem(cell_case.setup), cell_case.prior, cell_case.samples)
+    tracked = replay(Rpem(cell_case.setup), cell_case.prior, cell_case.samples)
     fixed = Fixed(cell_case.setup)
-    for before, now, sample in zip(found, found[1:], cell_case.samples[1:], strict=False):
+    for before, now, sample in zip(tracked, tracked[1:], cell_case.samples[1:], strict=False):
         start = Prior(before.time, before.state, before.parameters, before.covariance, cell_case.prior.noise_std)
         _, expected = fixed.update(fixed.init(start), sample)
         np.testing.assert_allclose(now.prediction, expected.prediction, rtol=1e-11)
@@ -90,11 +90,11 @@ def test_estimates_are_projected_onto_their_bounds_and_say_so(cell_case: CellCas
     """The status is PROJECTED exactly where an estimate lies on a bound, and the estimate never leaves them."""
     setup = replace(cell_case.setup, model=_bounded(cell_case.setup.model, cell_case.setup.parameters, 0.004))
     low, high = 0.996 * cell_case.prior.parameters, 1.004 * cell_case.prior.parameters
-    found = replay(Rpem(setup), cell_case.prior, cell_case.samples)
-    on_bound = [bool((e.parameters == low).any() or (e.parameters == high).any()) for e in found]
-    assert [e.status is Status.PROJECTED for e in found] == on_bound
-    assert 5 < sum(on_bound) < len(found), "the case must have both kinds of sample"
-    assert all((low <= e.parameters).all() and (e.parameters <= high).all() for e in found)
+    tracked = replay(Rpem(setup), cell_case.prior, cell_case.samples)
+    on_bound = [bool((e.parameters == low).any() or (e.parameters == high).any()) for e in tracked]
+    assert [e.status is Status.PROJECTED for e in tracked] == on_bound
+    assert 5 < sum(on_bound) < len(tracked), "the case must have both kinds of sample"
+    assert all((low <= e.parameters).all() and (e.parameters <= high).all() for e in tracked)
 
 
 @pytest.mark.parametrize("estimator", [Rpem, Fixed])

@@ -72,17 +72,17 @@ def test_it_is_recursive_least_squares_where_the_free_run_is_linear_in_the_param
     """
     model, inputs, regressors, measured, prior = regression_case()
     zero = Stepper(model, 1.0).simulate(prior.state, inputs, np.zeros(2)).outputs[:, 0]
-    found = run(model, inputs, (measured + zero)[:, None], prior, forgetting=forgetting, forget_to=share)
+    tracked = run(model, inputs, (measured + zero)[:, None], prior, forgetting=forgetting, forget_to=share)
     towards = np.zeros((2, 2)) if share is None else np.eye(2) / share**2
     theta, R, sigma = prior.parameters, np.linalg.inv(prior.covariance), prior.noise_std[0]
     for k, (psi, y) in enumerate(zip(regressors, measured, strict=True)):
         R = forgetting * R + (1 - forgetting) * towards + np.outer(psi, psi) / sigma**2
         theta = theta + np.linalg.solve(R, psi) * (y - psi @ theta) / sigma**2
-        np.testing.assert_allclose(found[k].parameters, theta, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(found[k].covariance, np.linalg.inv(R), rtol=1e-9, atol=1e-9)
-    end = Stepper(model, 1.0).simulate(prior.state, inputs, found[-1].parameters).states[-1]
-    np.testing.assert_allclose(found[-1].state, end, rtol=1e-9)
-    assert np.abs(found[-1].parameters - [2.0, -0.5]).max() < 0.3, "the record tells b and d"
+        np.testing.assert_allclose(tracked[k].parameters, theta, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(tracked[k].covariance, np.linalg.inv(R), rtol=1e-9, atol=1e-9)
+    end = Stepper(model, 1.0).simulate(prior.state, inputs, tracked[-1].parameters).states[-1]
+    np.testing.assert_allclose(tracked[-1].state, end, rtol=1e-9)
+    assert np.abs(tracked[-1].parameters - [2.0, -0.5]).max() < 0.3, "the record tells b and d"
 
 
 def test_the_one_step_gradient_is_another_estimator_there() -> None:
@@ -104,10 +104,10 @@ def test_without_a_state_the_gradients_agree(q: int, m: int, forgetting: float) 
     generator = np.random.default_rng(q + m)
     model, inputs, measured = toys.linear(q, m), generator.normal(size=(40, m * q)), generator.normal(size=(40, m))
     prior = Prior(0.0, np.zeros(1), np.zeros(q), np.eye(q), np.ones(m))
-    found = run(model, inputs, measured, prior, forgetting=forgetting)
+    tracked = run(model, inputs, measured, prior, forgetting=forgetting)
     setup = Setup(model, 1.0, model.names("parameters"), model.names("outputs"))
     samples = tuple(Sample(k + 1.0, u, y) for k, (u, y) in enumerate(zip(inputs, measured, strict=True)))
-    for a, b in zip(found, replay(Rpem(setup, forgetting=forgetting), prior, samples), strict=True):
+    for a, b in zip(tracked, replay(Rpem(setup, forgetting=forgetting), prior, samples), strict=True):
         np.testing.assert_allclose(a.parameters, b.parameters, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-12)
 
@@ -182,9 +182,9 @@ def test_the_compiled_update_is_the_recursion_written_out_in_numpy(cell_case: Ce
     thetas, predictions = Recursion(cell_case.setup).run(prior, list(samples), stabilised(0.9, 0.05))
     # the study forgets after a sample, the estimator before the next: the first differs by what the prior forgets
     start = replace(prior, covariance=_unforgotten(cell_case, 0.9, 0.05))
-    found = replay(rpem_full(cell_case.setup, freeze_s=None), start, samples)
-    np.testing.assert_allclose([e.parameters for e in found], thetas, rtol=1e-7)
-    np.testing.assert_allclose([e.prediction[0] for e in found], predictions, rtol=1e-7)
+    tracked = replay(rpem_full(cell_case.setup, freeze_s=None), start, samples)
+    np.testing.assert_allclose([e.parameters for e in tracked], thetas, rtol=1e-7)
+    np.testing.assert_allclose([e.prediction[0] for e in tracked], predictions, rtol=1e-7)
 
 
 def _unforgotten(case: CellCase, factor: float, share: float) -> FloatArray:
@@ -208,6 +208,6 @@ def test_on_the_cascaded_tanks_the_full_recursion_predicts_better(shared_file: C
     )
     errors = []
     for estimator in (Rpem(setup), rpem_full(setup)):
-        found = np.array([e.innovation[0] for e in replay(estimator, prior, samples)])
-        errors.append(float(np.sqrt(np.mean(found[len(found) // 2 :] ** 2))))
+        tracked = np.array([e.innovation[0] for e in replay(estimator, prior, samples)])
+        errors.append(float(np.sqrt(np.mean(tracked[len(tracked) // 2 :] ** 2))))
     assert errors[1] < 0.7 * errors[0], errors

@@ -43,11 +43,11 @@ def run_rpem(case: Case, **options: float) -> list[Estimate]:
     setup = Setup(model, 1.0, model.names("parameters"), model.names("outputs"))
     estimator = Rpem(setup, forgetting=case.forgetting, **options)  # type: ignore[arg-type]
     state = estimator.init(Prior(0.0, np.zeros(1), case.theta, case.covariance, case.noise))
-    found = []
+    tracked = []
     for k in range(rows):
         state, estimate = estimator.update(state, Sample(k + 1.0, case.regressors[k].ravel(), case.measured[k]))
-        found.append(estimate)
-    return found
+        tracked.append(estimate)
+    return tracked
 
 
 def block_least_squares(case: Case) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -69,17 +69,17 @@ def block_least_squares(case: Case) -> tuple[FloatArray, FloatArray, FloatArray]
 @pytest.mark.parametrize(("q", "m"), [(1, 1), (3, 1), (2, 2), (3, 4)])
 def test_estimates_and_covariances_are_those_of_the_block_recursion(q: int, m: int, forgetting: float) -> None:
     case = make_case(7, q, m, forgetting)
-    found = run_rpem(case)
+    tracked = run_rpem(case)
     thetas, covariances, _ = block_least_squares(case)
-    np.testing.assert_allclose([e.parameters for e in found], thetas, rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose([e.covariance for e in found], covariances, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose([e.parameters for e in tracked], thetas, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose([e.covariance for e in tracked], covariances, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize(("q", "m"), [(2, 1), (2, 3)])
 def test_innovation_std_is_that_of_the_whole_innovation_before_any_output_was_used(q: int, m: int) -> None:
     case = make_case(3, q, m, 0.97)
-    found = run_rpem(case)
-    np.testing.assert_allclose([e.innovation_std for e in found], block_least_squares(case)[2], rtol=1e-10)
+    tracked = run_rpem(case)
+    np.testing.assert_allclose([e.innovation_std for e in tracked], block_least_squares(case)[2], rtol=1e-10)
 
 
 @given(seed=st.integers(0, 10**6), q=st.integers(1, 4), m=st.integers(1, 3), forgetting=st.floats(0.8, 1.0))
@@ -118,12 +118,12 @@ def test_a_sample_without_measurement_changes_and_forgets_nothing() -> None:
     measured = case.measured[gaps]
     measured[1::2] = np.nan
     with_gaps = Case(case.regressors[gaps], measured, case.theta, case.covariance, case.noise, 0.9)
-    found, plain = run_rpem(with_gaps), run_rpem(case)
+    tracked, plain = run_rpem(with_gaps), run_rpem(case)
     for k, e in enumerate(plain):
-        for same in found[2 * k : 2 * k + 2]:
+        for same in tracked[2 * k : 2 * k + 2]:
             np.testing.assert_array_equal(same.parameters, e.parameters)
             np.testing.assert_array_equal(same.covariance, e.covariance)
-    assert [e.status for e in found] == [Status.OK, Status.MISSING] * 20
+    assert [e.status for e in tracked] == [Status.OK, Status.MISSING] * 20
 
 
 def test_l0_scale_multiplies_the_prior_covariance() -> None:

@@ -42,10 +42,10 @@ def by_samples(estimator: Rpem, prior: Prior, time: FloatArray, u: FloatArray, y
     return Track.of(estimates)
 
 
-def same(found: Track, expected: Track) -> None:
-    assert found.statuses == expected.statuses
+def same(tracked: Track, expected: Track) -> None:
+    assert tracked.statuses == expected.statuses
     for name in ("time", "prediction", "innovation_std", "parameters", "covariance", "state"):
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-9, atol=1e-14, err_msg=name)
+        np.testing.assert_allclose(getattr(tracked, name), getattr(expected, name), rtol=1e-9, atol=1e-14, err_msg=name)
 
 
 @pytest.mark.parametrize(
@@ -56,9 +56,9 @@ def same(found: Track, expected: Track) -> None:
 def test_track_is_update_sample_by_sample(options: dict[str, Any]) -> None:
     """Missing measurements, and an absurd one that puts the estimate on its bounds."""
     estimator = Rpem(Setup(decay(), 0.5, ("a", "b"), ("y",)), forgetting=0.98, **options)
-    found = estimator.track(estimator.init(PRIOR), *record())
-    same(found, by_samples(estimator, PRIOR, *record()))
-    counts = Counter(found.statuses)
+    tracked = estimator.track(estimator.init(PRIOR), *record())
+    same(tracked, by_samples(estimator, PRIOR, *record()))
+    counts = Counter(tracked.statuses)
     assert counts[Status.MISSING] > 20 and counts[Status.OK] > 100
 
 
@@ -71,9 +71,9 @@ def test_a_block_with_a_sample_to_skip_is_taken_sample_by_sample() -> None:
     y = 1.0 + 0.1 * rng.standard_normal((ROWS, 1))
     estimator = Rpem(Setup(square(), 0.1, ("p",), ("y",)))
     time = instants(0.1)
-    found = estimator.track(estimator.init(prior), time, u, y)
-    same(found, by_samples(estimator, prior, time, u, y))
-    assert [k for k, s in enumerate(found.statuses) if s is Status.NOT_FINITE] == [BLOCK_ROWS + 20]
+    tracked = estimator.track(estimator.init(prior), time, u, y)
+    same(tracked, by_samples(estimator, prior, time, u, y))
+    assert [k for k, s in enumerate(tracked.statuses) if s is Status.NOT_FINITE] == [BLOCK_ROWS + 20]
 
 
 def test_the_end_of_a_track_is_where_an_estimator_goes_on() -> None:

@@ -45,11 +45,11 @@ def delayed(samples: list[Sample], delays: FloatArray) -> list[Sample]:
 
 def run(estimator: DelayedMeasurements | Rpem, samples: list[Sample]) -> list[Estimate]:
     state = estimator.init(Prior(0.0, np.zeros(1), np.zeros(2), np.eye(2), np.full(2, 0.1)))
-    found = []
+    estimates = []
     for sample in samples:
         state, estimate = estimator.update(state, sample)  # type: ignore[arg-type]
-        found.append(estimate)
-    return found
+        estimates.append(estimate)
+    return estimates
 
 
 @given(seed=st.integers(0, 10**6), delays=st.lists(st.integers(0, 8), min_size=ROWS - 9, max_size=ROWS - 9))
@@ -59,9 +59,9 @@ def test_in_whatever_order_values_arrive_the_last_estimate_is_that_of_the_whole_
     samples = make_samples(seed)
     shown = delayed(samples, np.array(delays + [0] * 9))
     estimator = DelayedMeasurements(Rpem(linear_setup(), forgetting=0.95), 10.0)
-    found, expected = run(estimator, shown)[-1], run(Rpem(linear_setup(), forgetting=0.95), samples)[-1]
-    np.testing.assert_array_equal(found.parameters, expected.parameters)
-    np.testing.assert_array_equal(found.covariance, expected.covariance)
+    estimates, expected = run(estimator, shown)[-1], run(Rpem(linear_setup(), forgetting=0.95), samples)[-1]
+    np.testing.assert_array_equal(estimates.parameters, expected.parameters)
+    np.testing.assert_array_equal(estimates.covariance, expected.covariance)
     np.testing.assert_array_equal([s.outputs for s in in_time(shown, linear_setup())], [s.outputs for s in samples])
 
 
@@ -79,8 +79,8 @@ def test_a_delayed_value_of_the_sample_itself_is_a_plain_measurement() -> None:
     alone = np.array([samples[7].outputs[0], np.nan])
     value = DelayedValue("y1", samples[7].time, samples[7].outputs[1])
     shown[7] = replace(samples[7], outputs=alone, delayed=(value,))
-    found, expected = run(DelayedMeasurements(Rpem(linear_setup()), 5.0), shown), run(Rpem(linear_setup()), samples)
-    for a, b in zip(found, expected, strict=True):
+    estimates, expected = run(DelayedMeasurements(Rpem(linear_setup()), 5.0), shown), run(Rpem(linear_setup()), samples)
+    for a, b in zip(estimates, expected, strict=True):
         np.testing.assert_array_equal(a.parameters, b.parameters)
         assert a.status is b.status
 

@@ -53,12 +53,12 @@ def test_likelihood_is_that_of_the_joint_gaussian_of_all_measurements() -> None:
 
 def test_a_walk_is_found() -> None:
     moves = 0.6 / 60.0 * np.random.default_rng(1).normal(size=(1500, 2))
-    found = most_likely_drift(*regression(1.0 + np.cumsum(moves, axis=0), noise=0.05))
-    assert found.drift_per_hour == pytest.approx(0.6, rel=0.25)
-    assert found.drift_per_hour < found.upper < 1.2
+    estimates = most_likely_drift(*regression(1.0 + np.cumsum(moves, axis=0), noise=0.05))
+    assert estimates.drift_per_hour == pytest.approx(0.6, rel=0.25)
+    assert estimates.drift_per_hour < estimates.upper < 1.2
 
 
 def test_parameters_at_rest_have_no_drift_but_a_short_record_allows_some() -> None:
-    found = most_likely_drift(*regression(np.ones((400, 2)), noise=0.05))
-    assert found.drift_per_hour < 0.1
-    assert found.upper > max(found.drift_per_hour, 10 * SLOWEST)
+    estimates = most_likely_drift(*regression(np.ones((400, 2)), noise=0.05))
+    assert estimates.drift_per_hour < 0.1
+    assert estimates.upper > max(estimates.drift_per_hour, 10 * SLOWEST)

@@ -84,11 +84,11 @@ def test_an_absurd_value_moves_the_estimate_by_a_few_standard_deviations_only(ce
 
 def test_estimates_of_the_cell_lie_within_their_uncertainty(cell_case: CellCase) -> None:
     """n and C rise by 5 % a minute; the drift given is about that of the record, the truth lies within 3 std."""
-    found = replay(Ekf(cell_case.setup, drift_per_hour=0.3), cell_case.prior, cell_case.samples)
+    tracked = replay(Ekf(cell_case.setup, drift_per_hour=0.3), cell_case.prior, cell_case.samples)
     truth = cell_case.prior.parameters * 1.05
-    std = np.sqrt(np.diag(found[-1].covariance))
-    assert np.all(np.abs(found[-1].parameters - truth) < 3 * std)
-    assert np.abs(found[-1].innovation[0]) < 5 * found[-1].innovation_std[0]
+    std = np.sqrt(np.diag(tracked[-1].covariance))
+    assert np.all(np.abs(tracked[-1].parameters - truth) < 3 * std)
+    assert np.abs(tracked[-1].innovation[0]) < 5 * tracked[-1].innovation_std[0]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -133,9 +133,9 @@ def test_a_first_record_that_said_nothing_along_the_ridge_is_no_end(cell_case: C
     open_ = cell_case.prior.covariance + 1e14 * np.outer(ridge, ridge)
     options = {"window_s": 12, "solve_every_s": 4} if name == "mhe" else {}
     estimator = load(name, ESTIMATORS, "estimator")(cell_case.setup, **options)
-    found = replay(estimator, replace(cell_case.prior, covariance=open_), cell_case.samples)
-    for e in found:
+    tracked = replay(estimator, replace(cell_case.prior, covariance=open_), cell_case.samples)
+    for e in tracked:
         assert np.isfinite(e.parameters).all() and np.isfinite(e.covariance).all() and np.isfinite(e.state).all()
         assert e.status in (Status.OK, Status.PROJECTED)
     grade = cell_case.setup.model.index("outputs", "concentrate_grade")
-    assert np.abs([e.innovation[grade] for e in found[-20:]]).mean() < 3e-3
+    assert np.abs([e.innovation[grade] for e in tracked[-20:]]).mean() < 3e-3

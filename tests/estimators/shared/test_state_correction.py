@@ -61,8 +61,8 @@ def matrices() -> tuple[FloatArray, FloatArray, FloatArray]:
     step = Stepper(SETUP.model, 1.0).call
 
     def end(x: list[float], u: float) -> tuple[FloatArray, FloatArray]:
-        found = step(np.array(x), 0.0, np.array([u]), np.array([1.0]))
-        return found[0], found[1]
+        tracked = step(np.array(x), 0.0, np.array([u]), np.array([1.0]))
+        return tracked[0], tracked[1]
 
     (a, ya), (b, yb), (c, _) = end([1, 0], 0), end([0, 1], 0), end([0, 0], 1)
     return np.column_stack([a, b]), c, np.array([[ya[1], yb[1]]])
@@ -79,23 +79,23 @@ def stationary_gain(state_noise: float) -> FloatArray:
 
 
 def test_the_gain_is_where_the_riccati_recursion_rests() -> None:
-    found = StateCorrection(SETUP, NOISE, 0.01).design(np.ones(2), 0.0, np.ones(1), np.ones(1), np.ones(1))
-    np.testing.assert_allclose(found.gain, stationary_gain(0.01), rtol=1e-8)
+    tracked = StateCorrection(SETUP, NOISE, 0.01).design(np.ones(2), 0.0, np.ones(1), np.ones(1), np.ones(1))
+    np.testing.assert_allclose(tracked.gain, stationary_gain(0.01), rtol=1e-8)
 
 
 def test_with_known_parameters_it_is_the_stationary_kalman_filter() -> None:
     """Sample by sample: x <- A x + B u + K (y - C x - D u); and, once that has settled, the EKF with the same noise."""
     samples, K, (A, B, C) = tank_samples(), stationary_gain(0.01), matrices()
     prior = Prior(0.0, np.array([1.0, 4.0]), np.array([1.4]), np.array([[1e-20]]), np.array([0.3]))
-    found = replay(Rpem(SETUP, correct_state=NOISE, state_noise=0.01), prior, samples)
+    tracked = replay(Rpem(SETUP, correct_state=NOISE, state_noise=0.01), prior, samples)
     x = prior.state
-    for sample, estimate in zip(samples, found, strict=True):
+    for sample, estimate in zip(samples, tracked, strict=True):
         ahead = Stepper(SETUP.model, 1.0).call(np.zeros(2), 0.0, sample.inputs, np.array([1.4]))[1][1]
         x = A @ x + 1.4 * B * sample.inputs + K[:, 0] * (sample.outputs[1] - C[0] @ x - ahead)
         np.testing.assert_allclose(estimate.state, x, rtol=1e-6)
     ekf = Ekf(replace(SETUP, outputs=("yb",)), drift_per_hour=0.0, state_noise=0.01)
     filtered = replay(ekf, replace(prior, noise_std=np.array([NOISE["yb"]])), samples)
-    np.testing.assert_allclose(found[-1].state, filtered[-1].state, rtol=1e-4)
+    np.testing.assert_allclose(tracked[-1].state, filtered[-1].state, rtol=1e-4)
 
 
 def test_with_the_full_gradient_it_is_least_squares_on_the_predictor() -> None:
@@ -103,7 +103,7 @@ def test_with_the_full_gradient_it_is_least_squares_on_the_predictor() -> None:
     samples, K, sigma = tank_samples(), stationary_gain(0.01), 0.3
     prior = Prior(0.0, np.array([1.0, 4.0]), np.array([0.5]), np.array([[4.0]]), np.array([sigma]))
     options: dict[str, Any] = {"gradient": "recursive", "forgetting": 1.0, "correct_state": NOISE, "state_noise": 0.01}
-    found = replay(Rpem(SETUP, **options), prior, samples)
+    tracked = replay(Rpem(SETUP, **options), prior, samples)
     step = Stepper(SETUP.model, 1.0).call
     runs = []
     for g in (0.0, 1.0):
@@ -115,7 +115,7 @@ def test_with_the_full_gradient_it_is_least_squares_on_the_predictor() -> None:
         runs.append(np.array(ys))
     psi, y = runs[1] - runs[0], np.array([s.outputs[0] for s in samples]) - runs[0]
     expected = (psi @ y / sigma**2 + 0.5 / 4.0) / (psi @ psi / sigma**2 + 1 / 4.0)
-    np.testing.assert_allclose(found[-1].parameters[0], expected, rtol=1e-9)
+    np.testing.assert_allclose(tracked[-1].parameters[0], expected, rtol=1e-9)
 
 
 def cell_run(case: CellCase, feed_step: float, **options: Any) -> tuple[list[Estimate], FloatArray]:
@@ -137,8 +137,8 @@ def test_level_and_tails_flow_follow_where_the_feed_flow_is_not_what_is_known(ce
     """A feed flow of 20 % more than measured: without correction the estimated level and tails flow are off by it."""
     errors = []
     for options in ({}, {"correct_state": MEASURED}):
-        found, truth = cell_run(cell_case, 0.2, **options)
-        errors.append(np.sqrt(np.mean((np.array([e.state for e in found]) - truth)[60:] ** 2, axis=0)))
+        tracked, truth = cell_run(cell_case, 0.2, **options)
+        errors.append(np.sqrt(np.mean((np.array([e.state for e in tracked]) - truth)[60:] ** 2, axis=0)))
     model = cell_case.setup.model
     for state in ("level", "tails_flow"):
         j = model.index("states", state)
@@ -148,8 +148,8 @@ def test_level_and_tails_flow_follow_where_the_feed_flow_is_not_what_is_known(ce
 def test_where_the_inputs_are_right_the_correction_adds_less_than_the_noise_of_the_instruments(
     cell_case: CellCase,
 ) -> None:
-    found, truth = cell_run(cell_case, 0.0, correct_state=MEASURED)
-    error = np.sqrt(np.mean((np.array([e.state for e in found]) - truth) ** 2, axis=0))
+    tracked, truth = cell_run(cell_case, 0.0, correct_state=MEASURED)
+    error = np.sqrt(np.mean((np.array([e.state for e in tracked]) - truth) ** 2, axis=0))
     for state, noise in MEASURED.items():
         assert error[cell_case.setup.model.index("states", state)] < noise / 2
 
@@ -182,8 +182,8 @@ def test_without_the_measurement_the_state_is_predicted_only(cell_case: CellCase
         outputs = np.full_like(sample.outputs, np.nan)
         outputs[0] = sample.outputs[0]
         blind.append(replace(sample, outputs=outputs))
-    found = replay(rpem_full(cell_case.setup, correct_state=MEASURED), cell_case.prior, tuple(blind))
-    for a, b in zip(found, replay(rpem_full(cell_case.setup), cell_case.prior, tuple(blind)), strict=True):
+    tracked = replay(rpem_full(cell_case.setup, correct_state=MEASURED), cell_case.prior, tuple(blind))
+    for a, b in zip(tracked, replay(rpem_full(cell_case.setup), cell_case.prior, tuple(blind)), strict=True):
         np.testing.assert_allclose(a.state, b.state, rtol=1e-12)
         np.testing.assert_allclose(a.parameters, b.parameters, rtol=1e-9)
         assert a.status is b.status
@@ -193,15 +193,15 @@ def test_a_delayed_level_is_as_good_as_one_in_time(cell_case: CellCase) -> None:
     setup = cell_case.setup
     level = setup.model.index("outputs", "level")
     estimator = DelayedMeasurements(Rpem(setup, correct_state=MEASURED), 20.0)
-    state, found = estimator.init(cell_case.prior), []
+    state, tracked = estimator.init(cell_case.prior), []
     value = DelayedValue("level", cell_case.samples[10].time, float(cell_case.samples[10].outputs[level]))
     for k, sample in enumerate(cell_case.samples):
         outputs = sample.outputs.copy()
         outputs[level] = np.nan if k == 10 else outputs[level]
         delayed = (value,) if k == 25 else ()
         state, estimate = estimator.update(state, replace(sample, outputs=outputs, delayed=delayed))
-        found.append(estimate)
+        tracked.append(estimate)
     expected = replay(Rpem(setup, correct_state=MEASURED), cell_case.prior, cell_case.samples)
-    assert found[25].status is Status.DELAYED
-    assert not np.array_equal(found[20].state, expected[20].state)
-    np.testing.assert_array_equal(found[-1].state, expected[-1].state)
+    assert tracked[25].status is Status.DELAYED
+    assert not np.array_equal(tracked[20].state, expected[20].state)
+    np.testing.assert_array_equal(tracked[-1].state, expected[-1].state)
