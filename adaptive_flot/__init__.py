@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from adaptive_flot.greybox.model import Model
     from adaptive_flot.greybox.quantities import KnownEffect, Parameter, Quantity
     from adaptive_flot.greybox.scope import Scope
-    from adaptive_flot.runner.scenario.scenario import load_scenario
+    from adaptive_flot.runner.scenario.loading import load_scenario
 
     __version__: str
 
@@ -61,7 +61,7 @@ _HOMES = {
     "Scope": "greybox.scope",
     "discover": "api.finding",
     "estimate": "api.estimation",
-    "load_scenario": "runner.scenario.scenario",
+    "load_scenario": "runner.scenario.loading",
     "read_dataset": "greybox.data.dataset",
     "run": "api.runs",
     "simulate": "api.simulation",

@@ -20,7 +20,7 @@ from adaptive_flot.report.kit import page as report
 from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
 from adaptive_flot.runner.commands.estimate import RecordEstimate
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 PIPE_WIDTH = 140

@@ -9,7 +9,7 @@ from adaptive_flot.console import print_fits, progress_bar
 from adaptive_flot.report.run.page import write_run_report
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_summary, write_json
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 
 SCENARIOS = ("paper_scenario_1", "paper_scenario_2", "paper_scenario_1_step", "paper_scenario_2_step")
 SEEDS = tuple(range(1, 21))

@@ -30,9 +30,12 @@ from scipy.stats import chi2
 
 from adaptive_flot.greybox.data.tables import read_table, write_table
 from adaptive_flot.metrics import normalised_error_squared
-from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 SCENARIOS = ("paper_scenario_1", "paper_scenario_2")
 BOUND = "bound"
@@ -47,7 +50,7 @@ def run_part(scenario: Scenario, estimators: Sequence[str], seed: int) -> dict[s
     """Fits, and NEES every tenth row over the time of the fits: a table of one row for each estimator."""
     found: dict[str, dict[str, object]] = {}
     if BOUND in estimators:
-        true = TrueRun(scenario, seed, scenario.schedule(seed))
+        true = TrueRun(Realisation(scenario, seed), Realisation(scenario, seed).schedule)
         allowed = dict(zip(("n", "C"), true.fits(true.limit()), strict=True))
         found[BOUND] = {**allowed, "concentrate_grade": np.nan, "nees": [np.nan]}
     names = [name for name in estimators if name != BOUND]

@@ -27,7 +27,7 @@ from adaptive_flot.runner.commands.comparison import Comparison, Contender, comp
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_summary
 from adaptive_flot.runner.commands.runs_table import read_runs, run_rows
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from benchmarks.speed import Figure
 
 SCENARIOS = (

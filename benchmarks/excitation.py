@@ -24,8 +24,10 @@ from adaptive_flot.greybox.cramer_rao_bound import walk
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun
+from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.profiles import InputProfile
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 ESTIMATORS = ("ekf", "imm")
 SEEDS = 5
@@ -71,7 +73,7 @@ def medians(scenario: Scenario, estimators: Sequence[str], seeds: Sequence[int])
     bounds: list[list[FloatArray]] = []
     ties = []
     for seed in seeds:
-        run = TrueRun(scenario, seed, scenario.schedule(seed))
+        run = TrueRun(Realisation(scenario, seed), Realisation(scenario, seed).schedule)
         P = run.limit()
         late = P[scenario.initial_rows :]
         walking = walk(len(P), WALK * run.adapted[0] * np.sqrt(scenario.dt / 3600.0))

@@ -22,7 +22,8 @@ from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.starts import record_of
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
 
 SCENARIOS = ("paper_scenario_1", "paper_scenario_2")
 SEEDS = tuple(range(101, 107))
@@ -152,7 +153,7 @@ class Recursion:
 def record(name: str, seed: int) -> tuple[Prior, list[PlantRecord]]:
     """Initial estimate of a scenario and what the plant showed from then on."""
     scenario = load_scenario(name)
-    shown = simulate_plant(scenario, seed)
+    shown = simulate_plant(Realisation(scenario, seed))
     first = [Step(Decision(r.inputs, Status.OK, "schedule"), r, None) for r in shown[: scenario.initial_rows]]
     fit = Prepared.of(scenario).batch.fit(record_of(scenario, scenario.setup, first))
     return fit.prior(first[-1].plant.sample.time), shown[scenario.initial_rows :]

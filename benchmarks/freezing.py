@@ -12,9 +12,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.keys import Plugin
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 
 SCENARIO, CONTROLLER = "closed_loop_drift_down", "economic_mpc"
 SEEDS = tuple(range(1, 6))

@@ -14,7 +14,9 @@ from rich.table import Table
 from adaptive_flot.contracts import Prior, full_parameters
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 from estimators.shared.drift import DriftFit, most_likely_drift
 
 SCENARIOS = ("paper_scenario_1", "random_walk")
@@ -26,7 +28,7 @@ START_STD = 0.1
 
 def start(scenario: Scenario, seed: int) -> Prior:
     """Steady at parameters near the nominal ones, which are known to 10 %."""
-    setup, inputs = scenario.setup, scenario.schedule(seed)[0]
+    setup, inputs = scenario.setup, Realisation(scenario, seed).schedule[0]
     theta = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)] * OFF
     p = full_parameters(setup.model, setup.parameters, theta)
     x = steady_state(setup.model, inputs, p).state
@@ -38,7 +40,7 @@ def start(scenario: Scenario, seed: int) -> Prior:
 
 def fits(scenario: Scenario, seed: int) -> tuple[DriftFit, DriftFit]:
     """Drift from the first part of a run and from all of it."""
-    samples = [record.sample for record in simulate_plant(scenario, seed)]
+    samples = [record.sample for record in simulate_plant(Realisation(scenario, seed))]
     prior = start(scenario, seed)
     first = most_likely_drift(scenario.setup, prior, samples[: scenario.initial_rows])
     return first, most_likely_drift(scenario.setup, prior, samples)

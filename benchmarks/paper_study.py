@@ -20,7 +20,9 @@ from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.keys import Measurement, Plugin
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 from estimators.rpem.estimator import Rpem
 
 SEEDS = tuple(range(1, 11))
@@ -66,7 +68,7 @@ def ridge_factors(scenario: Scenario, seed: int, prior: Prior) -> FloatArray:
     grade = model.index("outputs", scenario.setup.outputs[0])
     state = estimator.init(prior)
     factors = []
-    for record in simulate_plant(scenario, seed)[scenario.initial_rows :]:
+    for record in simulate_plant(Realisation(scenario, seed))[scenario.initial_rows :]:
         old, sample = state, record.sample
         state, estimate = estimator.update(old, sample)
         inverse_hessian = old.covariance / old.noise_std[0] ** 2 / np.outer(scale, scale)

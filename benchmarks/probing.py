@@ -21,9 +21,11 @@ from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot.runner.commands.comparison import Spread
-from adaptive_flot.runner.commands.run import Run, run_scenario
-from adaptive_flot.runner.scenario.keys import Case
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.keys import CaseEntry
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 SCENARIO = "closed_loop_drift_down"
 SEEDS = 5
@@ -79,7 +81,7 @@ def with_probing(scenario: Scenario) -> Scenario:
         name: own.model_copy(update={"options": own.options | {"probing": options}})
         for name, options in OPTIONS.items()
     }
-    cases = [Case(controller=controller, estimator=estimator) for controller, estimator in CASES]
+    cases = [CaseEntry(controller=controller, estimator=estimator) for controller, estimator in CASES]
     file = scenario.file.model_copy(update={"controllers": {PLAIN: own} | probing, "cases": cases})
     return replace(scenario, file=file)
 

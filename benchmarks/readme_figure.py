@@ -11,7 +11,7 @@ from adaptive_flot.files import replace_path
 from adaptive_flot.report.kit import figures
 from adaptive_flot.report.run import closed_loop, series
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 
 FOLDER = Path(__file__).parents[1] / "docs"
 CLOSED_LOOP = ("air flow", "concentrate grade", "recovery")

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.plugins import ESTIMATORS, load
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from benchmarks.forgetting import record
 
 ONLINE = ("rpem", "rpem_full")

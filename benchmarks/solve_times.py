@@ -22,7 +22,9 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks.speed import Figure
 from controllers.economic_mpc.controller import EconomicMpc
 from controllers.economic_mpc.nlp_solvers import SOLVERS
@@ -63,7 +65,12 @@ class Ours:
 def setup_of(scenario: Scenario) -> ControllerSetup:
     """What a controller of a scenario is built for."""
     return ControllerSetup(
-        scenario.model, scenario.dt, scenario.plan(1), scenario.setup.parameters, scenario.limits, scenario.prices
+        scenario.model,
+        scenario.dt,
+        Realisation(scenario, 1).plan,
+        scenario.setup.parameters,
+        scenario.limits,
+        scenario.prices,
     )
 
 
@@ -92,7 +99,7 @@ class Lane:
 
 def closed_loops(scenario: Scenario, controllers: dict[str, Decides], moves: int = MOVES) -> dict[str, Lane]:
     """Run the controllers on `scenario`'s cell while C rises by 20 % and then n by 10 %; times and realised value."""
-    model, theta, held = scenario.model, scenario.model.parameter_values, scenario.schedule(1)[0]
+    model, theta, held = scenario.model, scenario.model.parameter_values, Realisation(scenario, 1).schedule[0]
     x0, step = steady_state(model, held).state, Stepper(model, scenario.dt)
     lanes = {name: Lane(name, decide, x0, held) for name, decide in controllers.items()}
     drift = dict(zip(("C", "n"), ((1.2, 0.1, 0.4), (1.1, 0.5, 0.8)), strict=True))

@@ -22,7 +22,9 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks import scipy_reference
 from estimators.rpem.estimator import Rpem
 
@@ -65,8 +67,8 @@ class _Record:
 
 def _record() -> _Record:
     scenario = load_scenario("paper_scenario_1")
-    model, schedule = scenario.model, scenario.schedule(1)
-    samples = [record.sample for record in simulate_plant(scenario, 1)]
+    model, schedule = scenario.model, Realisation(scenario, 1).schedule
+    samples = [record.sample for record in simulate_plant(Realisation(scenario, 1))]
     start = steady_state(model, schedule[scenario.initial_rows]).state
     nominal = scipy_reference.THETA_NOMINAL.copy()
     prior = Prior(600.0, start, nominal, np.diag((0.01 * nominal) ** 2), np.array([1e-3]))
@@ -133,7 +135,7 @@ def _scipy_rpem(record: _Record, method: scipy_reference.Method) -> Callable[[],
 def simulation_figures() -> list[Figure]:
     """2400 s at 1 s: fast step and accurate integrator."""
     scenario = load_scenario("paper_scenario_1")
-    schedule, p = scenario.schedule(1), scenario.true_parameters(1)
+    schedule, p = Realisation(scenario, 1).schedule, Realisation(scenario, 1).parameters
     x0 = steady_state(scenario.model, schedule[0]).state
     figures = []
     for name, stepper, limit in (

@@ -25,8 +25,11 @@ class Oracle:
     ----------
     setup
         Model, sampling interval, adapted parameters, and the true parameters (N, np), row k for the interval that
-        starts at k dt. The runner gives them to the estimator named `oracle` and to no other.
+        starts at k dt. The runner gives them to estimators with `needs_truth` and to no other.
     """
+
+    needs_truth = True
+    """Asks the runner for the truth; no estimator that runs on a plant can."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup

@@ -16,10 +16,12 @@ from adaptive_flot.api.progress import counted
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ResultError, ScenarioError, near_match
 from adaptive_flot.report.kit.page import seed_list
-from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

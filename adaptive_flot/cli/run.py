@@ -27,7 +27,7 @@ def run(
     from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
     from adaptive_flot.runner.commands.run import run_scenario
     from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
-    from adaptive_flot.runner.scenario.scenario import load_scenario
+    from adaptive_flot.runner.scenario.loading import load_scenario
 
     loaded = load_scenario(scenario)
     loaded = loaded.compiled() if can_compile(compile_) else loaded

@@ -9,7 +9,7 @@ def scenarios() -> None:
     """List the shipped scenarios with a line each."""
     import yaml
 
-    from adaptive_flot.runner.scenario.scenario import shipped_scenarios
+    from adaptive_flot.runner.scenario.loading import shipped_scenarios
 
     shipped = shipped_scenarios()
     width = max(map(len, shipped), default=0)

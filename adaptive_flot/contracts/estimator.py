@@ -28,7 +28,8 @@ class Setup:
     outputs
         Names of the measured outputs that drive the adaptation.
     truth
-        True parameters (N, np), row k for the interval that starts at k dt: for the oracle only, None for all others.
+        True parameters (N, np), row k for the interval that starts at k dt; None for all estimators but those
+        whose class says `needs_truth = True` (the oracle).
     """
 
     model: Model

@@ -15,7 +15,8 @@ from adaptive_flot.plugins import module_file
 from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
 from adaptive_flot.runner.scenario.keys import Plugin
-from adaptive_flot.runner.scenario.scenario import Scenario, find_scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.yaml_problems import first_problem
 
 Seed = Annotated[int, Field(ge=0)]

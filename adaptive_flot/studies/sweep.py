@@ -17,6 +17,7 @@ from distributed import Client, Future, KilledWorker, as_completed
 
 from adaptive_flot.errors import AdaptiveFlotError, StudyError, located
 from adaptive_flot.runner.loop.prepared import Prepared
+from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.studies import worker
 from adaptive_flot.studies.cluster import connected
 from adaptive_flot.studies.folder import locked
@@ -136,12 +137,13 @@ def _check_plugins(groups: Sequence[_Group], study: Study) -> None:
     used = {(g.order.path, g.controller, c.estimator) for g in groups for c in g.cases}
     for arm in study.arms:
         prepared = Prepared(arm.scenario, arm.estimators, arm.controllers)
+        first = Realisation(arm.scenario, study.seeds[0])
         mine = [(controller, estimator) for path, controller, estimator in used if path == arm.scenario.path]
         with located(study.path):
             for controller in sorted({c for c, _ in mine}):
-                prepared.controller(controller, study.seeds[0])
+                prepared.controller(controller, first, arm.scenario.setup)
             for estimator in sorted({e for _, e in mine}):
-                prepared.estimator(estimator, study.seeds[0])
+                prepared.estimator(estimator, first)
 
 
 def _results(client: Client, groups: Sequence[_Group]) -> Iterator[list[worker.Result]]:

@@ -19,7 +19,8 @@ from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.commands.runs_table import run_rows
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.keys import Plugin
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.studies.grid import content_hash
 
 TIMES = ("seconds", "solve_median_s", "solve_p99_s")
@@ -82,7 +83,7 @@ def fit_start(order: Order, controller: str, seed: int) -> BatchFit | str:
     with _turn:
         prepared = _prepare(order)
         try:
-            return initial_fit(prepared, controller, seed)
+            return initial_fit(prepared, controller, Realisation(prepared.scenario, seed))
         except PluginError:
             raise
         except Exception as error:
@@ -119,8 +120,9 @@ def run(
         with _turn:
             begin = time.perf_counter(), time.process_time()
             prepared = _prepare(order)
-            found = run_one(prepared, estimator, controller, seed, {} if start is None else {"fit": start})
-            row = run_rows(plain(run_summary(prepared.scenario, [found])))[0]
+            realisation = Realisation(prepared.scenario, seed)
+            finished = run_one(prepared, estimator, controller, realisation, {} if start is None else {"fit": start})
+            row = run_rows(plain(run_summary(prepared.scenario, [finished])))[0]
     except (PluginError, StudyError):
         raise
     except Exception as error:

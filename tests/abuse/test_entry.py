@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from adaptive_flot.errors import ScenarioError
-from adaptive_flot.runner.scenario import scenario as scenarios
+from adaptive_flot.runner.scenario import loading
 from tests.cli.conftest import Call
 
 
@@ -18,7 +18,7 @@ def _fails_with(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def fails() -> None:
         raise error
 
-    monkeypatch.setattr(scenarios, "shipped_scenarios", fails)
+    monkeypatch.setattr(loading, "shipped_scenarios", fails)
 
 
 def test_a_defect_is_one_line_with_its_place_and_exit_code_1(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

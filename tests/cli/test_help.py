@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from adaptive_flot.cli import app
-from adaptive_flot.runner.scenario.scenario import shipped_scenarios
+from adaptive_flot.runner.scenario.loading import shipped_scenarios
 from tests.cli.conftest import Call
 
 COMMANDS = [c.callback.__name__.replace("_", "-") for c in app.registered_commands if c.callback is not None]

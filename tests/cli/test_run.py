@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.cli.conftest import Call, WriteScenario
 
 OWN = """

@@ -16,9 +16,11 @@ from adaptive_flot.report.kit.strips import Strip, spells, strip_figure
 from adaptive_flot.report.run import closed_loop, series
 from adaptive_flot.report.run.page import run_report
 from adaptive_flot.report.run.series import Case
-from adaptive_flot.runner.commands.run import Run, run_scenario
+from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import write_runs
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.report.test_run_report import Links
 
 Result = tuple[Scenario, list[Run]]

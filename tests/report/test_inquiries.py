@@ -17,7 +17,7 @@ from adaptive_flot.runner.adaptation.extension import Extension, Finding
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.runner.adaptation.test_discovery_in_the_loop import CLOSED, GROWTH, OPTIONS
 from tests.runner.conftest import edited
 

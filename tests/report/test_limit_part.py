@@ -13,7 +13,9 @@ from adaptive_flot.report.run.cramer_rao_limit import limit_part
 from adaptive_flot.report.run.series import Case, cases
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 
 def short(scenario: Scenario, **changes: object) -> Scenario:
@@ -37,8 +39,8 @@ def test_ratios_are_errors_over_bounds_pooled_over_the_seeds(case: Case) -> None
     for i, (label, row) in enumerate(zip("nC", part.table.rows, strict=True)):
         tables = [case.shown(run) for run in case.of("ekf")]
         error = rmse(np.concatenate([t[f"{label}_estimate"] - t[f"{label}_true"] for t in tables]))
-        schedule = [(seed, case.scenario.schedule(seed)) for seed in (1, 2)]
-        limits = [TrueRun(case.scenario, seed, inputs).limit()[100:, i, i] for seed, inputs in schedule]
+        schedule = [(seed, Realisation(case.scenario, seed).schedule) for seed in (1, 2)]
+        limits = [TrueRun(Realisation(case.scenario, seed), inputs).limit()[100:, i, i] for seed, inputs in schedule]
         assert float(row[3]) == pytest.approx(error / np.sqrt(np.mean(limits)), abs=0.006)
         assert float(row[2]) < float(row[1]), "more sensors do not lower the bound"
 

@@ -16,8 +16,10 @@ from adaptive_flot.report.run import series
 from adaptive_flot.report.run.findings import below_published, candidates, findings, swing_share
 from adaptive_flot.report.run.page import run_report, write_run_report
 from adaptive_flot.report.run.tables import fits_table, status_table
-from adaptive_flot.runner.commands.run import Run, run_scenario
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 Result = tuple[Scenario, list[Run]]
 

@@ -14,7 +14,7 @@ from adaptive_flot.greybox.stepping import compiled as machine_code
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.commands.runs_table import read_runs, run_rows
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.studies import worker
 from adaptive_flot.studies.folder import locked
 from adaptive_flot.studies.study_file import load_study

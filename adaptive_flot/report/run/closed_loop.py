@@ -13,7 +13,7 @@ from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 from adaptive_flot.report.kit.strips import Strip
 from adaptive_flot.report.run.series import Case, changes
 from adaptive_flot.runner.commands.comparison import ORACLE
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 
 
 def colours(case: Case) -> dict[str, tuple[Role, int]]:

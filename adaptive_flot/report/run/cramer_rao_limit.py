@@ -15,8 +15,9 @@ from adaptive_flot.report.kit import figures
 from adaptive_flot.report.kit.page import Album, Picture, Table, number, seed_list
 from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 from adaptive_flot.report.run.series import Case
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
+from adaptive_flot.runner.scenario.realisation import Realisation
 
 MOST_SEEDS = 3
 """Seeds whose bounds are computed; each takes about as long as a run."""
@@ -75,7 +76,7 @@ def _bounds(case: Case, run: Run, sensors: Mapping[str, float], seen: dict[bytes
     inputs = run.table[acted].to_numpy()
     key = run.seed.to_bytes(8, "little") + inputs.tobytes()
     if key not in seen:
-        true = TrueRun(case.scenario, run.seed, inputs)
+        true = TrueRun(Realisation(case.scenario, run.seed), inputs)
         shown = run.table["time_s"].to_numpy() > case.scenario.fits_after + 1e-9
         seen[key] = _Bounds(true.limit()[shown], true.limit(more=sensors)[shown])
     return seen[key]

@@ -14,7 +14,7 @@ from adaptive_flot.report.kit.page import number
 from adaptive_flot.report.kit.plotdata import Role
 from adaptive_flot.report.run.series import Case, residuals
 from adaptive_flot.report.run.tables import SIGNIFICANT, coverage, median, quantities, relative_error
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 
 TIED = 0.8
 """Correlation of the errors of two parameters from which they are said to lie along one line."""

@@ -13,7 +13,7 @@ from adaptive_flot.report.kit.plotdata import Role
 from adaptive_flot.report.kit.style import exponent, unit_text
 from adaptive_flot.report.run.series import Case, residuals
 from adaptive_flot.runner.commands.estimate import WHITENESS_LAGS
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 
 SIGNIFICANT = 0.05
 """p value below which innovations are called not white."""

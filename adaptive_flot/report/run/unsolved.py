@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from adaptive_flot.report.kit.page import Table, number
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 
 MOST_ROWS = 10
 

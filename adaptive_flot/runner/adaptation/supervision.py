@@ -12,6 +12,7 @@ from adaptive_flot.greybox.model import Model
 from adaptive_flot.runner.loop.loop import Running, Step
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.plants.fault_injection import with_controller_faults
+from adaptive_flot.runner.scenario.realisation import Realisation
 
 if TYPE_CHECKING:
     from adaptive_flot.runner.adaptation.inquiry import Inquiry
@@ -43,7 +44,7 @@ class Unwatched:
 
 
 @contextmanager
-def supervision(prepared: Prepared, estimator: str, controller: str, seed: int) -> Iterator[Supervises]:
+def supervision(prepared: Prepared, estimator: str, controller: str, realisation: Realisation) -> Iterator[Supervises]:
     """Supervisor of a run; a search that is still at work when the run ends, in whatever way, ends with it."""
     options = prepared.scenario.file.discovery
     if options is None or estimator not in prepared.scenario.watched:
@@ -52,9 +53,9 @@ def supervision(prepared: Prepared, estimator: str, controller: str, seed: int) 
     from adaptive_flot.runner.adaptation.supervisor import Supervisor
 
     def rebuild(model: Model) -> tuple[AnyEstimator, AnyController]:
-        setup = replace(prepared.setup(estimator, seed), model=model)
-        made = with_controller_faults(prepared.scenario, prepared.controller_for(controller, seed, setup))
-        return prepared.estimator_for(estimator, setup), made
+        setup = replace(prepared.setup(estimator, realisation), model=model)
+        made = prepared.controller(controller, realisation, setup)
+        return prepared.new_estimator(estimator, setup), with_controller_faults(prepared.scenario, made)
 
     supervisor = Supervisor(options, rebuild)
     try:

@@ -3,7 +3,8 @@
 Map
 ---
 run.py             Run a scenario for estimators, controllers and seeds.
-run_files.py       Files that a run leaves.
+run_result.py      What one run leaves behind.
+run_files.py       Files that a run writes.
 runs_table.py      One row a run.
 comparison.py      Controllers and estimators side by side.
 fingerprint.py     What a scenario asks of its controllers: only like is compared with like.

@@ -12,8 +12,8 @@ import pandas as pd
 
 from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.commands.run import Run
 from adaptive_flot.runner.commands.run_files import run_summary
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.commands.runs_table import run_rows
 from adaptive_flot.runner.scenario.scenario import Scenario
 

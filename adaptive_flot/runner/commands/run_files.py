@@ -14,7 +14,7 @@ import numpy as np
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run import Run
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 

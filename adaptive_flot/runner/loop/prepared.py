@@ -12,6 +12,7 @@ from adaptive_flot.contracts.delayed_measurements import taking_delayed_values
 from adaptive_flot.errors import ScenarioError, near_match
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 
@@ -19,7 +20,7 @@ from adaptive_flot.runner.scenario.scenario import Scenario
 class Prepared:
     """A scenario and its plug-ins.
 
-    An estimator is a frozen configuration (`Estimator`), so all seeds can share one; a controller is built for the
+    An estimator is a frozen configuration (`Estimator`), so all seeds can share one. A controller is built for the
     schedule of its run.
 
     Attributes
@@ -48,42 +49,40 @@ class Prepared:
         moved = {name: controller_plugin(scenario, name) for name in controllers} or dict(scenario.file.controllers)
         return cls(scenario, chosen, moved)
 
-    def setup(self, name: str, seed: int) -> Setup:
-        """What the estimator of a run is built for; only the oracle is shown the truth, and the plant's model."""
+    def setup(self, name: str, realisation: Realisation) -> Setup:
+        """What the estimator of a run is built for; one with `needs_truth` gets the truth, and the plant's model."""
         s = self.scenario
-        if self.estimators[name].use != "oracle":
+        if not self._needs_truth(name):
             return s.setup
         known = tuple(p for p in s.setup.parameters if p in s.plant_model.names("parameters"))
-        return replace(s.setup, model=s.plant_model, parameters=known, truth=s.true_parameters(seed))
+        return replace(s.setup, model=s.plant_model, parameters=known, truth=realisation.parameters)
 
     def shares_fit(self, name: str) -> bool:
         """Whether runs with this estimator see the same first part as all others: not where its model is another."""
-        return self.estimators[name].use != "oracle" or self.scenario.plant_model is self.scenario.model
+        return self.scenario.plant_model is self.scenario.model or not self._needs_truth(name)
 
-    def estimator(self, name: str, seed: int) -> AnyEstimator:
-        """The estimator of that name for the run of a seed: one for all, but where it is told the truth."""
-        key = f"{name}-{seed}" if self.estimators[name].use == "oracle" else name
-        if key not in self._built:
-            self._built[key] = self.estimator_for(name, self.setup(name, seed))
-        return self._built[key]
+    def estimator(self, name: str, realisation: Realisation) -> AnyEstimator:
+        """The estimator of that name for a run: one for all runs, but where it is shown the truth."""
+        if self._needs_truth(name):
+            return self.new_estimator(name, self.setup(name, realisation))
+        if name not in self._built:
+            self._built[name] = self.new_estimator(name, self.scenario.setup)
+        return self._built[name]
 
-    def estimator_for(self, name: str, setup: Setup) -> AnyEstimator:
-        """A new estimator of that name for another setup."""
+    def new_estimator(self, name: str, setup: Setup) -> AnyEstimator:
+        """A new estimator of that name for a setup."""
         made = self.estimators[name].make(setup, ESTIMATORS, "estimator", self.scenario.path.parent)
         return taking_delayed_values(made, self.scenario.longest_dead_time)
 
-    def controller(self, name: str, seed: int, estimator: str | None = None) -> AnyController:
-        """A controller of that name for the run of a seed, with the model of the estimator that it listens to."""
-        return self.controller_for(
-            name, seed, self.scenario.setup if estimator is None else self.setup(estimator, seed)
-        )
-
-    def controller_for(self, name: str, seed: int, told: Setup) -> AnyController:
-        """A controller of that name for the run of a seed and an estimator with that setup."""
+    def controller(self, name: str, realisation: Realisation, listens_to: Setup) -> AnyController:
+        """A controller of that name for a run, with the model of the estimator that it listens to."""
         s = self.scenario
-        setup = ControllerSetup(told.model, s.dt, s.plan(seed), told.parameters, s.limits, s.prices)
+        setup = ControllerSetup(listens_to.model, s.dt, realisation.plan, listens_to.parameters, s.limits, s.prices)
         made: AnyController = self.controllers[name].make(setup, CONTROLLERS, "controller", s.path.parent)
         return made
+
+    def _needs_truth(self, name: str) -> bool:
+        return self.estimators[name].needs_truth(self.scenario.path.parent)
 
     @cached_property
     def batch(self) -> BatchEstimator:

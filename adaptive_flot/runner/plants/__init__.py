@@ -3,8 +3,7 @@
 Map
 ---
 plant.py              A simulated plant, and a measured record that is replayed.
-scenario_plant.py     The simulated plant of a scenario's run, with its noise and drift.
-disturbances.py       What the plant imposes beside the controller.
+scenario_plant.py     The simulated plant of a run, from its scenario and seed.
 true_outputs.py       Outputs without what effects on sensors make them show.
 fault_injection.py    Puts the faults of a scenario between plant and controller.
 faulty_plant.py       Instruments and actuators that fail.

@@ -10,7 +10,7 @@ import numpy as np
 
 from adaptive_flot.contracts import AnyPlant, DelayedValue, PlantRecord, Sample
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.runner.scenario.faults import Fault, Frozen, SensorFault, SlowAnalyser, Stuck
+from adaptive_flot.runner.scenario.faults import Frozen, PlantFault, SensorFault, SlowAnalyser, Stuck
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,9 @@ class FaultyPlant:
         Uniform random numbers in [0, 1) for each interval and fault (N, number of faults, 2).
     """
 
-    def __init__(self, plant: AnyPlant, faults: Sequence[Fault], model: Model, dt: float, draws: FloatArray) -> None:
+    def __init__(
+        self, plant: AnyPlant, faults: Sequence[PlantFault], model: Model, dt: float, draws: FloatArray
+    ) -> None:
         self._plant = plant
         self._faults = tuple(enumerate(faults))
         self._model = model
@@ -82,7 +84,7 @@ class FaultyPlant:
         after = FaultyState(inner, state.row + 1, record.inputs, self._shown(state, sample), pending)
         return after, replace(record, sample=sample, faults=(*failed, *broken, *slow))
 
-    def _acting(self, time: float) -> list[tuple[int, Fault]]:
+    def _acting(self, time: float) -> list[tuple[int, PlantFault]]:
         return [(i, fault) for i, fault in self._faults if fault.acts(time)]
 
     def _actuators(self, state: FaultyState, inputs: FloatArray) -> tuple[FloatArray, list[int], list[str]]:

@@ -12,25 +12,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.plants.true_outputs import TrueOutputs
-
-
-@dataclass(frozen=True)
-class Disturbances:
-    """What acts on a plant beside the controller, and what its instruments show of it, a row an interval.
-
-    Attributes
-    ----------
-    inputs
-        Inputs (N, nu) that are not the controller's to choose, NaN where they are.
-    shown
-        The same as measured or assumed, for `Sample.inputs`.
-    parameters
-        Known parameter vectors (N, np), for `Sample.parameters`; None where no parameter is measured.
-    """
-
-    inputs: FloatArray
-    shown: FloatArray
-    parameters: FloatArray | None = None
+from adaptive_flot.runner.scenario.disturbances import Disturbances
 
 
 @dataclass(frozen=True)

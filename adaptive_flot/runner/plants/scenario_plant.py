@@ -1,34 +1,29 @@
-"""The simulated plant of a scenario's run: its own drift, disturbances and noise, from its seed."""
+"""The simulated plant of a run, made from its scenario and seed."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from adaptive_flot.contracts import PlantRecord
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.runner.plants.disturbances import disturbances
 from adaptive_flot.runner.plants.plant import SimulatedPlant
+from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 
-def make_plant(scenario: Scenario, seed: int, model: Model | None = None) -> SimulatedPlant:
+def make_plant(realisation: Realisation, model: Model | None = None) -> SimulatedPlant:
     """Plant of a run, with its own effects, drift and noise.
 
-    `model` is that of the estimator and the controller, whose parameters the plant's instruments tell.
+    `model` is that of the estimator and the controller: the plant's instruments show its parameters.
     """
-    parameters = scenario.true_parameters(seed)
-    x0 = initial_state(scenario, scenario.plant_model, scenario.schedule(seed)[0], parameters[0])
-    noise = measurement_noise(scenario, seed)
-    accurate = scenario.file.plant.integrator == "accurate"
+    scenario = realisation.scenario
     return SimulatedPlant(
         scenario.plant_model,
         scenario.dt,
-        x0,
-        parameters,
-        noise,
-        disturbances=disturbances(scenario, seed, model),
-        accurate=accurate,
+        initial_state(scenario, scenario.plant_model, realisation.schedule[0], realisation.parameters[0]),
+        realisation.parameters,
+        realisation.measurement_noise,
+        disturbances=realisation.disturbances(model),
+        accurate=scenario.file.plant.integrator == "accurate",
         dead_time=scenario.dead_times,
     )
 
@@ -43,19 +38,11 @@ def initial_state(scenario: Scenario, model: Model, inputs: FloatArray, paramete
     return x0
 
 
-def simulate_plant(scenario: Scenario, seed: int) -> list[PlantRecord]:
+def simulate_plant(realisation: Realisation) -> list[PlantRecord]:
     """What the plant of a run shows under the planned inputs, one record an interval, without any estimator."""
-    plant = make_plant(scenario, seed)
+    plant = make_plant(realisation)
     state, records = plant.init(), []
-    for inputs in scenario.schedule(seed):
+    for inputs in realisation.schedule:
         state, record = plant.apply(state, inputs)
         records.append(record)
     return records
-
-
-def measurement_noise(scenario: Scenario, seed: int) -> FloatArray:
-    """White Gaussian noise of a run (N, ny), the same for every estimator; NaN where nothing is measured."""
-    generator = np.random.default_rng([seed, 0])
-    std = scenario.noise_std()
-    noise = std * generator.standard_normal((len(scenario.starts), std.size))
-    return np.where(scenario.measured_at(), noise, np.nan)

@@ -13,6 +13,8 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state_gradient
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.plants.scenario_plant import initial_state
+from adaptive_flot.runner.scenario.measurement_noise import measured_at, noise_std
+from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 MORE_SENSORS = {"air_recovery": 0.01, "concentrate_flow": 0.01}
@@ -25,22 +27,24 @@ class TrueRun:
 
     Parameters
     ----------
-    scenario
-        The scenario; its plant must have all adapted parameters (see `has_limit`).
-    seed
-        Seed of the run.
+    realisation
+        What the seed of the run draws; the plant must have all adapted parameters (see `has_limit`).
     inputs
         Inputs that acted (N, nu); those of the schedule in open loop.
     """
 
-    scenario: Scenario
-    seed: int
+    realisation: Realisation
     inputs: FloatArray
 
-    @cached_property
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.realisation.scenario
+
+    @property
     def parameters(self) -> FloatArray:
         """True parameters of the plant's model (N, np)."""
-        return self.scenario.true_parameters(self.seed)
+        return self.realisation.parameters
 
     @cached_property
     def adapted(self) -> FloatArray:
@@ -95,7 +99,7 @@ class TrueRun:
     def _noise(self, more: Mapping[str, float]) -> FloatArray:
         s, model = self.scenario, self.scenario.plant_model
         driving = np.isin(np.arange(len(model.outputs)), model.indices("outputs", s.setup.outputs))
-        noise = np.where(s.measured_at() & driving, s.noise_std(), np.nan)
+        noise = np.where(measured_at(s) & driving, noise_std(s), np.nan)
         for name, share in more.items():
             j = model.index("outputs", name)
             noise[:, j] = share * np.abs(self.outputs[:, j]).mean()

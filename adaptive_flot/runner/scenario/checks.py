@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.runner.scenario.discovery_options import FEWEST
 from adaptive_flot.runner.scenario.faults import ControllerFault, SlowAnalyser, Stuck
-
-if TYPE_CHECKING:  # the scenario that is being loaded, which calls this
-    from adaptive_flot.runner.scenario.scenario import Scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 MOST_INTERVALS = 1e7
 """Longest run: its table still fits into memory."""
@@ -37,29 +34,38 @@ def check_scenario(scenario: Scenario) -> None:
     model.indices("outputs", file.measurements)
     with located("initial_estimate.guess"):
         model.with_parameters(file.initial_estimate.guess)
-    for seed in file.seeds:
-        check_truth(scenario, seed)
+    realisations = [Realisation(scenario, seed) for seed in file.seeds]
+    for realisation in realisations:
+        _check_parameters(realisation)
     _check_closed_loop(scenario)
     _check_initial_state(scenario)
     _check_disturbances(scenario)
     _check_faults(scenario)
     _check_discovery(scenario)
-    for seed in file.seeds:
-        model.check_inputs(scenario.schedule(seed), scenario.starts, where="inputs")
+    for realisation in realisations:
+        model.check_inputs(realisation.schedule, scenario.starts, where="inputs")
 
 
-def check_truth(scenario: Scenario, seed: int) -> None:
-    """Check that the plant's parameters stay within their range in the run of a seed.
+def check_realisation(realisation: Realisation) -> None:
+    """Check the inputs and the plant's parameters of a run, whose seed need not be one of the scenario's.
 
     Raises
     ------
+    RangeError
+        An input leaves the model's range.
     ModelError
-        They do not.
+        A parameter leaves its own.
     """
-    true, plant = scenario.true_parameters(seed), scenario.plant_model
+    s = realisation.scenario
+    s.model.check_inputs(realisation.schedule, s.starts, where=f"inputs of seed {realisation.seed}")
+    _check_parameters(realisation)
+
+
+def _check_parameters(realisation: Realisation) -> None:
+    plant = realisation.scenario.plant_model
     with located("parameters"):
-        for name in scenario.file.parameters:
-            values = true[:, plant.index("parameters", name)]
+        for name in realisation.scenario.file.parameters:
+            values = realisation.parameters[:, plant.index("parameters", name)]
             for extreme in (values.min(), values.max()):
                 plant.with_parameters({name: float(extreme)})
 
@@ -131,10 +137,10 @@ def _check_discovery(scenario: Scenario) -> None:
     for name in part.estimators or ():
         if name not in file.estimators:
             raise ScenarioError(f"discovery.estimators: {name!r} is not defined; {near_match(name, file.estimators)}")
-        if file.estimators[name].use == "oracle":
-            raise ScenarioError(f"discovery.estimators: {name!r} is an oracle, which lacks nothing; leave it out")
+        if file.estimators[name].needs_truth(scenario.path.parent):
+            raise ScenarioError(f"discovery.estimators: {name!r} is shown the truth and lacks nothing; leave it out")
     if not scenario.watched:
-        raise ScenarioError("discovery: there is no estimator to watch; add one that is no oracle")
+        raise ScenarioError("discovery: there is no estimator to watch; add one that is not shown the truth")
     for name in part.outputs or ():
         if name not in file.measurements:
             raise ScenarioError(f"discovery.outputs: {name!r} is not measured; {near_match(name, file.measurements)}")

@@ -17,7 +17,7 @@ class DiscoveryOptions(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     estimators: list[str] | None = Field(default=None, min_length=1)
-    """Names of the scenario's estimators that are watched; default all but an oracle."""
+    """Names of the scenario's estimators that are watched; default all that are not shown the truth."""
     outputs: list[str] | None = Field(default=None, min_length=1)
     """Outputs whose innovations are watched; default those that drive the adaptation. No estimator corrects others, so
     that their innovations also carry what the input measurements are off by."""

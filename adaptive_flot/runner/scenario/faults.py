@@ -12,8 +12,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
-class Window(BaseModel):
-    """When a fault acts [s]."""
+class Period(BaseModel):
+    """From when to when a fault acts [s]."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -22,7 +22,7 @@ class Window(BaseModel):
     """Default the end of the run."""
 
     @model_validator(mode="after")
-    def _order(self) -> Window:
+    def _order(self) -> Period:
         if self.to_s is not None and self.to_s <= self.from_s:
             raise ValueError("to_s must lie after from_s")
         return self
@@ -32,7 +32,7 @@ class Window(BaseModel):
         return self.from_s - 1e-9 <= time and (self.to_s is None or time < self.to_s - 1e-9)
 
 
-class Missing(Window):
+class Missing(Period):
     """A share of the measurements of an output does not come."""
 
     fault: Literal["missing"]
@@ -45,7 +45,7 @@ class Missing(Window):
         return math.nan if draws[0] < self.rate else value
 
 
-class Outliers(Window):
+class Outliers(Period):
     """A share of the measurements is off by `size`, in the output's unit, up or down."""
 
     fault: Literal["outliers"]
@@ -61,7 +61,7 @@ class Outliers(Window):
         return value + (self.size if draws[1] < 0.5 else -self.size)
 
 
-class Frozen(Window):
+class Frozen(Period):
     """An instrument repeats the last value that it showed before."""
 
     fault: Literal["frozen"]
@@ -73,7 +73,7 @@ class Frozen(Window):
         return frozen
 
 
-class SlowAnalyser(Window):
+class SlowAnalyser(Period):
     """An output comes from an analyser (or the laboratory) every `every_s` only, known `dead_time_s` later."""
 
     fault: Literal["slow_analyser"]
@@ -82,7 +82,7 @@ class SlowAnalyser(Window):
     dead_time_s: float = Field(default=0.0, ge=0)
 
 
-class Stuck(Window):
+class Stuck(Period):
     """An actuator stays where it was whatever is asked of it; `measured`: a flow meter shows what really flows."""
 
     fault: Literal["stuck"]
@@ -90,20 +90,19 @@ class Stuck(Window):
     measured: bool = False
 
 
-class SolverFailure(Window):
+class SolverFailure(Period):
     """The controller's optimisations fail."""
 
     fault: Literal["solver_failure"]
 
 
-class NanState(Window):
+class NanState(Period):
     """The state estimate that the controller gets is not a number."""
 
     fault: Literal["nan_state"]
 
 
 SensorFault = Missing | Outliers | Frozen
+PlantFault = Missing | Outliers | Frozen | SlowAnalyser | Stuck
 ControllerFault = SolverFailure | NanState
-Fault = Annotated[
-    Missing | Outliers | Frozen | SlowAnalyser | Stuck | SolverFailure | NanState, Field(discriminator="fault")
-]
+Fault = Annotated[PlantFault | ControllerFault, Field(discriminator="fault")]

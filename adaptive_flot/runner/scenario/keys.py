@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
-from adaptive_flot.plugins import construct, load
+from adaptive_flot.plugins import ESTIMATORS, construct, load
 from adaptive_flot.processes.effect_entry import EffectEntry
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
@@ -104,8 +104,21 @@ class Plugin(_Part):
         PluginError
             It can not be loaded, or does not take the options.
         """
-        factory = self._factory or load(self.use, shipped, what, folder)
-        return construct(factory, self.use, what, setup, **self.options)
+        return construct(self._load(shipped, what, folder), self.use, what, setup, **self.options)
+
+    def needs_truth(self, folder: Path | None = None) -> bool:
+        """Whether it is an estimator that is shown the true parameters: its class says `needs_truth = True`.
+
+        Raises
+        ------
+        PluginError
+            It can not be loaded.
+        """
+        return bool(getattr(self._load(ESTIMATORS, "estimator", folder), "needs_truth", False))
+
+    def _load(self, shipped: Mapping[str, str], what: str, folder: Path | None) -> Callable[..., Any]:
+        factory: Callable[..., Any] = self._factory or load(self.use, shipped, what, folder)
+        return factory
 
 
 class LimitsPart(_Part):
@@ -126,7 +139,7 @@ class EconomicsPart(_Part):
     reagent_per_m3: float = Prices().reagent
 
 
-class Case(_Part):
+class CaseEntry(_Part):
     """One combination to run."""
 
     estimator: str
@@ -166,7 +179,7 @@ class ScenarioFile(_Part):
     initial_estimate: InitialEstimate
     estimators: dict[str, Plugin] = Field(min_length=1)
     controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
-    cases: list[Case] = Field(default_factory=list)
+    cases: list[CaseEntry] = Field(default_factory=list)
     """Combinations of estimator and controller; default all."""
     discovery: DiscoveryOptions | None = None
     """Search for what the model lacks while the loop runs; default no search."""

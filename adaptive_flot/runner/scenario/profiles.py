@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.runner.scenario.random_streams import Stream, generator
 
 
 class _Profile(BaseModel):
@@ -59,9 +60,9 @@ class Random(_Profile):
 
     def values(self, time: FloatArray, seed: int) -> FloatArray:
         """Value held in the interval that starts at each time [s] (N,)."""
-        generator = np.random.default_rng([seed, 1] if self.seed == "per_run" else [self.seed, 2])
+        draw = generator(seed, Stream.INPUT_OF_RUN) if self.seed == "per_run" else generator(self.seed, Stream.INPUT)
         block = np.floor(time / self.every_s + 1e-9).astype(int)
-        levels: FloatArray = generator.uniform(*self.between, size=int(block[-1]) + 1)
+        levels: FloatArray = draw.uniform(*self.between, size=int(block[-1]) + 1)
         return np.take(levels, block)
 
 
@@ -140,10 +141,12 @@ class RandomWalk(_Profile):
 
     def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
         """Factor on the nominal value in the interval that starts at each time [s] (N,); another walk for each name."""
-        stream = [seed, 6] if self.seed == "per_run" else [self.seed, 7]
-        generator = np.random.default_rng([*stream, *name.encode()])
+        if self.seed == "per_run":
+            draw = generator(seed, Stream.RANDOM_WALK_OF_RUN, *name.encode())
+        else:
+            draw = generator(self.seed, Stream.RANDOM_WALK, *name.encode())
         walk = np.zeros(len(time))
-        moves = generator.standard_normal(len(time) - 1) * np.sqrt(np.diff(time) / 3600.0)
+        moves = draw.standard_normal(len(time) - 1) * np.sqrt(np.diff(time) / 3600.0)
         walk[1:] = self.share_per_hour * np.cumsum(np.where(time[1:] >= self.from_s - 1e-9, moves, 0.0))
         return np.exp(walk)
 

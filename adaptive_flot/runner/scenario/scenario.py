@@ -1,4 +1,4 @@
-"""Scenario files: YAML, validated once into frozen objects. Behind this file nobody sees a dictionary."""
+"""A scenario: what its file says, with the model and the plant that it names."""
 
 from __future__ import annotations
 
@@ -7,21 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
-import yaml
-from pydantic import ValidationError
 
 from adaptive_flot.contracts import Limits, Setup
-from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.processes.effect_entry import attach
 from adaptive_flot.processes.flotation.economics import Prices
-from adaptive_flot.processes.registry import make_model
-from adaptive_flot.resources import scenario_folder
-from adaptive_flot.runner.scenario.checks import check_scenario
-from adaptive_flot.runner.scenario.faults import SlowAnalyser
+from adaptive_flot.runner.scenario.faults import ControllerFault, PlantFault, SlowAnalyser
 from adaptive_flot.runner.scenario.keys import ScenarioFile
-from adaptive_flot.yaml_problems import first_problem
 
 
 @dataclass(frozen=True)
@@ -121,18 +112,8 @@ class Scenario:
         part = self.file.discovery
         if part is None:
             return ()
-        return tuple(part.estimators or (n for n, e in self.file.estimators.items() if e.use != "oracle"))
-
-    def schedule(self, seed: int) -> FloatArray:
-        """Planned inputs (N, nu) of a run."""
-        columns = [self.file.inputs[q.column].values(self.starts, seed) for q in self.model.inputs]
-        return np.column_stack(columns)
-
-    def plan(self, seed: int) -> FloatArray:
-        """Planned inputs (N, nu) as a controller may know them: disturbances keep their first value."""
-        plan = self.schedule(seed)
-        plan[:, self.imposed] = plan[0, self.imposed]
-        return plan
+        named, folder = self.file.estimators.items(), self.path.parent
+        return tuple(part.estimators or (name for name, plugin in named if not plugin.needs_truth(folder)))
 
     @property
     def imposed(self) -> list[int]:
@@ -148,14 +129,6 @@ class Scenario:
         parts = self.file.disturbances.items()
         return [self.model.index("parameters", key) for key, part in parts if key not in inputs and part.measured]
 
-    def true_parameters(self, seed: int) -> FloatArray:
-        """Parameters of the plant's model (N, np) in each interval of a run."""
-        p = np.tile(self.plant_model.parameter_values, (len(self.starts), 1))
-        for name, change in self.file.parameters.items():
-            column = self.plant_model.index("parameters", name)
-            p[:, column] *= change.factor(self.starts, seed, self.plant_model.parameters[column].name)
-        return p
-
     @property
     def dead_times(self) -> dict[str, float]:
         """Dead time of each output that is known with a delay [s]."""
@@ -167,82 +140,12 @@ class Scenario:
         slow = [f.dead_time_s for f in self.file.faults if isinstance(f, SlowAnalyser)]
         return max([*self.dead_times.values(), *slow], default=0.0)
 
-    def measured_at(self) -> npt.NDArray[np.bool_]:
-        """Whether each output is measured at the end of each interval (N, ny)."""
-        ends = self.starts + self.dt
-        measured = np.zeros((len(ends), len(self.model.outputs)), dtype=bool)
-        for name, m in self.file.measurements.items():
-            # the first sampling instant at or after each multiple of the period
-            counted = np.floor(np.concatenate([[0.0], ends]) / (m.every_s or self.dt) + 1e-9)
-            measured[:, self.model.index("outputs", name)] = np.diff(counted) > 0
-        return measured
+    @property
+    def plant_faults(self) -> list[PlantFault]:
+        """Faults of instruments and actuators, in the order of the file."""
+        return [fault for fault in self.file.faults if not isinstance(fault, ControllerFault)]
 
-    def noise_std(self) -> FloatArray:
-        """Noise of each output (ny,), NaN where it is not measured."""
-        std = np.full(len(self.model.outputs), np.nan)
-        for j, q in enumerate(self.model.outputs):
-            if q.name in self.file.measurements:
-                std[j] = self.file.measurements[q.name].noise_std
-        return std
-
-
-def shipped_scenarios() -> dict[str, Path]:
-    """Shipped scenario files by name."""
-    return {f.stem: f for f in sorted(scenario_folder().glob("*.yaml"))}
-
-
-def find_scenario(name: str) -> Path:
-    """Path of a scenario: a file, or the name of a shipped one.
-
-    Raises
-    ------
-    ScenarioError
-        Neither.
-    """
-    path = Path(name)
-    if path.is_file():
-        return path
-    shipped = shipped_scenarios()
-    if name in (path.stem, f"{path.stem}.yaml") and path.stem in shipped:
-        return shipped[path.stem]
-    raise ScenarioError(f"{name}: no such scenario file; shipped: {near_match(path.stem, shipped)}")
-
-
-def load_scenario(name: Path | str) -> Scenario:
-    """Read and check a scenario.
-
-    Raises
-    ------
-    ScenarioError
-        Unknown key (with the nearest one), wrong type, missing input, times that do not fit.
-    CellError, ModelError, RangeError, PluginError
-        The cell, a parameter name, an input value or the model is wrong.
-    """
-    path = find_scenario(str(name))
-    try:
-        content = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: not a YAML file ({' '.join(str(error).split())}); correct it") from error
-    if not isinstance(content, dict):
-        raise ScenarioError(f"{path}: holds no keys; see `adaptive-flot scenarios` for examples to copy")
-    try:
-        file = ScenarioFile.model_validate(content)
-    except ValidationError as error:
-        raise ScenarioError(f"{path}: {first_problem(error, ScenarioFile)}") from error
-    with located(path):
-        model = attach(make_model(file.model, cell=file.cell, folder=path.parent), file.effects)
-        plant = model
-        if file.plant.effects is not None:
-            plant = attach(model.without_effects(), file.plant.effects, "plant.effects")
-        scenario = Scenario(path.stem, path, file, model, _setup(file, model), plant)
-        check_scenario(scenario)
-    return scenario
-
-
-def _setup(file: ScenarioFile, model: Model) -> Setup:
-    parameters = model.expand_parameters(file.adapt.parameters)
-    outputs = tuple(model.outputs[i].name for i in model.indices("outputs", file.adapt.outputs))
-    unmeasured = [o for o in outputs if o not in file.measurements]
-    if unmeasured:
-        raise ScenarioError(f"adapt.outputs: {unmeasured[0]!r} is not among the measurements; add it there")
-    return Setup(model, file.sampling_s, parameters, outputs)
+    @property
+    def controller_faults(self) -> list[ControllerFault]:
+        """Faults inside the controller, in the order of the file."""
+        return [fault for fault in self.file.faults if isinstance(fault, ControllerFault)]

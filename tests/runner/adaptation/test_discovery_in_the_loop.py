@@ -25,8 +25,10 @@ from adaptive_flot.runner.adaptation import extension, supervisor
 from adaptive_flot.runner.adaptation.extension import Extension, Finding, search_record
 from adaptive_flot.runner.adaptation.whiteness_watch import Alarm
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run import Run, run_scenario
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
 from tests.runner.conftest import WriteScenario
 
 GROWTH = {
@@ -148,7 +150,7 @@ def test_a_named_effect_lowers_the_error(
     state of the record nothing is left of it; the alarm is the watch's own, and nothing is rewritten."""
     changes: dict[str, Any] = {"seeds": [1], "plant": {"effects": [GROWTH]}, "parameters": {}}
     scenario = load_scenario(write_scenario(changes))
-    start = steady_state(scenario.plant_model, scenario.schedule(1)[0]).state
+    start = steady_state(scenario.plant_model, Realisation(scenario, 1).schedule[0]).state
     truth = Extension((growth(0.6),), {}, start if fitted else None)
     finding = Finding(Verdict("named", "stub"), truth)
     monkeypatch.setattr(supervisor, "search_record", lambda setup, record, processes: finding)

@@ -16,9 +16,11 @@ from adaptive_flot.contracts import ControllerSetup, Prior, Setup
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from adaptive_flot.runner.commands.run import Run, run_scenario
-from adaptive_flot.runner.plants.scenario_plant import measurement_noise
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 from controllers.schedule import Schedule
 from estimators.fixed import Fixed, FixedState
 from tests.runner.conftest import DURATION, INITIAL, WriteScenario
@@ -73,7 +75,7 @@ def test_a_run_does_not_depend_on_what_ran_beside_it(scenario: Scenario, by_name
 
 def test_noise_is_white_gaussian_with_the_standard_deviation_of_the_file(write_scenario: WriteScenario) -> None:
     loaded = load_scenario(write_scenario({"duration_s": 5000}))
-    noise = measurement_noise(loaded, 3)
+    noise = Realisation(loaded, 3).measurement_noise
     for name, std in (("concentrate_grade", 1e-3), ("level", 2e-3)):
         own = noise[:, loaded.model.index("outputs", name)]
         assert own.std() == pytest.approx(std, rel=0.03) and abs(own.mean()) < 0.05 * std
@@ -87,7 +89,8 @@ def test_noise_is_white_gaussian_with_the_standard_deviation_of_the_file(write_s
 def test_noise_does_not_depend_on_how_long_the_run_is_or_what_else_is_adapted(write_scenario: WriteScenario) -> None:
     """So a shortened scenario is the beginning of the long one."""
     long, short = (
-        measurement_noise(load_scenario(write_scenario({"duration_s": d, "fits_after_s": 50})), 3) for d in (120, 60)
+        Realisation(load_scenario(write_scenario({"duration_s": d, "fits_after_s": 50})), 3).measurement_noise
+        for d in (120, 60)
     )
     np.testing.assert_array_equal(long[:60], short)
 
@@ -123,7 +126,7 @@ def test_row_k_holds_the_inputs_and_the_truth_of_the_interval_that_ends_there(
     """Row k is at (k + 1) dt and shows what the profiles say at the start of its interval, k dt."""
     run = by_name["rpem", 1]
     np.testing.assert_array_equal(column(run, "time_s"), np.arange(1.0, DURATION + 1))
-    np.testing.assert_array_equal(column(run, "air_flow_m3_s"), scenario.schedule(1)[:, 0])
+    np.testing.assert_array_equal(column(run, "air_flow_m3_s"), Realisation(scenario, 1).schedule[:, 0])
     air = column(run, "air_flow_m3_s")
     assert air[19] == 9.05e-4 and air[20] > air[19], "the first step is at 20 s: the row of 21 s is the first with it"
     true = column(run, "C_true")
@@ -132,7 +135,7 @@ def test_row_k_holds_the_inputs_and_the_truth_of_the_interval_that_ends_there(
 
 def test_truth_is_the_simulation_of_the_same_inputs(scenario: Scenario, by_name: Runs) -> None:
     """Open loop: `Stepper.simulate` from the steady state of the first inputs, in one call."""
-    model, schedule, p = scenario.model, scenario.schedule(1), scenario.true_parameters(1)
+    model, schedule, p = scenario.model, Realisation(scenario, 1).schedule, Realisation(scenario, 1).parameters
     x0 = steady_state(model, schedule[0], p[0]).state
     expected = Stepper(model, 1.0).simulate(x0, schedule, p)
     for j, q in enumerate(model.outputs):
@@ -140,7 +143,7 @@ def test_truth_is_the_simulation_of_the_same_inputs(scenario: Scenario, by_name:
 
 
 def test_measured_is_truth_plus_the_noise_of_the_seed(scenario: Scenario, by_name: Runs) -> None:
-    noise = measurement_noise(scenario, 1)[:, scenario.model.index("outputs", "concentrate_grade")]
+    noise = Realisation(scenario, 1).measurement_noise[:, scenario.model.index("outputs", "concentrate_grade")]
     run = by_name["fixed", 1]
     difference = column(run, "concentrate_grade_measured") - column(run, "concentrate_grade_true")
     np.testing.assert_allclose(difference, noise, atol=1e-15)
@@ -242,7 +245,7 @@ def test_the_truth_is_hidden_from_estimators_and_controllers(
     # `start: nominal` hands over the nominal values and the nominal model's own state, not the plant's
     np.testing.assert_array_equal(priors[0].parameters, [1.0, 6.38e-4])
     expected = Stepper(loaded.model, 1.0).simulate(
-        steady_state(loaded.model, loaded.schedule(1)[0]).state, loaded.schedule(1)[:INITIAL]
+        steady_state(loaded.model, Realisation(loaded, 1).schedule[0]).state, Realisation(loaded, 1).schedule[:INITIAL]
     )
     np.testing.assert_allclose(priors[0].state, expected.states[-1], rtol=1e-9)
     assert priors[0].time == INITIAL

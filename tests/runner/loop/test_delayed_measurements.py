@@ -8,7 +8,9 @@ import pytest
 from adaptive_flot.contracts import Status
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.measurement_noise import measured_at
+from adaptive_flot.runner.scenario.realisation import Realisation
 from tests.runner.conftest import DURATION, INITIAL, WriteScenario
 
 GRADE = "concentrate_grade"
@@ -19,11 +21,9 @@ def test_plant_shows_each_output_at_its_rate_and_delayed_ones_after_their_dead_t
 ) -> None:
     """Every 7 s from 7 s on, known 10 s later: the same values as without dead time, each once."""
     plain = load_scenario(write_scenario({f"measurements.{GRADE}.every_s": 7}))
-    in_time = simulate_plant(plain, 1)
-    delayed = simulate_plant(
-        load_scenario(write_scenario({f"measurements.{GRADE}": {"noise_std": 1e-3, "every_s": 7, "dead_time_s": 10}})),
-        1,
-    )
+    in_time = simulate_plant(Realisation(plain, 1))
+    late = {"noise_std": 1e-3, "every_s": 7, "dead_time_s": 10}
+    delayed = simulate_plant(Realisation(load_scenario(write_scenario({f"measurements.{GRADE}": late})), 1))
     column = plain.model.index("outputs", GRADE)
     taken = {r.sample.time: r.sample.outputs[column] for r in in_time if np.isfinite(r.sample.outputs[column])}
     assert list(taken) == [float(t) for t in range(7, DURATION + 1, 7)]
@@ -39,7 +39,7 @@ def test_a_period_that_is_no_multiple_of_the_sampling_interval_keeps_its_mean_ra
     write_scenario: WriteScenario,
 ) -> None:
     scenario = load_scenario(write_scenario({f"measurements.{GRADE}.every_s": 2.5}))
-    measured = scenario.measured_at()[:, scenario.model.index("outputs", GRADE)]
+    measured = measured_at(scenario)[:, scenario.model.index("outputs", GRADE)]
     assert list(np.flatnonzero(measured) + 1)[:6] == [3, 5, 8, 10, 13, 15]
     assert measured.sum() == DURATION / 2.5
 

@@ -16,7 +16,7 @@ from adaptive_flot.processes.registry import make_model
 from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.keys import Plugin
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.estimators import toys
 from tests.runner.conftest import WriteScenario
 

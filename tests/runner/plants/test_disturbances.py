@@ -11,11 +11,12 @@ import yaml
 
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.plants.disturbances import disturbances
 from adaptive_flot.runner.results.accounts import account
 from adaptive_flot.runner.scenario.keys import DisturbancePart
+from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.profiles import Factors, Steps
-from adaptive_flot.runner.scenario.scenario import Scenario, load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.runner.conftest import WriteScenario
 
 FEED, GRADE = "feed_flow_m3_s", "feed_concentration.chalcopyrite"
@@ -44,16 +45,16 @@ def test_the_plant_imposes_what_no_controller_moves() -> None:
 
 def test_controllers_are_not_told_the_future() -> None:
     scenario = disturbed({})
-    plan = scenario.plan(1)
+    plan = Realisation(scenario, 1).plan
     feed = scenario.model.index("inputs", "feed_flow")
     assert (plan[:, feed] == 1.67e-4).all()
     moved = [j for j in range(plan.shape[1]) if j != feed]
-    np.testing.assert_array_equal(plan[:, moved], scenario.schedule(1)[:, moved])
+    np.testing.assert_array_equal(plan[:, moved], Realisation(scenario, 1).schedule[:, moved])
 
 
 def test_unmeasured_is_taken_for_what_was_planned() -> None:
     scenario = disturbed({FEED: DisturbancePart(measured=False), GRADE: DisturbancePart(measured=False)})
-    found = disturbances(scenario, 1)
+    found = Realisation(scenario, 1).disturbances()
     feed = scenario.model.index("inputs", "feed_flow")
     assert found.inputs[-1, feed] == 1.837e-4 and (found.shown[:, feed] == 1.67e-4).all()
     assert found.parameters is None
@@ -64,7 +65,7 @@ def test_unmeasured_is_taken_for_what_was_planned() -> None:
 def test_an_analyser_repeats_its_last_value_and_shows_it_late() -> None:
     """Every 30 s, 10 s late: the step at 340 s is first measured at 360 s and known at 370 s; row k ends at k + 1 s."""
     scenario = disturbed({GRADE: DisturbancePart(every_s=30, dead_time_s=10)})
-    known = disturbances(scenario, 1).parameters
+    known = Realisation(scenario, 1).disturbances().parameters
     assert known is not None
     values = known[:, scenario.model.index("parameters", GRADE)]
     np.testing.assert_allclose(values, np.where(np.arange(1, 391) >= 370, 12.72, 10.6))
@@ -72,7 +73,7 @@ def test_an_analyser_repeats_its_last_value_and_shows_it_late() -> None:
 
 def test_measurement_noise_is_drawn_for_each_seed_and_held_between_measurements() -> None:
     scenario = disturbed({GRADE: DisturbancePart(every_s=30, noise_std=0.1), FEED: DisturbancePart(noise_std=1e-6)})
-    one, again, two = (disturbances(scenario, seed) for seed in (1, 1, 2))
+    one, again, two = (Realisation(scenario, seed).disturbances() for seed in (1, 1, 2))
     feed = scenario.model.index("inputs", "feed_flow")
     assert one.parameters is not None and two.parameters is not None and again.parameters is not None
     np.testing.assert_array_equal(one.shown, again.shown)

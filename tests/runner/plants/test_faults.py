@@ -13,7 +13,7 @@ from adaptive_flot.contracts import Decision, DelayedValue, Estimate, PlantRecor
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.plants.faulty_controller import FaultyController
 from adaptive_flot.runner.plants.faulty_plant import FaultyPlant
-from adaptive_flot.runner.scenario.faults import ControllerFault, Fault
+from adaptive_flot.runner.scenario.faults import ControllerFault, Fault, PlantFault
 from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc.controller import EconomicMpc
 from controllers.hold import Hold
@@ -50,13 +50,13 @@ class Scripted:
         return Row(state.k + 1), PlantRecord(sample, np.full(self.outputs, now), np.zeros(0), inputs)
 
 
-def fault(**entry: Any) -> Fault:
+def fault(**entry: Any) -> Any:
     """As a scenario would give it."""
     made: Fault = TypeAdapter(Fault).validate_python(entry)
     return made
 
 
-def play(model: Model, faults: list[Fault], plant: Scripted | None = None, seed: int = 1) -> list[PlantRecord]:
+def play(model: Model, faults: list[PlantFault], plant: Scripted | None = None, seed: int = 1) -> list[PlantRecord]:
     """Air flow k + 1 is asked for in interval k."""
     draws = np.random.default_rng(seed).random((ROWS, len(faults), 2))
     faulty = FaultyPlant(plant or Scripted(model), faults, model, 1.0, draws)

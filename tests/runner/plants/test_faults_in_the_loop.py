@@ -14,10 +14,12 @@ from adaptive_flot.contracts import Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.run.unsolved import unsolved_table
-from adaptive_flot.runner.commands.run import Run, run_scenario
-from adaptive_flot.runner.plants.fault_injection import with_faults
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.plants.fault_injection import with_controller_faults, with_plant_faults
 from adaptive_flot.runner.plants.scenario_plant import make_plant
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
 from controllers.economic_mpc.controller import EconomicMpc
 from controllers.economic_mpc.state import MpcState
 from controllers.hold import Hold
@@ -126,8 +128,10 @@ def test_after_every_fault_it_decides_as_a_fresh_controller(runs: list[Run], sol
 
 def test_without_faults_nothing_is_put_between(write_scenario: WriteScenario) -> None:
     scenario = load_scenario(write_scenario())
-    plant, controller = make_plant(scenario, 1), object.__new__(Hold)
-    assert with_faults(scenario, 1, plant, controller) == (plant, controller)
+    realisation, controller = Realisation(scenario, 1), object.__new__(Hold)
+    plant = make_plant(realisation)
+    assert with_plant_faults(realisation, plant) is plant
+    assert with_controller_faults(scenario, controller) is controller
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox import Model, Stepper
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.runner.conftest import WriteScenario
 
 INPUTS = np.array([1.5e-3, 1.67e-4, 0.38])

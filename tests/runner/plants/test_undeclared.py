@@ -14,8 +14,10 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run import Run, run_scenario
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
 from tests.runner.conftest import WriteScenario
 
 GROWTH = {
@@ -85,7 +87,7 @@ def test_an_effect_of_the_plant_may_drift(write_scenario: WriteScenario) -> None
     drift = {EXPONENT: {"profile": "ramp", "change": 1.0, "from_s": 50, "to_s": 90}}
     path = write_scenario({"plant": {"effects": [GROWTH]}, "parameters": drift})
     scenario = load_scenario(path)
-    column = scenario.true_parameters(1)[:, scenario.plant_model.index("parameters", EXPONENT)]
+    column = Realisation(scenario, 1).parameters[:, scenario.plant_model.index("parameters", EXPONENT)]
     assert (column[0], column[-1]) == (0.4, 0.8)
     table = run_scenario(scenario, ["fixed"], [1])[0].table
     np.testing.assert_array_equal(table[f"{EXPONENT}_true"], column)

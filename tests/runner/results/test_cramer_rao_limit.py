@@ -6,7 +6,8 @@ import numpy as np
 
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
-from adaptive_flot.runner.scenario.scenario import load_scenario
+from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.realisation import Realisation
 
 
 def test_the_joint_filter_of_a_random_walk_is_within_1_3_of_the_bound() -> None:
@@ -16,7 +17,7 @@ def test_the_joint_filter_of_a_random_walk_is_within_1_3_of_the_bound() -> None:
     errors, claimed, bounds = [], [], []
     for seed in (1, 2, 3, 4):
         table = run_scenario(scenario, ["ekf"], [seed])[0].table
-        limit = TrueRun(scenario, seed, scenario.schedule(seed)).limit()
+        limit = TrueRun(Realisation(scenario, seed), Realisation(scenario, seed).schedule).limit()
         bounds.append(np.diagonal(limit, axis1=1, axis2=2)[late])
         wrong = [table[f"{label}_estimate"] - table[f"{label}_true"] for label in "nC"]
         errors.append(np.column_stack(wrong)[late] ** 2)
@@ -30,7 +31,7 @@ def test_the_joint_filter_of_a_random_walk_is_within_1_3_of_the_bound() -> None:
 def test_more_sensors_lower_the_bound_of_the_ridge() -> None:
     scenario = load_scenario("paper_scenario_1")
     assert has_limit(scenario)
-    run = TrueRun(scenario, 1, scenario.schedule(1))
+    run = TrueRun(Realisation(scenario, 1), Realisation(scenario, 1).schedule)
     alone, more = run.limit(), run.limit(more=MORE_SENSORS)
     assert alone.shape == (2400, 2, 2)
     assert (np.diagonal(more, axis1=1, axis2=2) <= np.diagonal(alone, axis1=1, axis2=2) * (1 + 1e-9)).all()
@@ -40,7 +41,7 @@ def test_more_sensors_lower_the_bound_of_the_ridge() -> None:
 def test_a_fit_of_the_bound_is_that_of_an_error_of_its_size() -> None:
     """One percent of the truth at every time is a fit of 99; what comes before the fits is of no account."""
     scenario = load_scenario("paper_scenario_1")
-    run = TrueRun(scenario, 1, scenario.schedule(1))
+    run = TrueRun(Realisation(scenario, 1), Realisation(scenario, 1).schedule)
     covariance = np.zeros((2400, 2, 2))
     covariance[:, 0, 0], covariance[:, 1, 1] = (0.01 * run.adapted[:, 0]) ** 2, (0.05 * run.adapted[:, 1]) ** 2
     covariance[:600] *= 1e6

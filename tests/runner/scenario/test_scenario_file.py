@@ -11,7 +11,9 @@ import pytest
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.scenario.scenario import load_scenario, shipped_scenarios
+from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
+from adaptive_flot.runner.scenario.measurement_noise import noise_std
+from adaptive_flot.runner.scenario.realisation import Realisation
 from benchmarks import scipy_reference
 from tests.runner.conftest import WriteScenario
 
@@ -129,13 +131,13 @@ def test_an_unknown_scenario_names_the_shipped_ones(name: str) -> None:
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_every_shipped_scenario_loads_by_name(name: str) -> None:
     loaded = load_scenario(name)
-    assert loaded.name == name and len(loaded.schedule(1)) == len(loaded.true_parameters(1))
+    assert loaded.name == name and len(Realisation(loaded, 1).schedule) == len(Realisation(loaded, 1).parameters)
 
 
 @pytest.mark.parametrize("name", [n for n in shipped_scenarios() if n.startswith("paper")])
 def test_the_paper_scenarios_are_those_of_the_paper(name: str) -> None:
     loaded = load_scenario(name)
-    schedule, truth = loaded.schedule(1), loaded.true_parameters(1)
+    schedule, truth = Realisation(loaded, 1).schedule, Realisation(loaded, 1).parameters
     model = loaded.model
     assert schedule.shape == (2400, 3) and loaded.initial_rows == 600
     assert loaded.setup.parameters == ("growth_exponent", "coalescence_rate")
@@ -171,7 +173,7 @@ def test_a_cell_file_is_found_beside_the_scenario(write_scenario: WriteScenario,
 
 def test_noise_belongs_to_the_measured_outputs_only(write_scenario: WriteScenario) -> None:
     loaded = load_scenario(write_scenario())
-    std = dict(zip(loaded.model.names("outputs"), loaded.noise_std(), strict=True))
+    std = dict(zip(loaded.model.names("outputs"), noise_std(loaded), strict=True))
     assert std.pop("concentrate_grade") == 1e-3 and std.pop("level") == 2e-3
     assert np.isnan(list(std.values())).all()
 

@@ -1,0 +1,118 @@
+"""What one run leaves behind."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+
+from adaptive_flot.contracts import Setup, Status
+from adaptive_flot.contracts.batch import BatchFit
+from adaptive_flot.runner.adaptation.inquiry import Inquiry
+from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.runner.results.accounts import account, control_account
+from adaptive_flot.runner.results.plans import plan_table
+from adaptive_flot.runner.results.timeseries import fits, time_series
+from adaptive_flot.runner.scenario.realisation import Realisation
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run.
+
+    Attributes
+    ----------
+    estimator, controller, seed
+        What ran.
+    table
+        Time series, one row an interval; see `time_series`.
+    fit
+        Fit in percent of each adapted parameter (by label) and driving output, over t > `fits_after_s`.
+    status_counts
+        How often the estimator returned which status.
+    initial
+        The batch fit that gave the initial estimate.
+    seconds
+        Wall-clock time of the run.
+    account
+        Recovery, grade and economic value over the same times (see `account`); empty without economics.
+    control
+        Solve times, statuses and who decided over the same times (see `control_account`); empty without economics.
+    fault_counts
+        Intervals in which each injected fault changed something; empty without faults.
+    plans
+        What the controller expected, one row a planned move (see `plan_table`); empty where it makes no plans.
+    inquiries
+        What came of each alarm of a watched estimator; None where the estimator was not watched.
+    """
+
+    estimator: str
+    controller: str
+    seed: int
+    table: pd.DataFrame
+    fit: dict[str, float]
+    status_counts: dict[str, int]
+    initial: BatchFit
+    seconds: float = float("nan")
+    account: dict[str, float] = field(default_factory=dict)
+    control: dict[str, Any] = field(default_factory=dict)
+    fault_counts: dict[str, int] = field(default_factory=dict)
+    plans: pd.DataFrame = field(default_factory=pd.DataFrame)
+    inquiries: Sequence[Inquiry] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        estimator: str,
+        controller: str,
+        realisation: Realisation,
+        steps: Sequence[Step],
+        setup: Setup,
+        initial: BatchFit,
+        inquiries: Sequence[Inquiry] | None = None,
+    ) -> Run:
+        """The run that these steps were, of an estimator that was built for `setup`; its time is yet to be told."""
+        scenario = realisation.scenario
+        table = time_series(scenario, steps, setup)
+        earned: dict[str, float] = {}
+        control: dict[str, Any] = {}
+        if scenario.prices is not None and scenario.limits is not None:
+            late = table[table["time_s"] > scenario.fits_after + 1e-9]
+            least = scenario.limits.outputs["concentrate_grade"][0]
+            earned = account(late, scenario.plant_model, scenario.dt, scenario.prices, least)
+            control = control_account(late)
+        statuses = (s.estimate.status if s.estimate else Status.INITIALISING for s in steps)
+        return cls(
+            estimator,
+            controller,
+            realisation.seed,
+            table,
+            fits(scenario, table),
+            dict(Counter(status.name.lower() for status in statuses)),
+            initial,
+            account=earned,
+            control=control,
+            fault_counts=dict(Counter(fault for s in steps for fault in (*s.plant.faults, *s.decision.faults))),
+            plans=plan_table(scenario.model, steps),
+            inquiries=inquiries,
+        )
+
+    def summary(self) -> dict[str, object]:
+        """Entry of the JSON summary; some of its keys only where they apply."""
+        extra: dict[str, object] = {"account": self.account, "control": self.control} if self.account else {}
+        if self.fault_counts:
+            extra["fault_counts"] = self.fault_counts
+        if self.inquiries is not None:
+            extra["discovery"] = [inquiry.as_dict() for inquiry in self.inquiries]
+        return {
+            "estimator": self.estimator,
+            "controller": self.controller,
+            "seed": self.seed,
+            "fit": self.fit,
+            "status_counts": self.status_counts,
+            "seconds": self.seconds,
+            **extra,
+        }

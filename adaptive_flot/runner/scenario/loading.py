@@ -1,0 +1,81 @@
+"""Read scenario files: YAML, validated once into frozen objects. Behind this file nobody sees a dictionary."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+from pydantic import ValidationError
+
+from adaptive_flot.contracts import Setup
+from adaptive_flot.errors import ScenarioError, located, near_match
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.processes.effect_entry import attach
+from adaptive_flot.processes.registry import make_model
+from adaptive_flot.resources import scenario_folder
+from adaptive_flot.runner.scenario.checks import check_scenario
+from adaptive_flot.runner.scenario.keys import ScenarioFile
+from adaptive_flot.runner.scenario.scenario import Scenario
+from adaptive_flot.yaml_problems import first_problem
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """Shipped scenario files by name."""
+    return {f.stem: f for f in sorted(scenario_folder().glob("*.yaml"))}
+
+
+def find_scenario(name: str) -> Path:
+    """Path of a scenario: a file, or the name of a shipped one.
+
+    Raises
+    ------
+    ScenarioError
+        Neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shipped = shipped_scenarios()
+    if name in (path.stem, f"{path.stem}.yaml") and path.stem in shipped:
+        return shipped[path.stem]
+    raise ScenarioError(f"{name}: no such scenario file; shipped: {near_match(path.stem, shipped)}")
+
+
+def load_scenario(name: Path | str) -> Scenario:
+    """Read and check a scenario.
+
+    Raises
+    ------
+    ScenarioError
+        Unknown key (with the nearest one), wrong type, missing input, times that do not fit.
+    CellError, ModelError, RangeError, PluginError
+        The cell, a parameter name, an input value or the model is wrong.
+    """
+    path = find_scenario(str(name))
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not a YAML file ({' '.join(str(error).split())}); correct it") from error
+    if not isinstance(content, dict):
+        raise ScenarioError(f"{path}: holds no keys; see `adaptive-flot scenarios` for examples to copy")
+    try:
+        file = ScenarioFile.model_validate(content)
+    except ValidationError as error:
+        raise ScenarioError(f"{path}: {first_problem(error, ScenarioFile)}") from error
+    with located(path):
+        model = attach(make_model(file.model, cell=file.cell, folder=path.parent), file.effects)
+        plant = model
+        if file.plant.effects is not None:
+            plant = attach(model.without_effects(), file.plant.effects, "plant.effects")
+        scenario = Scenario(path.stem, path, file, model, _setup(file, model), plant)
+        check_scenario(scenario)
+    return scenario
+
+
+def _setup(file: ScenarioFile, model: Model) -> Setup:
+    parameters = model.expand_parameters(file.adapt.parameters)
+    outputs = tuple(model.outputs[i].name for i in model.indices("outputs", file.adapt.outputs))
+    unmeasured = [o for o in outputs if o not in file.measurements]
+    if unmeasured:
+        raise ScenarioError(f"adapt.outputs: {unmeasured[0]!r} is not among the measurements; add it there")
+    return Setup(model, file.sampling_s, parameters, outputs)
