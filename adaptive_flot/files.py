@@ -12,6 +12,39 @@ from typing import IO
 from adaptive_flot.errors import OutputError
 
 
+def check_writable(path: Path, where: str) -> None:
+    """Check that a file could be written, before the work whose result it will hold. Nothing is made or changed.
+
+    Parameters
+    ----------
+    path
+        The file; folders above it that do not exist are made when it is written.
+    where
+        Option that named it, for the message.
+
+    Raises
+    ------
+    OutputError
+        A folder, a device or a write-protected file has that name, a file stands where a folder must be, or the
+        folder takes no files.
+    """
+    try:
+        if path.is_dir():
+            raise OutputError(f"{where}: {path} is a folder; give the name of a file")
+        if path.exists() and not path.is_file():
+            raise OutputError(f"{where}: {path} is no regular file; give another path")
+        if path.exists() and not os.access(path, os.W_OK):
+            raise OutputError(f"{where}: {path} is write-protected; give another path")
+        folder = next(parent for parent in path.absolute().parents if parent.exists())
+        if not folder.is_dir():
+            raise OutputError(f"{where}: {path} can not be written ({folder} is a file); give another path")
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"{where}: {path} can not be written ({reason}); give another path") from error
+
+
 @contextmanager
 def replace_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; it takes its place when the block ends without an error.

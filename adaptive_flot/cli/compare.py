@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import command_line
+from adaptive_flot.cli.targets import check_targets, in_folder
 
 
 def compare(
@@ -26,8 +27,16 @@ def compare(
     from adaptive_flot.report.compare.page import write_compare_report
     from adaptive_flot.runner.commands import comparison
     from adaptive_flot.runner.commands.run_files import write_json
-    from adaptive_flot.runner.commands.runs_table import read_runs
+    from adaptive_flot.runner.commands.runs_table import read_runs, result_files
 
+    check_targets(
+        result_files(results),
+        [
+            ("--json", json),
+            ("--markdown", markdown),
+            *([] if out is None else in_folder(out, "comparison.html")),
+        ],
+    )
     found = comparison.compare(read_runs(results))
     tables = [compare_tables.compare_tables(c) for c in found]
     overview = [table for table in (compare_tables.overview_table(found),) if table is not None]

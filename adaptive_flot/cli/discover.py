@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import CellOption, ModelOption, Out, command_line, results_folder
+from adaptive_flot.cli.targets import check_targets, in_folder, model_inputs
 
 
 def discover(
@@ -37,13 +38,17 @@ def discover(
     from adaptive_flot.runner.commands.run_files import write_json
 
     check_model_path(save_model)
+    folder = results_folder(out, data.stem, "discover")
+    check_targets(
+        [data, *model_inputs(model, cell, data.parent)],
+        [*in_folder(folder, "verdict.json", "report.html"), ("--json", json), ("--save-model", save_model)],
+    )
     limits = read_limits(limit or ())
     made = make_model(model, cell=cell, folder=data.parent)
     with stage_bar(data.stem) as progress:
         found = discover_file(
             data, made, limits=limits, processes=processes or available_processes(), progress=progress
         )
-    folder = results_folder(out, data.stem, "discover")
     for target in filter(None, (folder / "verdict.json", json)):
         write_json(target, found.verdict.as_dict())
     print_discovery(found)

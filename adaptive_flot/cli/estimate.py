@@ -16,8 +16,10 @@ from adaptive_flot.cli.options import (
     Out,
     can_compile,
     command_line,
+    once,
     results_folder,
 )
+from adaptive_flot.cli.targets import check_targets, in_folder, model_inputs
 
 
 def estimate(
@@ -47,6 +49,7 @@ def estimate(
     from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
     from adaptive_flot.runner.commands.estimate_files import (
         estimate_summary,
+        replay_file,
         save_fitted_cell,
         save_fitted_model,
         write_replays,
@@ -55,14 +58,19 @@ def estimate(
 
     if save_cell is not None and model != "flotation":
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
+    names = once(estimator) or ["fixed", "rpem", "pem"]
+    folder = results_folder(out, data.stem, "estimate")
+    files = [*map(replay_file, names), "summary.json", "report.html"]
+    check_targets(
+        [data, *model_inputs(model, cell, data.parent, names)],
+        [*in_folder(folder, *files), ("--json", json), ("--save-cell", save_cell), ("--save-model", save_model)],
+    )
     made = replace(make_model(model, cell=cell, folder=data.parent), compiled=can_compile(compile_))
     blocks = read_blocks(data, made, fit_share)
-    names = estimator or ["fixed", "rpem", "pem"]
     with progress_bar(data.stem, 1 + len(names)) as advance:
         result = estimate_record(
             blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent, progress=advance
         )
-    folder = results_folder(out, data.stem, "estimate")
     write_replays(result, folder)
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, estimate_summary(data, result))

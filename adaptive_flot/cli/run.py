@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import Compile, Json, Out, can_compile, command_line, once, results_folder
+from adaptive_flot.cli.targets import check_targets, in_folder, scenario_inputs
 
 
 def run(
@@ -32,10 +33,11 @@ def run(
     loaded = load_scenario(scenario)
     loaded = loaded.compiled() if can_compile(compile_) else loaded
     who = once(estimator), once(controller)
+    folder = results_folder(out, loaded.name, "run")
+    check_targets(scenario_inputs(loaded, *who), [*in_folder(folder, "summary.json", "report.html"), ("--json", json)])
     count = len(loaded.combinations(*who)) * len(once(seed) or set(loaded.file.seeds))
     with progress_bar(loaded.name, count) as advance:
         runs = run_scenario(loaded, who[0], once(seed), advance, who[1])
-    folder = results_folder(out, loaded.name, "run")
     write_runs(runs, folder, ".parquet" if parquet else ".csv")
     summary = run_summary(loaded, runs)
     for target in filter(None, (folder / "summary.json", json)):

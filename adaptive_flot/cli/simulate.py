@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import CellOption, ModelOption
+from adaptive_flot.cli.targets import check_targets, model_inputs
 
 
 def simulate(
@@ -22,6 +23,7 @@ def simulate(
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.runner.commands.simulate import simulate_file
 
+    check_targets([inputs, *model_inputs(model, cell, inputs.parent)], [("--out", out)])
     table = simulate_file(inputs, make_model(model, cell=cell, folder=inputs.parent), accurate=accurate)
     write_table(table, out)
     typer.echo(f"{len(table)} rows: {out}")

@@ -9,6 +9,7 @@ import typer
 
 from adaptive_flot.child_processes import Terminated
 from adaptive_flot.cli.options import Compile, Out, can_compile, results_folder
+from adaptive_flot.cli.targets import check_targets, in_folder, scenario_inputs
 
 INTERRUPTED = 130
 
@@ -30,6 +31,8 @@ def sweep(
 
     loaded = load_study(study)
     folder = results_folder(out, loaded.name, "sweep")
+    inputs = [file for arm in loaded.arms for file in scenario_inputs(arm.scenario, arm.estimators, arm.controllers)]
+    check_targets([loaded.path, *inputs], in_folder(folder, "study.json", "runs.parquet", "timings.parquet"))
     compiled = can_compile(compile_)
     try:
         with live(loaded.name) as progress:

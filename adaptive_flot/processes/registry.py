@@ -6,7 +6,7 @@ from pathlib import Path
 
 from adaptive_flot.errors import CellError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.plugins import construct, load
+from adaptive_flot.plugins import construct, load, module_file
 from adaptive_flot.processes import cascaded_tanks, flotation, iron_columns, zinc_level
 from adaptive_flot.processes.model_file import find_model_file, is_model_file, load_model_file
 from adaptive_flot.resources import cell_file
@@ -69,6 +69,24 @@ def _read(path: Path, cell: str | None) -> Model:
     with located(path):
         own_cell = str(beside) if beside is not None and beside.is_file() else file.cell
         return file.extend(make_model(file.model, cell=own_cell, folder=path.parent))
+
+
+def model_files(name: str, *, cell: str | None = None, folder: Path | None = None) -> list[Path]:
+    """Files from which `make_model` reads a model: model file, cell file, a user's own module.
+
+    Raises
+    ------
+    ModelError, CellError
+        There is no such file, or the model file can not be read.
+    """
+    if is_model_file(name):
+        path = find_model_file(name, folder)
+        file = load_model_file(path)
+        return [path, *model_files(file.model, cell=file.cell, folder=path.parent)]
+    if name == "flotation":
+        return [find_cell(cell, folder)]
+    module = module_file(name.rpartition(":")[0], folder) if ":" in name else None
+    return [] if module is None else [module]
 
 
 def find_cell(cell: str | None, folder: Path | None = None) -> Path:

@@ -38,7 +38,7 @@ def test_a_study_prints_its_distributions_and_goes_on_from_what_is_there(call: C
     [
         (["nowhere.yaml"], ["nowhere.yaml", "shipped: ", "paper_1000"]),
         (["two.yaml", "--scheduler", "nonsense://x"], ["--scheduler nonsense://x", "leave the option out"]),
-        (["two.yaml", "--out", "two.yaml"], ["two.yaml", "give another folder"]),
+        (["two.yaml", "--out", "two.yaml"], ["--out: two.yaml", "is a file", "give another path"]),
     ],
 )
 def test_mistakes_are_one_line(call: Call, study: Path, arguments: list[str], words: list[str]) -> None:

@@ -42,7 +42,16 @@ def estimate_summary(data: Path, result: RecordEstimate) -> dict[str, Any]:
 def write_replays(result: RecordEstimate, folder: Path) -> None:
     """Write the time series of each estimator as `<estimator>.csv`."""
     for replay in result.replays:
-        write_table(replay.table, folder / f"{replay.estimator.replace(':', '-').replace('/', '-')}.csv")
+        write_table(replay.table, folder / replay_file(replay.estimator))
+
+
+def replay_file(estimator: str) -> str:
+    """Name of the file of an estimator's time series.
+
+    >>> replay_file("my_file:Mine")
+    'my_file-Mine.csv'
+    """
+    return f"{estimator.replace(':', '-').replace('/', '-')}.csv"
 
 
 def save_fitted_cell(result: RecordEstimate, cell: Path, path: Path) -> None:

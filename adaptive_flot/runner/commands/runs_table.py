@@ -94,6 +94,12 @@ def read_runs(results: Sequence[Path]) -> pd.DataFrame:
     return table
 
 
+def result_files(results: Sequence[Path]) -> list[Path]:
+    """Files that `read_runs` may read of these results."""
+    inside = ([*p.rglob("*.parquet"), p / SUMMARY] if p.is_dir() else [p] for p in results)
+    return [file for files in inside for file in files]
+
+
 def _file_or_folder(path: Path) -> Path:
     """Where the runs are: a summary, a Parquet file, or a folder of parts."""
     if not path.exists():

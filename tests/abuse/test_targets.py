@@ -1,0 +1,161 @@
+"""No output option costs a user an input, and what can not be written is said before any work."""
+
+from __future__ import annotations
+
+import os
+import typing
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from adaptive_flot.cli import app
+from adaptive_flot.resources import cell_file
+from adaptive_flot.runner.commands.run_files import write_json
+from tests.cli.conftest import Call, Result, WriteScenario, WriteTable
+from tests.runner.commands.test_runs_table import closed_loop_summary
+
+MODULE = "from estimators.fixed import Fixed as Own\n"
+ESTIMATE = ["estimate", "rec.csv", "--cell", "cell.yaml", "--estimator", "own.py:Own"]
+RUN = ["run", "short.yaml", "--estimator", "own.py:Own"]
+STUDY = {"description": "Two", "scenarios": ["short.yaml"], "estimators": ["fixed"], "seeds": [1]}
+
+# command without its outputs, the option of an output, and the inputs that it must not overwrite
+CASES = [
+    (["simulate", "rec.csv", "--cell", "cell.yaml"], "--out", ["rec.csv", "cell.yaml"]),
+    (["simulate", "rec.csv", "--model", "model.yaml"], "--out", ["rec.csv", "model.yaml", "cell.yaml"]),
+    *((ESTIMATE, option, ["rec.csv", "cell.yaml", "own.py"]) for option in ("--json", "--save-cell")),
+    (["estimate", "rec.csv", "--model", "model.yaml"], "--save-model", ["rec.csv", "model.yaml", "cell.yaml"]),
+    *((["discover", "rec.csv", "--model", "model.yaml"], "--json", [name]) for name in ("rec.csv", "cell.yaml")),
+    (["discover", "rec.csv", "--model", "model.yaml"], "--save-model", ["model.yaml", "cell.yaml"]),
+    (RUN, "--json", ["short.yaml", "cell.yaml", "own.py"]),
+    *((["compare", "done"], option, ["done/summary.json"]) for option in ("--json", "--markdown")),
+]
+FOLDERS = [
+    (["estimate", "pem.csv"], "."),
+    (["sweep", "study.json"], "."),
+    (["discover", "verdict.json"], "."),
+    (["run", "summary.json"], "."),
+    (["compare", "comparison.html"], "."),
+]
+"""A result in the folder of the results has the name of an input."""
+
+SPELLINGS: dict[str, Callable[[Path], str]] = {
+    "as given": str,
+    "another path": lambda path: f"nowhere/../{path}",
+    "absolute": lambda path: str(path.absolute()),
+    "symbolic link": lambda path: _linked(path, os.symlink),
+    "hard link": lambda path: _linked(path, os.link),
+}
+
+
+def _linked(path: Path, link: Callable[[Path, Path], None]) -> str:
+    other = Path(f"other{path.suffix}")
+    link(path.absolute(), other)
+    return str(other)
+
+
+@pytest.fixture
+def inputs(scenario: WriteScenario, table: WriteTable, tmp_path: Path) -> dict[Path, bytes]:
+    """Inputs of every command, and their content."""
+    table().rename(tmp_path / "rec.csv")
+    (tmp_path / "nowhere").mkdir()
+    (tmp_path / "cell.yaml").write_bytes(cell_file().read_bytes())
+    (tmp_path / "model.yaml").write_text("model: flotation\ncell: cell.yaml\n")
+    (tmp_path / "own.py").write_text(MODULE)
+    scenario({"cell": "cell.yaml"})
+    write_json(tmp_path / "done" / "summary.json", closed_loop_summary(1))
+    for name in ("pem.csv", "verdict.json"):
+        (tmp_path / name).write_bytes((tmp_path / "rec.csv").read_bytes())
+    (tmp_path / "summary.json").write_bytes((tmp_path / "short.yaml").read_bytes())
+    (tmp_path / "comparison.html").write_text("no result, but an input all the same")
+    (tmp_path / "study.json").write_text(yaml.safe_dump(STUDY))
+    return {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+
+def check(result: Result, kept: dict[Path, bytes], tmp_path: Path, *says: str) -> None:
+    assert result.code == 2 and result.out == "" and result.err.count("\n") == 1, result
+    assert all(part in result.err for part in says), result.err
+    assert {file: file.read_bytes() for file in kept} == kept
+    new = {f for f in tmp_path.rglob("*") if f.is_file() and f not in kept and "__pycache__" not in f.parts}
+    assert {f.stem for f in new} <= {"other"}, "something was written"
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+@pytest.mark.parametrize(
+    ("command", "option", "named"),
+    [(command, option, name) for command, option, names in CASES for name in names],
+    ids=lambda value: value if isinstance(value, str) else value[0],
+)
+def test_no_output_overwrites_an_input(
+    call: Call,
+    inputs: dict[Path, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: list[str],
+    option: str,
+    named: str,
+    spelling: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    target = SPELLINGS[spelling](Path(named))
+    check(call(*command, option, target), inputs, tmp_path, f"{option}: {target}", "is an input", Path(named).name)
+
+
+@pytest.mark.parametrize(("command", "folder"), FOLDERS, ids=lambda value: " ".join(value))
+def test_no_result_in_a_folder_overwrites_an_input(
+    call: Call, inputs: dict[Path, bytes], tmp_path: Path, command: list[str], folder: str
+) -> None:
+    check(call(*command, "--out", folder), inputs, tmp_path, "--out: ", "is an input", command[1])
+
+
+def test_no_output_overwrites_another(call: Call, inputs: dict[Path, bytes], tmp_path: Path) -> None:
+    result = call(*ESTIMATE, "--json", "new.yaml", "--save-cell", "nowhere/../new.yaml")
+    check(result, inputs, tmp_path, "--save-cell: ", "is written by --json already")
+
+
+UNWRITABLE = {
+    "a folder": "nowhere",
+    "below a file": "rec.csv/new.json",
+    "too long a name": "x" * 300,
+    "a device": "/dev/null",
+}
+
+
+@pytest.mark.parametrize("kind", UNWRITABLE)
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [(c, o) for c, o, _ in CASES if o != "--save-model"],
+    ids=lambda v: v if v[0] == "-" else v[0],
+)
+def test_what_can_not_be_written_is_said_before_any_work(
+    call: Call, inputs: dict[Path, bytes], tmp_path: Path, command: list[str], option: str, kind: str
+) -> None:
+    check(call(*command, option, UNWRITABLE[kind]), inputs, tmp_path, f"{option}: {UNWRITABLE[kind]}")
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
+@pytest.mark.parametrize("what", ["file", "folder"])
+def test_no_permission_is_said_before_any_work(
+    call: Call, inputs: dict[Path, bytes], tmp_path: Path, what: str
+) -> None:
+    target = tmp_path / "nowhere" / "kept.json"
+    target.write_text("kept")
+    (target if what == "file" else target.parent).chmod(0o500)
+    result = call(*RUN, "--json", target if what == "file" else target.with_name("new.json"))
+    target.parent.chmod(0o700)
+    check(result, {**inputs, target: b"kept"}, tmp_path, "--json: ")
+
+
+def test_every_output_option_is_in_these_tables() -> None:
+    """A new command or option that writes must be added to `CASES`."""
+    outputs = set()
+    for command in app.registered_commands:
+        assert command.callback is not None
+        for name, kind in typing.get_type_hints(command.callback).items():
+            if kind in (Path, Path | None) and name not in ("inputs", "data"):
+                outputs.add((command.callback.__name__, f"--{name.replace('_', '-')}"))
+    tried = {(command[0], option) for command, option, _ in CASES} | {(command[0], "--out") for command, _ in FOLDERS}
+    assert outputs == tried
