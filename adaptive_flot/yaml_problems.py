@@ -9,6 +9,8 @@ from pydantic import BaseModel, ValidationError
 from adaptive_flot.errors import near_match
 
 Place = tuple[int | str, ...]
+LONGEST_SHOWN = 80
+"""Characters of a wrong value that a message repeats."""
 
 
 def first_problem(error: ValidationError, schema: type[BaseModel]) -> str:
@@ -34,8 +36,13 @@ def first_problem(error: ValidationError, schema: type[BaseModel]) -> str:
         key = first["ctx"]["discriminator"].strip("'")
         return f"{place}: key {key!r} is missing; it says what kind of entry this is"
     got = first.get("input")
-    shown = f", got {got!r}" if not isinstance(got, dict) else ""
+    shown = f", got {_shortened(got)}" if not isinstance(got, dict) else ""
     return f"{place}: {first['msg'].removeprefix('Value error, ')}{shown}; correct it"
+
+
+def _shortened(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
 
 
 def _known_keys(schema: type[BaseModel], where: Place) -> list[str]:

@@ -21,12 +21,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from adaptive_flot.errors import ModelError, located
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.effect_entry import EffectEntry, attach
+from adaptive_flot.yaml_files import read_yaml
 from adaptive_flot.yaml_problems import first_problem
 
 SUFFIXES = (".yaml", ".yml")
@@ -105,12 +105,7 @@ def load_model_file(path: Path) -> ModelFile:
     ModelError
         Not YAML, an unknown or missing key, a wrong type.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise ModelError(f"{path}: not a YAML file ({' '.join(str(error).split())}); correct it") from error
-    if not isinstance(content, dict):
-        raise ModelError(f"{path}: holds no keys; write at least 'model: flotation'")
+    content = read_yaml(path, ModelError, "holds no keys; write at least 'model: flotation'")
     try:
         file = ModelFile.model_validate(content)
     except ValidationError as error:

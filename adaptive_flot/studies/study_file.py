@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from adaptive_flot.errors import StudyError, located, near_match
@@ -17,6 +16,7 @@ from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plug
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
+from adaptive_flot.yaml_files import read_yaml
 from adaptive_flot.yaml_problems import first_problem
 
 Seed = Annotated[int, Field(ge=0)]
@@ -107,12 +107,7 @@ def load_study(name: Path | str) -> Study:
         A scenario, estimator or controller of it is wrong.
     """
     path = _find(str(name))
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise StudyError(f"{path}: not a YAML file ({' '.join(str(error).split())}); correct it") from error
-    if not isinstance(content, dict):
-        raise StudyError(f"{path}: holds no keys; give description, scenarios and seeds")
+    content = read_yaml(path, StudyError, "holds no keys; give description, scenarios and seeds")
     try:
         file = StudyFile.model_validate(content)
     except ValidationError as error:

@@ -16,6 +16,7 @@ from adaptive_flot.files import replace_file
 from adaptive_flot.greybox.model import Parameter
 from adaptive_flot.processes.flotation.parameters import OPERATION_UNITS, PARAMETERS, Cell, Spec
 from adaptive_flot.resources import cell_file
+from adaptive_flot.yaml_files import read_yaml
 
 HIGHEST_GAS_VELOCITY = 0.03
 """Superficial gas velocity [m/s] up to which a cell file without `air_flow_valid` is trusted."""
@@ -117,13 +118,7 @@ def save_cell(source: Path | str, values: Mapping[str, float], note: str, path: 
 def _load(file: Path) -> dict[str, Any]:
     if not file.is_file():
         raise CellError(f"{file}: no such cell file; see scenarios/cells/ for one to copy")
-    try:
-        content = yaml.safe_load(file.read_text())
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise CellError(f"{file}: not a YAML file ({str(error).splitlines()[0]}); correct it") from error
-    if not isinstance(content, dict):
-        raise CellError(f"{file}: holds no entries; see scenarios/cells/ for one to copy")
-    return content
+    return read_yaml(file, CellError, "holds no entries; see scenarios/cells/ for one to copy")
 
 
 def _section(file: Path, content: Mapping[str, Any], section: str) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
 from pydantic import ValidationError
 
 from adaptive_flot.contracts import Setup
@@ -16,6 +15,7 @@ from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.scenario.checks import check_scenario
 from adaptive_flot.runner.scenario.keys import ScenarioFile
 from adaptive_flot.runner.scenario.scenario import Scenario
+from adaptive_flot.yaml_files import read_yaml
 from adaptive_flot.yaml_problems import first_problem
 
 
@@ -52,12 +52,7 @@ def load_scenario(name: Path | str) -> Scenario:
         The cell, a parameter name, an input value or the model is wrong.
     """
     path = find_scenario(str(name))
-    try:
-        content = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: not a YAML file ({' '.join(str(error).split())}); correct it") from error
-    if not isinstance(content, dict):
-        raise ScenarioError(f"{path}: holds no keys; see `adaptive-flot scenarios` for examples to copy")
+    content = read_yaml(path, ScenarioError, "holds no keys; see `adaptive-flot scenarios` for examples to copy")
     try:
         file = ScenarioFile.model_validate(content)
     except ValidationError as error:
