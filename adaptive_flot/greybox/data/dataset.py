@@ -5,6 +5,7 @@ Row k holds the inputs held during the interval that ends at `time[k]` and the o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,12 +14,14 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
-from adaptive_flot.greybox.data.tables import Source, line, named, numeric_column, read_table
+from adaptive_flot.greybox.data.tables import Source, line, named, numeric_column, read_table, time_column
 from adaptive_flot.greybox.model import FloatArray, Model
 
 TIME_COLUMN = "time_s"
 UNIFORMITY = 1e-3
 """Largest difference between two sampling intervals, as a share of the interval, that still counts as uniform."""
+MOST_STEPS = 5_000_000
+"""Most integration steps of one run over a record: some minutes on one core for a flotation cell."""
 
 
 @dataclass(frozen=True)
@@ -79,21 +82,24 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     path
         CSV or Parquet file, or a table with these columns.
     model
-        Names, units and ranges. Inputs are needed; outputs and parameters are used where present.
+        Names, units and ranges. Inputs are needed; outputs and parameters are used where present. Its longest step
+        bounds how long the record may be.
     required_outputs
         Outputs that must have a column.
 
     Raises
     ------
     DataError
-        Missing column, wrong unit suffix, text in a number, NaN in an input, time that does not increase uniformly.
+        Missing column, wrong unit suffix, text in a number, NaN in an input, time that does not increase uniformly,
+        more integration steps than MOST_STEPS.
     RangeError
         An input outside the model's physical range.
     """
     file, table = named(path), read_table(path)
     columns = [str(c) for c in table.columns]
-    time = numeric_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
+    time = time_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
     dt = _interval(table, time, file)
+    _check_steps(model, dt, len(time), file)
 
     inputs = np.column_stack([_input(table, columns, q.name, q.column, q.unit, file) for q in model.inputs])
     model.check_inputs(inputs, time, where=str(file))
@@ -177,6 +183,15 @@ def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
             "resample the record or cut it at the gap"
         )
     return float((time[-1] - time[0]) / (len(time) - 1))
+
+
+def _check_steps(model: Model, dt: float, rows: int, file: Path) -> None:
+    steps = (rows - 1) * max(1, math.ceil(dt / model.max_step_s - 1e-9))
+    if steps > MOST_STEPS:
+        raise DataError(
+            f"{file}: {rows} rows, {dt:g} s apart, take {steps:.3g} steps of model {model.name!r}, whose longest is "
+            f"{model.max_step_s:g} s; {MOST_STEPS} are allowed: check that the time is in seconds, or cut the record"
+        )
 
 
 def _first_state(table: pd.DataFrame, columns: Sequence[str], model: Model, file: Path) -> FloatArray | None:

@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
+import unicodedata
 import warnings
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet
 
-from adaptive_flot.errors import DataError
+from adaptive_flot.errors import DataError, OutputError
 from adaptive_flot.files import replace_path
 from adaptive_flot.greybox.model import FloatArray
 
 FIRST_LINE = 2
 """Line of a CSV file that holds row 0: messages count lines as an editor does."""
+MOST_ROWS = 2_000_000
+"""Longest table: 23 days, one row a second."""
+LARGEST = 1e30
+"""Largest number that counts as measured; a logger writes 3.4e38 where it has none."""
+LONGEST_SHOWN = 60
+"""Characters of a wrong cell that a message repeats."""
+SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
+NO_NUMBERS = {
+    "boolean": "true and false",
+    "bytes": "binary data",
+    "complex": "complex numbers",
+    "date": "dates",
+    "datetime": "dates",
+    "datetime64": "dates",
+    "timedelta": "durations",
+    "timedelta64": "durations",
+    "time": "times of day",
+    "period": "periods",
+}
+"""Kinds of columns that pandas would turn into numbers without a word, by its name for them."""
 
 
 Source: TypeAlias = Path | str | pd.DataFrame
@@ -29,45 +51,109 @@ def named(source: Source) -> Path:
 def read_table(source: Source) -> pd.DataFrame:
     """Read a table with a header line. Blank lines and empty last columns are dropped; the index keeps the row numbers.
 
-    Rows of a table at hand are counted as lines of the CSV file that it would make.
+    A file whose name ends in `.parquet` is Parquet; any other is CSV, packed where its name ends in `.gz`, `.bz2`,
+    `.xz` or `.zip`. Rows of a table at hand are counted as lines of the CSV file that it would make.
 
     Raises
     ------
     DataError
-        No such file, empty, not a table, rows longer than the header, or no rows.
+        No such file, unreadable, empty, not a table, rows longer than the header, a column twice, no rows or too many.
     """
     file = named(source)
     if isinstance(source, pd.DataFrame):
-        return _with_rows(source.reset_index(drop=source.index.name is None), file)
-    if not file.is_file():
-        raise DataError(f"{file}: no such file; give the path of a CSV or Parquet table")
-    if file.stat().st_size == 0:
-        raise DataError(f"{file}: the file is empty; give a table with a header line and rows")
+        return _with_rows(_plain(source, file), file)
     try:
-        table = pd.read_parquet(file) if file.suffix == ".parquet" else _read_csv(file)
-    except pd.errors.ParserWarning as error:
-        raise DataError(f"{file}: a row is longer than the header (a decimal comma?); correct it") from error
-    except (ValueError, OSError, pd.errors.ParserError) as error:
-        raise DataError(f"{file}: not a readable table ({str(error).splitlines()[0]}); give CSV or Parquet") from error
-    return _with_rows(table, file)
+        if not file.is_file():
+            raise DataError(f"{file}: no such file; give the path of a CSV or Parquet table")
+        if file.stat().st_size == 0:
+            raise DataError(f"{file}: the file is empty; give a table with a header line and rows")
+    except OSError as error:
+        raise DataError(_unreadable(file, error)) from error
+    if file.suffix.lower() in SPREADSHEETS:
+        raise DataError(f"{file}: a spreadsheet; save its sheet as CSV and give that")
+    return _with_rows(_read(file), file)
 
 
 def _with_rows(table: pd.DataFrame, file: Path) -> pd.DataFrame:
     table = table.dropna(how="all")
-    table = table.loc[:, [c for c in table.columns if not (str(c).startswith("Unnamed") and table[c].isna().all())]]
-    if len(table.columns) == 0 or not str(table.columns[0]).isprintable():
+    table = table.loc[:, [c for c in table.columns if not (c.startswith("Unnamed") and table[c].isna().all())]]
+    if len(table.columns) == 0 or not table.columns[0].isprintable():
         raise DataError(
             f"{file}: not a text table (no readable header); give a CSV or Parquet table with named columns"
         )
+    _check_header(table, file)
     if len(table) == 0:
         raise DataError(f"{file}: a header but no rows; give a table with rows")
+    if len(table) > MOST_ROWS:
+        raise DataError(_too_long(file))
     return table
+
+
+def _read(file: Path) -> pd.DataFrame:
+    try:
+        return _read_parquet(file) if file.suffix.lower() == ".parquet" else _read_csv(file)
+    except DataError:
+        raise
+    except pd.errors.ParserWarning as error:
+        raise DataError(f"{file}: a row is longer than the header (a decimal comma?); correct it") from error
+    except PermissionError as error:
+        raise DataError(_unreadable(file, error)) from error
+    except Exception as error:  # damaged bytes: each of the unpackers and parsers has errors of its own
+        said = next(iter(str(error).splitlines()), type(error).__name__)
+        raise DataError(f"{file}: not a readable table ({said}); give CSV or Parquet") from error
 
 
 def _read_csv(file: Path) -> pd.DataFrame:
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # else pandas cuts rows longer than the header
-        return pd.read_csv(file, skipinitialspace=True, index_col=False, skip_blank_lines=False)
+        table = pd.read_csv(
+            file, skipinitialspace=True, index_col=False, skip_blank_lines=False, nrows=MOST_ROWS + 1, low_memory=False
+        )
+        # pandas renames the second of two columns: what the file says is in its first line
+        header = pd.read_csv(
+            file, skipinitialspace=True, index_col=False, skip_blank_lines=False, nrows=1, header=None, dtype=str
+        )
+    _check_repeated(header.iloc[0].dropna(), file)
+    return table
+
+
+def _read_parquet(file: Path) -> pd.DataFrame:
+    if pyarrow.parquet.read_metadata(file).num_rows > MOST_ROWS:
+        raise DataError(_too_long(file))
+    return _plain(pd.read_parquet(file), file)
+
+
+def _plain(table: pd.DataFrame, file: Path) -> pd.DataFrame:
+    """A table whose index is a column as any other, where it has a name, and whose column names are texts."""
+    plain = table.reset_index(drop=table.index.names == [None], allow_duplicates=True)
+    plain.columns = pd.Index([str(c) for c in plain.columns], dtype=object)
+    _check_repeated(plain.columns.to_series(), file)
+    return plain
+
+
+def _check_repeated(names: pd.Series, file: Path) -> None:
+    repeated = names[names.duplicated()]
+    if len(repeated):
+        raise DataError(f"{file}: column {_shown(repeated.iloc[0])} is there twice; rename or remove one of them")
+
+
+def _check_header(table: pd.DataFrame, file: Path) -> None:
+    for number, name in enumerate(table.columns[1:], start=2):
+        if any(unicodedata.category(c) in ("Cc", "Cs") for c in name):
+            raise DataError(f"{file}: the name of column {number}, {_shown(name)}, can not be printed; rename it")
+
+
+def _unreadable(file: Path, error: OSError) -> str:
+    return f"{file}: can not be read ({error.strerror or error}); check the file and its permissions"
+
+
+def _too_long(file: Path) -> str:
+    return f"{file}: more than {MOST_ROWS} rows; cut the record or take every second row"
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
 
 
 def line(table: pd.DataFrame, row: int) -> int:
@@ -81,21 +167,70 @@ def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatA
     Raises
     ------
     DataError
-        The column holds text; the message names the line and the text.
+        The column holds text, an infinite or absurdly large number, or no numbers at all (true and false, dates,
+        binary data). The message names the line and what stands there.
     """
     raw = table[column]
+    if isinstance(raw.dtype, pd.CategoricalDtype):
+        raw = raw.astype(raw.cat.categories.dtype)
+    kind = NO_NUMBERS.get(pd.api.types.infer_dtype(raw, skipna=True))
+    if kind is not None:
+        raise DataError(f"{file}: column {column!r} holds {kind}; write numbers")
     values = pd.to_numeric(raw, errors="coerce")
     bad = np.flatnonzero((values.isna() & raw.notna()).to_numpy())
     if bad.size:
         where = f"{file}: column {column!r}, line {line(table, int(bad[0]))}"
-        raise DataError(f"{where}: {raw.iloc[bad[0]]!r} is not a number; correct it")
-    return np.asarray(values, dtype=float)
+        raise DataError(f"{where}: {_shown(raw.iloc[bad[0]])} is not a number; correct it")
+    found = np.asarray(values, dtype=float)
+    large = np.flatnonzero(np.abs(found) > LARGEST)
+    if large.size:
+        where = f"{file}: column {column!r}, line {line(table, int(large[0]))}"
+        raise DataError(
+            f"{where}: {found[large[0]]:g} is no measured value ({large.size} in all); "
+            "correct it, or leave the cell empty where nothing was measured"
+        )
+    return found
+
+
+def time_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatArray:
+    """Return the times of the rows [s] (N,): numbers as they are, dates as seconds since the first, durations.
+
+    Raises
+    ------
+    DataError
+        Neither; see `numeric_column`.
+    """
+    raw = table[column]
+    if pd.api.types.is_datetime64_any_dtype(raw.dtype):
+        raw = raw - raw.min()
+    if pd.api.types.is_timedelta64_dtype(raw.dtype):
+        return np.asarray(raw.dt.total_seconds(), dtype=float)
+    return numeric_column(table, column, file)
+
+
+def check_table_path(path: Path) -> None:
+    """Refuse a name that a table can not be written to.
+
+    Raises
+    ------
+    OutputError
+        The name ends neither in `.csv` nor in `.parquet`.
+    """
+    if path.suffix.lower() not in (".csv", ".parquet"):
+        raise OutputError(f"{path}: a table is written as .csv or .parquet; give such a name")
 
 
 def write_table(table: pd.DataFrame, path: Path) -> None:
-    """Write CSV (12 significant digits) or Parquet by suffix, whole or not at all."""
+    """Write CSV (12 significant digits) or Parquet by suffix, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        Neither suffix, or the file can not be written there.
+    """
+    check_table_path(path)
     with replace_path(path) as temporary:
-        if path.suffix == ".parquet":
+        if path.suffix.lower() == ".parquet":
             table.to_parquet(temporary, index=False)
         else:
             table.to_csv(temporary, index=False, float_format="%.12g")

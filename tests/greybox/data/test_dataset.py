@@ -152,7 +152,7 @@ def changed(line: int, text: str) -> tuple[str, ...]:
         (changed(1, "time_s,inflow,level_m,outflow_m3_s"), ("'inflow' has the wrong unit", "name it 'inflow_m3_s'")),
         (changed(1, "time_s,inflow_m3_s,level_cm,outflow_m3_s"), ("'level_cm' has the wrong unit", "'level_m'")),
         (changed(3, "2,,1.1,0.2"), ("input 'inflow_m3_s' has no value in line 3", "1 in all", "fill in")),
-        (changed(4, "4,inf,1.1,0.2"), ("input 'inflow_m3_s' has no value in line 4", "cut")),
+        (changed(4, "4,inf,1.1,0.2"), ("'inflow_m3_s', line 4: inf is no measured value", "correct it")),
         (changed(4, "4,0.1,high,0.2"), ("column 'level_m', line 4: 'high' is not a number", "correct it")),
         (changed(2, "noon,0.1,1.0,0.1"), ("column 'time_s', line 2: 'noon' is not a number", "correct it")),
         (changed(3, ",0.2,1.1,0.2"), ("'time_s' is empty in line 3", "give the time")),
