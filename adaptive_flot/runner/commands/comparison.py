@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from adaptive_flot.described import Described
 from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.commands.run_files import run_summary
@@ -43,8 +44,8 @@ class Spread:
         return cls(float(np.median(finite)), float(finite.min()), float(finite.max()), values.size - finite.size)
 
 
-@dataclass(frozen=True)
-class Contender:
+@dataclass(frozen=True, repr=False)
+class Contender(Described):
     """A controller with an estimator; its runs, one a seed.
 
     Attributes
@@ -61,6 +62,10 @@ class Contender:
     estimator: str
     result: str
     runs: pd.DataFrame
+
+    def described(self) -> dict[str, object]:
+        """Who ran how often; see `Described`."""
+        return {"controller": self.controller, "estimator": self.estimator, "runs": len(self.runs)}
 
     @property
     def label(self) -> str:
@@ -103,8 +108,8 @@ class Contender:
         return {name: n for name, n in sorted(found.items(), key=lambda item: -item[1]) if n}
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Described):
     """The contenders of one scenario.
 
     Attributes
@@ -120,6 +125,10 @@ class Comparison:
     scenario: str
     grade_limit: float
     contenders: tuple[Contender, ...]
+
+    def described(self) -> dict[str, object]:
+        """Which scenario, and who ran; see `Described`."""
+        return {"scenario": self.scenario, "contenders": "; ".join(c.label for c in self.contenders)}
 
     @cached_property
     def same_seeds(self) -> bool:

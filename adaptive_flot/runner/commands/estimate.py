@@ -14,6 +14,7 @@ from adaptive_flot import metrics
 from adaptive_flot.contracts import AnyEstimator, ControllerSetup, Prior, Setup, full_parameters
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.contracts.track import Track
+from adaptive_flot.described import Described
 from adaptive_flot.errors import DataError, ModelError, PluginError, near_match
 from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import Source, named
@@ -28,8 +29,8 @@ from adaptive_flot.runner.scenario.keys import Plugin
 WHITENESS_LAGS = 20
 
 
-@dataclass(frozen=True)
-class Blocks:
+@dataclass(frozen=True, repr=False)
+class Blocks(Described):
     """A record in two blocks: `fit` (parameters come from here only) and `test`.
 
     `continues` tells whether the test block goes on where the fit block ends, or starts from the same initial state.
@@ -39,6 +40,10 @@ class Blocks:
     fit: Dataset
     test: Dataset
     continues: bool
+
+    def described(self) -> dict[str, object]:
+        """The record and its cut; see `Described`."""
+        return {"record": self.name, "rows to fit": len(self.fit), "rows to test": len(self.test)}
 
 
 @dataclass(frozen=True)
@@ -67,8 +72,8 @@ class OutputError:
     samples: int
 
 
-@dataclass(frozen=True)
-class Replay:
+@dataclass(frozen=True, repr=False)
+class Replay(Described):
     """One estimator over the record.
 
     Attributes
@@ -92,15 +97,24 @@ class Replay:
     table: pd.DataFrame
     status_counts: dict[str, int]
 
+    def described(self) -> dict[str, object]:
+        """Who, and the parameters at the end of the fit block; see `Described`."""
+        return {"estimator": self.estimator, **{k: f"{v:.4g} ± {s:.2g}" for k, (v, s) in self.parameters.items()}}
 
-@dataclass(frozen=True)
-class RecordEstimate:
+
+@dataclass(frozen=True, repr=False)
+class RecordEstimate(Described):
     """Result of `estimate`: the blocks, the batch fit of the fit block and the replays."""
 
     blocks: Blocks
     setup: Setup
     batch: BatchFit
     replays: tuple[Replay, ...]
+
+    def described(self) -> dict[str, object]:
+        """Record, batch fit and estimators; see `Described`."""
+        fitted = {e.label: f"{e.value:.4g} ± {e.std:.2g} {e.unit}" for e in self.batch.estimates}
+        return {"record": self.blocks.name, **fitted, "estimators": ", ".join(r.estimator for r in self.replays)}
 
 
 def read_blocks(path: Source, model: Model, fit_share: float) -> Blocks:

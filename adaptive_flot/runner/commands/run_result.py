@@ -11,6 +11,7 @@ import pandas as pd
 
 from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.contracts.batch import BatchFit
+from adaptive_flot.described import Described
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.results.accounts import account, control_account
@@ -19,8 +20,8 @@ from adaptive_flot.runner.results.timeseries import fits, time_series
 from adaptive_flot.runner.scenario.realisation import Realisation
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Described):
     """One run.
 
     Attributes
@@ -62,6 +63,12 @@ class Run:
     fault_counts: dict[str, int] = field(default_factory=dict)
     plans: pd.DataFrame = field(default_factory=pd.DataFrame)
     inquiries: Sequence[Inquiry] | None = None
+
+    def described(self) -> dict[str, object]:
+        """What ran and how well it fits; see `Described`."""
+        quality = {f"fit of {name}": f"{value:.2f} %" for name, value in self.fit.items()}
+        who = {"estimator": self.estimator, "controller": self.controller, "seed": self.seed}
+        return {**who, "intervals": len(self.table), **quality}
 
     @classmethod
     def of(

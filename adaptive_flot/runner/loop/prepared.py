@@ -9,6 +9,7 @@ from functools import cached_property
 from adaptive_flot.contracts import AnyController, AnyEstimator, ControllerSetup, Setup
 from adaptive_flot.contracts.batch import BatchEstimator
 from adaptive_flot.contracts.delayed_measurements import taking_delayed_values
+from adaptive_flot.described import Described
 from adaptive_flot.errors import ScenarioError, near_match
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.runner.scenario.keys import Plugin
@@ -16,8 +17,8 @@ from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 
-@dataclass(frozen=True)
-class Prepared:
+@dataclass(frozen=True, repr=False)
+class Prepared(Described):
     """A scenario and its plug-ins.
 
     An estimator is a frozen configuration (`Estimator`), so all seeds can share one. A controller is built for the
@@ -35,6 +36,11 @@ class Prepared:
     estimators: Mapping[str, Plugin]
     controllers: Mapping[str, Plugin]
     _built: dict[str, AnyEstimator] = field(default_factory=dict, repr=False)
+
+    def described(self) -> dict[str, object]:
+        """What is prepared; see `Described`."""
+        who = {"estimators": ", ".join(self.estimators), "controllers": ", ".join(self.controllers)}
+        return {"scenario": self.scenario.name, **who}
 
     @classmethod
     def of(cls, scenario: Scenario, estimators: Sequence[str] = (), controllers: Sequence[str] = ()) -> Prepared:

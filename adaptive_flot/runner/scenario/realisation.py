@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from adaptive_flot.described import Described
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.scenario.disturbances import Disturbances, draw_disturbances
 from adaptive_flot.runner.scenario.measurement_noise import draw_measurement_noise
@@ -14,8 +15,8 @@ from adaptive_flot.runner.scenario.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 
-@dataclass(frozen=True)
-class Realisation:
+@dataclass(frozen=True, repr=False)
+class Realisation(Described):
     """A scenario with one seed. Each array is worked out once and can not be written to.
 
     All runs with this scenario and seed see the same realisation, whatever estimates and controls.
@@ -30,6 +31,10 @@ class Realisation:
 
     scenario: Scenario
     seed: int
+
+    def described(self) -> dict[str, object]:
+        """Of what; see `Described`."""
+        return {"scenario": self.scenario.name, "seed": self.seed}
 
     @cached_property
     def schedule(self) -> FloatArray:

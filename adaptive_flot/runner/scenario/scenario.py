@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from adaptive_flot.contracts import Limits, Setup
+from adaptive_flot.described import Described
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.faults import ControllerFault, PlantFault, SlowAnalyser
 from adaptive_flot.runner.scenario.keys import ScenarioFile
 
 
-@dataclass(frozen=True)
-class Scenario:
+@dataclass(frozen=True, repr=False)
+class Scenario(Described):
     """A validated scenario.
 
     Attributes
@@ -41,6 +42,19 @@ class Scenario:
     model: Model
     setup: Setup
     plant_model: Model
+
+    def described(self) -> dict[str, object]:
+        """What it runs; see `Described`."""
+        file = self.file
+        return {
+            "name": self.name,
+            "model": self.model.name,
+            "duration": f"{file.duration_s:g} s every {self.dt:g} s",
+            "adapts": ", ".join(file.adapt.parameters),
+            "estimators": ", ".join(file.estimators),
+            "controllers": ", ".join(file.controllers),
+            "seeds": _few(file.seeds),
+        }
 
     def compiled(self) -> Scenario:
         """The same scenario, its step and its estimators as machine code (`Model.compiled`)."""
@@ -149,3 +163,8 @@ class Scenario:
     def controller_faults(self) -> list[ControllerFault]:
         """Faults inside the controller, in the order of the file."""
         return [fault for fault in self.file.faults if isinstance(fault, ControllerFault)]
+
+
+def _few(seeds: Sequence[int]) -> str:
+    """Seeds in words: the first ones where there are many."""
+    return ", ".join(map(str, seeds)) if len(seeds) <= 5 else f"{seeds[0]}, {seeds[1]}, ... {len(seeds)} in all"
