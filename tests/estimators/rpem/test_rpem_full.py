@@ -16,8 +16,9 @@ from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.processes.registry import make_model
 from benchmarks.forgetting import Recursion, stabilised
-from estimators.rpem.estimator import Rpem, RpemState
+from estimators.rpem.estimator import Rpem
 from estimators.rpem.full import rpem_full
+from estimators.rpem.state import RpemState
 from estimators.rpem.update import alternative_covariance
 from tests.estimators import toys
 from tests.estimators.conftest import CellCase, replay
