@@ -35,10 +35,8 @@ class FeedForward:
 
     def __init__(self, setup: ControllerSetup, pair: tuple[str, str]) -> None:
         model, inputs = setup.model, setup.schedule[-1]
-        limited = () if setup.limits is None else setup.limits.inputs
         moved, output = pair
-        self._of_inputs = [i for i, q in enumerate(model.inputs) if q.name not in limited]
-        self._of_parameters = [i for i, p in enumerate(model.parameters) if p.disturbance]
+        self._of_inputs, self._of_parameters = disturbances(setup)
         self._inputs, self._parameters = inputs[self._of_inputs].copy(), model.parameter_values[self._of_parameters]
         names = [model.parameters[i].name for i in self._of_parameters]
         process = linearise(model, inputs, parameters_as_inputs=names)
@@ -60,6 +58,18 @@ class FeedForward:
         changes = np.concatenate([sample.inputs[self._of_inputs] - self._inputs, known - self._parameters])
         changes = np.where(np.isfinite(changes), changes, 0.0)
         return self.a @ state + self.b @ changes, float((self.c @ state + self.d @ changes)[0])
+
+
+def disturbances(setup: ControllerSetup) -> tuple[list[int], list[int]]:
+    """Indices of the inputs without a range in the limits, and of the parameters that are disturbances."""
+    ranged = () if setup.limits is None else setup.limits.inputs
+    of_inputs = [i for i, q in enumerate(setup.model.inputs) if q.name not in ranged]
+    return of_inputs, [i for i, p in enumerate(setup.model.parameters) if p.disturbance]
+
+
+def has_disturbances(setup: ControllerSetup) -> bool:
+    """Whether there is anything to feed forward."""
+    return any(disturbances(setup))
 
 
 def inverse(moved: control.StateSpace, disturbing: control.StateSpace) -> control.StateSpace:

@@ -16,7 +16,7 @@ from adaptive_flot.contracts import ControllerSetup, Decision, Estimate, Sample,
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
-from controllers.feed_forward import FeedForward
+from controllers.feed_forward import FeedForward, has_disturbances
 
 MOST_LAG_DEG = 80.0
 """Phase lag a PI controller gives at most in this design; with 90 degrees it would be a mere integrator."""
@@ -101,7 +101,8 @@ class Pi:
             model, (moved, output), setup.schedule[-1], filter_s, crossover_rad_s, np.deg2rad(phase_margin_deg)
         )
         self._memory = float(np.exp(-setup.dt / filter_s))
-        self.feed_forward = FeedForward(setup, (moved, output)) if feed_forward else None
+        ahead = FeedForward(setup, (moved, output)) if feed_forward and has_disturbances(setup) else None
+        self.feed_forward = ahead
 
     def init(self, time: float) -> PiState:
         """Start before the first sample."""

@@ -7,9 +7,13 @@ and back to the reservoir. Levels are in volts of an uncalibrated sensor; only t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.contracts.economics import OperatingPoint
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
@@ -81,6 +85,38 @@ def _equations(m: Scope) -> None:
     m.derivative("upper_level", pumped - out)
     m.derivative("lower_level", into - away)
     m.output("level", m.site("level_sensor", lower, "sensor", "offset", unit="V"))
+
+
+@dataclass(frozen=True)
+class PumpingEconomics:
+    """A lower level is worth something and pumping costs power: the contract `Economics`.
+
+    The power of a pump grows with the cube of its speed (affinity laws), here of its voltage u [V]. At rest the level
+    is (k2 k4 / (k1 k3))^2 u^2; where k2 k4 = k1 k3, the best voltage is u = 2 level / (3 pumping). Prices are chosen.
+
+    Attributes
+    ----------
+    level
+        Worth of the lower level [cu/(V s)].
+    pumping
+        Price of pumping, by the cube of the voltage [cu/(V3 s)].
+    """
+
+    level: float = 1.0
+    pumping: float = 0.25
+    terms: ClassVar[tuple[str, ...]] = ("level", "pumping")
+    typical_rate: ClassVar[float] = 1.0
+
+    def prices(self) -> list[float]:
+        """Prices in the order of the fields."""
+        return [self.level, self.pumping]
+
+    def rates(self, point: OperatingPoint, prices: Any) -> dict[str, Any]:
+        """Rate of each term [cu/s]."""
+        return {
+            "level": prices[0] * point.output("level"),
+            "pumping": -prices[1] * point.input("pump_voltage") ** 3,
+        }
 
 
 def read_benchmark(path: Source) -> tuple[Dataset, Dataset]:
