@@ -1,19 +1,64 @@
-"""The grey-box engine: models, steppers, measured tables. It knows nothing of flotation."""
+"""The grey-box engine: models, effects on them, simulation, measured tables. It knows nothing of flotation.
 
+Map, in the order of use
+------------------------
+quantities.py        Named quantities, parameters and known effects.
+scope.py             What equations are written into: symbols, sites, derivatives, outputs.
+model.py             Model: quantities and equations, its functions, its effects.
+build.py             Equations to CasADi functions.
+function_cache.py    Functions derived from a model, each made once.
+forms/               Forms of an effect, their coefficients and what each coefficient does (its role).
+effects.py           Effect: a form at a site, with a driver and values.
+extension.py         A model with effects, and without them.
+sensors.py           A model without the errors of its sensors.
+stepping/            Simulation of one sampling interval and of whole records, with exact sensitivities.
+data/                Measured tables.
+steady_state.py      Steady states and their sensitivities.
+linear.py            State space at an operating point (imports python-control, so it is not part of this front).
+cramer_rao_bound.py  Posterior Cramer-Rao bound: the smallest error that any estimator can have.
+"""
+
+from adaptive_flot.greybox.cramer_rao_bound import (
+    LinearisedTrajectory,
+    ParameterDrift,
+    drift_of_time_profile,
+    linearise_trajectory,
+    posterior_cramer_rao_bound,
+    random_walk,
+)
 from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.stepper import Stepper, Trajectory
+from adaptive_flot.greybox.quantities import KnownEffect
+from adaptive_flot.greybox.scope import Site
+from adaptive_flot.greybox.sensors import without_sensor_effects
+from adaptive_flot.greybox.steady_state import SteadyState, steady_state, steady_state_gradient
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.greybox.stepping.stepper import Sensitivities, Stepper, Trajectory
 
 __all__ = [
     "Dataset",
+    "Effect",
     "FloatArray",
+    "KnownEffect",
+    "LinearisedTrajectory",
     "Model",
     "Parameter",
+    "ParameterDrift",
     "Quantity",
+    "RecordSimulator",
     "Scope",
+    "Sensitivities",
+    "Site",
+    "SteadyState",
     "Stepper",
     "Trajectory",
+    "drift_of_time_profile",
+    "linearise_trajectory",
+    "posterior_cramer_rao_bound",
+    "random_walk",
     "read_dataset",
     "steady_state",
+    "steady_state_gradient",
+    "without_sensor_effects",
 ]

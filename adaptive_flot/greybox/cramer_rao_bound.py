@@ -1,17 +1,27 @@
 """Posterior Cramer-Rao bound of states and drifting parameters along a known trajectory.
 
-z = (x, theta, d): nx model states, q parameters, and how much each parameter moves an interval. At the start of
-interval k the moves are renewed where the parameters change their course, and added::
+z = (x, theta, d): nx model states, q parameters, and d, the move of each parameter an interval. At the start of
+interval k each move is kept or renewed, and added to its parameter::
 
     d_k = keep_k d_(k-1) + v_k, v_k ~ N(0, V_k)     theta_k = theta_(k-1) + d_k     x_(k+1) = f(x_k, theta_k)
     y_(k+1) = g(x_k, theta_k) + e,  e ~ N(0, R)
 
-A random walk renews every move, a ramp only at its two ends. The bound of the error covariance of any estimator is that
-of this model linearised at the true trajectory: the recursion of Tichavsky, Muravchik & Nehorai, *Posterior
-Cramer-Rao bounds for discrete-time nonlinear filtering*, IEEE Trans. Signal Processing 46 (1998), equation 21, which is
-here taken in its covariance form (by the matrix inversion lemma), since the states have no noise of their own and their
-information is infinite. Its expectation over trajectories is replaced by the trajectory at hand; average the
-covariances of several runs where that matters.
+A random walk renews every move, a ramp only at its two ends.
+
+The bound is the inverse of the information J that no estimator exceeds: E[(estimate - z)(estimate - z)'] >= J^-1.
+With the blocks D11, D12, D21 and D22 of expected second derivatives of -log p(z_(k+1), y_(k+1) | z_k)::
+
+    J_(k+1) = D22 - D21 (J_k + D11)^-1 D12
+
+(Tichavsky, Muravchik & Nehorai, *Posterior Cramer-Rao bounds for discrete-time nonlinear filtering*, IEEE Trans. Signal
+Processing 46 (1998), equation 21). The states have no noise of their own, so D11 is infinite. The recursion is
+therefore taken for P = J^-1, by the matrix inversion lemma, with the model linearised at the true trajectory::
+
+    P_k   <- P_k - P_k H' (H P_k H' + R)^-1 H P_k     (measurements, one output after the other)
+    P_k+1  = F P_k F' + V                             (one interval)
+
+The expectation over trajectories is replaced by the trajectory at hand. Average the covariances of several runs where
+that matters.
 """
 
 from __future__ import annotations
@@ -34,24 +44,40 @@ SAME_MOVE = 1e-6
 
 
 @dataclass(frozen=True)
-class Linearisation:
-    """Derivatives of N intervals for states and parameters at their start: `F` (N, nx, nx + q), `H` (N, ny, nx + q)."""
+class LinearisedTrajectory:
+    """Exact derivatives of N intervals for the states and the q parameters at their start.
+
+    Attributes
+    ----------
+    F
+        Those of the states at the end of each interval (N, nx, nx + q).
+    H
+        Those of the outputs at the end of each interval (N, ny, nx + q).
+    """
 
     F: FloatArray
     H: FloatArray
 
 
 @dataclass(frozen=True)
-class Course:
-    """How parameters may move: whether each goes on as before (N, q) and the variance of a new move (N, q)."""
+class ParameterDrift:
+    """How q parameters may move in N intervals.
+
+    Attributes
+    ----------
+    keep
+        1 where a parameter keeps the move of the interval before, 0 where it loses it (N, q).
+    variance
+        Variance of what is added to the move (N, q), in the square of the parameter's unit.
+    """
 
     keep: FloatArray
     variance: FloatArray
 
 
-def linearise(
+def linearise_trajectory(
     stepper: Stepper, wrt: Sequence[str], x0: FloatArray, inputs: FloatArray, parameters: FloatArray, t0: float = 0.0
-) -> Linearisation:
+) -> LinearisedTrajectory:
     """Linearise N intervals of a trajectory, exactly for the step itself.
 
     Parameters
@@ -80,7 +106,7 @@ def linearise(
         blocks = [_rows(np.array(results[i]), CHUNK)[: rows - first] for i in range(2, 6)]
         F[first : first + CHUNK] = np.concatenate(blocks[:2], axis=2)
         H[first : first + CHUNK] = np.concatenate(blocks[2:], axis=2)
-    return Linearisation(F, H)
+    return LinearisedTrajectory(F, H)
 
 
 def _jacobians_of_rows(model: Model, interval: Interval, wrt: tuple[str, ...]) -> ca.Function:
@@ -92,11 +118,11 @@ def _rows(side_by_side: FloatArray, count: int) -> FloatArray:
     return side_by_side.reshape(len(side_by_side), count, -1).transpose(1, 0, 2)
 
 
-def course_of(theta: FloatArray) -> Course:
-    """Course of known true parameters (N, q): what one knows who is told when each of them turns, but not where to.
+def drift_of_time_profile(theta: FloatArray) -> ParameterDrift:
+    """Drift of parameters whose true time profile (N, q) is known: the times of its turns are told, not where to.
 
-    Wherever a parameter's move from one interval to the next changes, the new move is unknown, with the root mean
-    square of the moves that this parameter takes up in the whole record; a rest is known to be one.
+    Wherever the move from one interval to the next changes, the new move is unknown. Its standard deviation is the root
+    mean square of all moves that this parameter begins in the record; a rest is known to be one.
     """
     moves = np.diff(theta, axis=0, prepend=theta[:1])
     largest = np.abs(moves).max(axis=0)
@@ -104,22 +130,26 @@ def course_of(theta: FloatArray) -> Course:
     started = turns & (np.abs(moves) > SAME_MOVE * largest)
     count = np.maximum(started.sum(axis=0), 1)
     variance = np.where(started, (np.where(started, moves, 0.0) ** 2).sum(axis=0) / count, 0.0)
-    return Course((~turns).astype(float), variance)
+    return ParameterDrift((~turns).astype(float), variance)
 
 
-def walk(rows: int, std: FloatArray) -> Course:
-    """Course of parameters that do a random walk: std of each one's move an interval (q,)."""
-    return Course(np.zeros((rows, std.size)), np.tile(std**2, (rows, 1)))
+def random_walk(rows: int, std: FloatArray) -> ParameterDrift:
+    """Drift of parameters that do a random walk over so many rows; std of each one's move an interval (q,)."""
+    return ParameterDrift(np.zeros((rows, std.size)), np.tile(std**2, (rows, 1)))
 
 
-def bound(linear: Linearisation, course: Course, noise_std: FloatArray, start: FloatArray) -> FloatArray:
+def posterior_cramer_rao_bound(
+    linear: LinearisedTrajectory, drift: ParameterDrift, noise_std: FloatArray, start: FloatArray
+) -> FloatArray:
     """Smallest error covariance of states and parameters at the end of each interval (N, nx + q, nx + q).
+
+    Equation 21 of Tichavsky et al. (1998) in its covariance form; see the module.
 
     Parameters
     ----------
     linear
         The linearised trajectory.
-    course
+    drift
         How the parameters may move.
     noise_std
         Standard deviation of the noise of each output at the end of each interval (N, ny); NaN where not measured.
@@ -130,14 +160,14 @@ def bound(linear: Linearisation, course: Course, noise_std: FloatArray, start: F
     q = size - nx
     P = np.zeros((size + q, size + q))
     P[:size, :size] = start
-    found = np.empty((rows, size, size))
+    bounds = np.empty((rows, size, size))
     moves = slice(size, size + q)
     for k in range(rows):
         # the moves are renewed and added to the parameters
-        keep = course.keep[k]
+        keep = drift.keep[k]
         P[moves, :] *= keep[:, None]
         P[:, moves] *= keep
-        P[np.arange(size, size + q), np.arange(size, size + q)] += course.variance[k]
+        P[np.arange(size, size + q), np.arange(size, size + q)] += drift.variance[k]
         P[nx:size, :] += P[moves, :]
         P[:, nx:size] += P[:, moves]
         for j in np.flatnonzero(np.isfinite(noise_std[k])):
@@ -147,8 +177,8 @@ def bound(linear: Linearisation, course: Course, noise_std: FloatArray, start: F
         P[:nx, :] = linear.F[k] @ P[:size, :]
         P[:, :nx] = P[:, :size] @ linear.F[k].T
         P = (P + P.T) / 2
-        found[k] = P[:size, :size]
-    return found
+        bounds[k] = P[:size, :size]
+    return bounds
 
 
 def model_scale(model: Model, wrt: Sequence[str]) -> FloatArray:

@@ -19,9 +19,20 @@ Role = Literal["process", "sensor", "actuator", "feed", "flow"]
 class Site:
     """A quantity that effects may act on.
 
-    `role` says what kind of thing it is, `mode` how effects act on it by default, `passed` how often the equations
-    pass it (once per component of a quantity), `unit` what its value is given in, `signals` the signals that are known
-    where it is passed first.
+    Attributes
+    ----------
+    name
+        Name of the site.
+    role
+        What it is a quantity of: the process, a sensor, an actuator, a feed or a flow.
+    mode
+        How effects act on it by default, see `Effect.mode`.
+    passed
+        How often the equations pass it: once for each component of the quantity.
+    unit
+        Unit of its value, None where the equations do not tell.
+    signals
+        Signals that are known where it is passed first.
     """
 
     name: str
@@ -33,7 +44,15 @@ class Site:
 
 
 class Scope:
-    """The symbols of one model while its equations are written. Values are scalar `casadi.SX`."""
+    """The symbols of one model while its equations are written. Values are scalar `casadi.SX`.
+
+    Attributes
+    ----------
+    time
+        Symbol of the time [s].
+    derivatives, decays, outputs, signals, residuals, sites, site_values
+        What the equations have given so far, by name.
+    """
 
     def __init__(
         self, symbols: Mapping[Kind, Mapping[str, ca.SX]], time: ca.SX, effects: Sequence[Effect] = ()

@@ -23,7 +23,15 @@ SETTLING_STEPS = 3000
 
 @dataclass(frozen=True)
 class SteadyState:
-    """A steady state x (nx,) and the largest scaled rate that is left, max |dx/dt / scale| [1/s]."""
+    """A steady state of a model.
+
+    Attributes
+    ----------
+    state
+        The state x (nx,).
+    residual
+        Largest scaled rate that is left, max |dx/dt / scale| [1/s].
+    """
 
     state: FloatArray
     residual: float

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from adaptive_flot.contracts import Prior
-from adaptive_flot.greybox.cramer_rao_bound import Course, bound, course_of, linearise, walk
+from adaptive_flot.greybox.cramer_rao_bound import (
+    ParameterDrift,
+    drift_of_time_profile,
+    linearise_trajectory,
+    posterior_cramer_rao_bound,
+    random_walk,
+)
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from tests.estimators import toys
@@ -20,12 +26,12 @@ def test_random_walk_of_a_linear_model_has_its_exact_posterior_covariance() -> N
     inputs = np.array([s.inputs for s in samples])
     parameters = np.tile(setup.model.parameter_values, (len(samples), 1))
     stepper = Stepper(setup.model, setup.dt)
-    linear = linearise(stepper, setup.parameters, np.zeros(2), inputs, parameters)
+    linear = linearise_trajectory(stepper, setup.parameters, np.zeros(2), inputs, parameters)
     measured = np.isfinite([s.outputs for s in samples])
     noise = np.where(measured, record.prior.noise_std, np.nan)
     std = np.array([0.05, 0.2])
     assert record.prior.joint_covariance is not None
-    found = bound(linear, walk(len(samples), std), noise, record.prior.joint_covariance)
+    found = posterior_cramer_rao_bound(linear, random_walk(len(samples), std), noise, record.prior.joint_covariance)
     Q = np.diag([0.0, 0.0, *std**2])
     # the bound at a sample knows the samples until then, so each instant is a record of its own
     for count in (1, 8, 25):
@@ -37,9 +43,11 @@ def straight(theta: FloatArray, noise: float, start_std: float) -> tuple[FloatAr
     """Bound of y = theta u for a known path of theta (N, 1), with the inputs u (N, 1)."""
     model = toys.linear(1, value=1.0)
     inputs = np.random.default_rng(2).normal(size=(len(theta), 1))
-    linear = linearise(Stepper(model, 1.0), ["th0"], np.zeros(1), inputs, theta)
+    linear = linearise_trajectory(Stepper(model, 1.0), ["th0"], np.zeros(1), inputs, theta)
     start = np.diag([0.0, start_std**2])
-    return bound(linear, course_of(theta), np.full((len(theta), 1), noise), start)[:, 1:, 1:], inputs
+    return posterior_cramer_rao_bound(linear, drift_of_time_profile(theta), np.full((len(theta), 1), noise), start)[
+        :, 1:, 1:
+    ], inputs
 
 
 def test_a_constant_parameter_has_the_variance_of_linear_regression() -> None:
@@ -63,17 +71,17 @@ def test_a_ramp_told_in_time_costs_one_unknown_slope() -> None:
 def test_a_step_is_one_unknown_move() -> None:
     theta = np.ones((20, 2))
     theta[7:, 0] = 1.5
-    course = course_of(theta)
-    np.testing.assert_allclose(course.variance[7], [0.25, 0.0])
-    assert not course.variance[np.arange(20) != 7].any()
-    assert course.keep[:, 1].all() and set(np.flatnonzero(course.keep[:, 0] == 0)) == {7, 8}
+    drift = drift_of_time_profile(theta)
+    np.testing.assert_allclose(drift.variance[7], [0.25, 0.0])
+    assert not drift.variance[np.arange(20) != 7].any()
+    assert drift.keep[:, 1].all() and set(np.flatnonzero(drift.keep[:, 0] == 0)) == {7, 8}
 
 
 def test_a_random_walk_is_renewed_at_every_interval_with_the_size_of_its_moves() -> None:
     moves = np.random.default_rng(1).normal(size=(500, 2)) * [0.1, 0.3]
-    course = course_of(np.cumsum(moves, axis=0))
-    assert not course.keep[1:].any()
-    np.testing.assert_allclose(np.sqrt(course.variance[1:]), np.tile([0.1, 0.3], (499, 1)), rtol=0.1)
+    drift = drift_of_time_profile(np.cumsum(moves, axis=0))
+    assert not drift.keep[1:].any()
+    np.testing.assert_allclose(np.sqrt(drift.variance[1:]), np.tile([0.1, 0.3], (499, 1)), rtol=0.1)
 
 
 @pytest.mark.parametrize("more", [0, 1])
@@ -81,16 +89,16 @@ def test_another_sensor_never_raises_the_bound(more: int) -> None:
     record = linear_record(3)
     model = record.setup.model
     inputs = np.array([s.inputs for s in record.samples])
-    linear = linearise(
+    linear = linearise_trajectory(
         Stepper(model, 1.0), ["th0", "th1"], np.zeros(2), inputs, np.tile(model.parameter_values, (25, 1))
     )
     prior: Prior = record.prior
     assert prior.joint_covariance is not None
     one = np.full((25, 2), np.nan)
     one[:, more] = 0.3
-    course = Course(np.zeros((25, 2)), np.full((25, 2), 0.01))
-    alone = bound(linear, course, one, prior.joint_covariance)
-    both = bound(linear, course, np.full((25, 2), 0.3), prior.joint_covariance)
+    drift = ParameterDrift(np.zeros((25, 2)), np.full((25, 2), 0.01))
+    alone = posterior_cramer_rao_bound(linear, drift, one, prior.joint_covariance)
+    both = posterior_cramer_rao_bound(linear, drift, np.full((25, 2), 0.3), prior.joint_covariance)
     gains = np.linalg.eigvalsh(alone - both)
     assert gains.min() > -1e-12 and gains.max() > 1e-3
 
@@ -100,10 +108,10 @@ def test_more_rows_than_one_call_takes_are_linearised_as_few_are() -> None:
     inputs = np.random.default_rng(4).normal(size=(701, 1))
     p = np.tile(model.parameter_values, (701, 1))
     stepper = Stepper(model, 1.0)
-    whole = linearise(stepper, ["a"], np.array([1.0]), inputs, p)
-    head = linearise(stepper, ["a"], np.array([1.0]), inputs[:10], p[:10])
+    whole = linearise_trajectory(stepper, ["a"], np.array([1.0]), inputs, p)
+    head = linearise_trajectory(stepper, ["a"], np.array([1.0]), inputs[:10], p[:10])
     np.testing.assert_allclose(whole.F[:10], head.F, rtol=1e-12)
     x = stepper.simulate(np.array([1.0]), inputs, p).states[599]
-    tail = linearise(stepper, ["a"], x, inputs[600:], p[600:], t0=600.0)
+    tail = linearise_trajectory(stepper, ["a"], x, inputs[600:], p[600:], t0=600.0)
     np.testing.assert_allclose(whole.F[600:], tail.F, rtol=1e-12)
     np.testing.assert_allclose(whole.H[600:], tail.H, rtol=1e-12)

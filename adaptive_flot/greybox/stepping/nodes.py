@@ -51,8 +51,8 @@ class Nodes:
     def spread(self, values: FloatArray, rows: IntArray | None = None) -> FloatArray:
         """Values at all rows (N, ...), or at some of them, from values at the nodes (M, ...)."""
         weights = self.weights if rows is None else self.weights[rows]
-        found: FloatArray = weights @ values.reshape(len(values), -1)
-        return found.reshape(len(found), *values.shape[1:])
+        spread: FloatArray = weights @ values.reshape(len(values), -1)
+        return spread.reshape(len(spread), *values.shape[1:])
 
     def means(self, values: FloatArray) -> FloatArray:
         """Means (M - 1, ...) over the rows of each interval, the row at its end among them; values (N, ...)."""
@@ -65,8 +65,8 @@ class Substeps(Nodes):
 
     def means(self, values: FloatArray) -> FloatArray:
         """What is held in each interval (M - 1, ...), the values of the row at its end; values (N, ...)."""
-        found: FloatArray = np.repeat(values[1:], (len(self.rows) - 1) // (len(values) - 1), axis=0)
-        return found
+        held: FloatArray = np.repeat(values[1:], (len(self.rows) - 1) // (len(values) - 1), axis=0)
+        return held
 
 
 def substeps(record: Dataset, count: int) -> Substeps:

@@ -76,9 +76,9 @@ class Recursion:
         """
         first = [carried[name] if carried[name].ndim == 2 else carried[name][:, None] for name in self._carried]
         tables = [each[name].T if each[name].ndim == 2 else self._repeat(each[name]) for name in self._each]
-        found = self._call(*first, *tables)
+        results = self._call(*first, *tables)
         square = {result for name, result in self._pairs.items() if carried[name].ndim == 2}
-        return {n: self._by_rows(value, n in square) for n, value in zip(self._results, found, strict=True)}
+        return {n: self._by_rows(value, n in square) for n, value in zip(self._results, results, strict=True)}
 
     def _repeat(self, value: FloatArray) -> FloatArray:
         return value[:, None].repeat(self.rows, axis=1)

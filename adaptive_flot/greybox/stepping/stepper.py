@@ -35,7 +35,15 @@ CHUNK = 64
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A simulated record of N rows: time (N,), states (N, nx), outputs (N, ny), signals (N, ns)."""
+    """A simulated record of N rows, each at the end of an interval.
+
+    Attributes
+    ----------
+    time
+        Time of each row [s] (N,).
+    states, outputs, signals
+        Their values (N, nx), (N, ny) and (N, ns), in the model's units.
+    """
 
     time: FloatArray
     states: FloatArray
@@ -45,7 +53,15 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """A record and its derivatives for q unknowns: outputs (N, ny), gradient (N, ny, q), last state, its (nx, q)."""
+    """A simulated record of N rows and its derivatives for q unknowns.
+
+    Attributes
+    ----------
+    outputs, gradient
+        Outputs (N, ny) and their derivatives (N, ny, q).
+    last_state, last_state_gradient
+        State at the end (nx,) and its derivatives (nx, q).
+    """
 
     outputs: FloatArray
     gradient: FloatArray

@@ -8,7 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from adaptive_flot.greybox.cramer_rao_bound import Course, Linearisation, bound, course_of, linearise, model_scale
+from adaptive_flot.greybox.cramer_rao_bound import (
+    LinearisedTrajectory,
+    ParameterDrift,
+    drift_of_time_profile,
+    linearise_trajectory,
+    model_scale,
+    posterior_cramer_rao_bound,
+)
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state_gradient
 from adaptive_flot.greybox.stepping.stepper import Stepper
@@ -63,31 +70,34 @@ class TrueRun:
         return self._stepper.simulate(self.start, self.inputs, self.parameters).outputs
 
     @cached_property
-    def linear(self) -> Linearisation:
+    def linear(self) -> LinearisedTrajectory:
         """The run, linearised."""
-        return linearise(self._stepper, self.scenario.setup.parameters, self.start, self.inputs, self.parameters)
+        names = self.scenario.setup.parameters
+        return linearise_trajectory(self._stepper, names, self.start, self.inputs, self.parameters)
 
     @property
     def _stepper(self) -> Stepper:
         return Stepper(self.scenario.plant_model, self.scenario.dt)
 
-    def limit(self, course: Course | None = None, more: Mapping[str, float] | None = None) -> FloatArray:
+    def limit(self, drift: ParameterDrift | None = None, more: Mapping[str, float] | None = None) -> FloatArray:
         """Smallest error covariance of the adapted parameters at the end of each interval (N, q, q), in their units.
 
         The inputs are known, and so is the start: steady at unknown parameters, or the state that the scenario gives.
 
         Parameters
         ----------
-        course
-            How the parameters may move; default the bound of one who is told when each parameter turns, but not where
-            to (see `course_of`): nobody who has to find that out himself can do better.
+        drift
+            How the parameters may move; default `drift_of_time_profile`, for one who is told when each parameter turns,
+            but not where to. Nobody who has to find that out himself can do better.
         more
             Outputs measured every interval beside those that drive the adaptation, with their noise as a share of their
             mean.
         """
         q = len(self.scenario.setup.parameters)
-        found = bound(self.linear, course or course_of(self.adapted), self._noise(more or {}), self._first_covariance())
-        return found[:, -q:, -q:]
+        known = drift or drift_of_time_profile(self.adapted)
+        noise = self._noise(more or {})
+        covariance = posterior_cramer_rao_bound(self.linear, known, noise, self._first_covariance())
+        return covariance[:, -q:, -q:]
 
     def fits(self, covariance: FloatArray) -> FloatArray:
         """Fits in percent (q,), as estimators are given them, of errors with this covariance (N, q, q)."""
