@@ -2,9 +2,9 @@
 
 The plant of paper scenario 1 (ramps of C, then n; the grade alone measured) under other input sequences: the fits that
 two posterior Cramer-Rao bounds allow, with the grade alone and with more sensors, and those that the estimators reach.
-`told` knows when the parameters turn (`adaptive_flot.greybox.cramer_rao_bound.course_of`); `walk` believes, as `ekf`
-does, that both walk all the time, by 6 % an hour. Medians over a few seeds. The sequences of the paper are not
-published, so that a published fit of C belongs to a row of this table that nobody knows.
+`told` knows when the parameters turn (`drift_of_time_profile` of the bound). `walk` believes, as `ekf` does, that both
+walk all the time, by 6 % an hour. Medians over a few seeds. The sequences of the paper are not published, so that a
+published fit of C belongs to a row of this table that nobody knows.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from adaptive_flot.greybox.cramer_rao_bound import walk
+from adaptive_flot.greybox.cramer_rao_bound import random_walk
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun
@@ -76,7 +76,7 @@ def medians(scenario: Scenario, estimators: Sequence[str], seeds: Sequence[int])
         run = TrueRun(Realisation(scenario, seed), Realisation(scenario, seed).schedule)
         P = run.limit()
         late = P[scenario.initial_rows :]
-        walking = walk(len(P), WALK * run.adapted[0] * np.sqrt(scenario.dt / 3600.0))
+        walking = random_walk(len(P), WALK * run.adapted[0] * np.sqrt(scenario.dt / 3600.0))
         walking.variance[: scenario.initial_rows] = 0.0  # the estimators know that nothing moves until they start
         courses = (None, walking)
         bounds.append([run.fits(run.limit(c, sensors)) for c in courses for sensors in ({}, MORE_SENSORS)])

@@ -74,7 +74,7 @@ def told(scenario: Scenario, run: Run, inquiry: Inquiry) -> str:
     errors = "; ".join(f"{name} {a:.3e} to {b:.3e}" for name, (a, b) in inquiry.errors.items())
     words += f"; one-step error between search and result, noise included: {errors}" if errors else ""
     (there,) = scenario.plant_model.fitted_effects()
-    if effect.form != "curve" or (effect.site, effect.driver) != (there.site, there.driver):
+    if not effect.family.is_curve or (effect.site, effect.driver) != (there.site, there.driver):
         return words
     air = run.table.loc[run.table["time_s"].between(*inquiry.record_s), f"{effect.driver}_m3_s"]
     ends = np.array([air.min(), air.max()])

@@ -15,12 +15,12 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.forms.catalogue import FORMS
-from adaptive_flot.greybox.forms.form import Coefficient, Form, Settings, wrong_setting
+from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole, Form, Settings, wrong_setting
 from adaptive_flot.greybox.quantities import Parameter, Quantity
 
 Mode = Literal["factor", "offset"]
 DYNAMIC_DRIVERS = ("lag", "delay", "saturation")
-"""What acts on the value at a site itself: it answers late, or only up to a limit."""
+"""What acts on the value at a site itself: it is delayed, or limited."""
 STATELESS_DRIVERS = ("constant", "time", *DYNAMIC_DRIVERS)
 
 
@@ -60,11 +60,11 @@ class Effect:
     def __post_init__(self) -> None:
         if self.form not in FORMS:
             raise ModelError(f"effect at {self.site!r}: unknown form {self.form!r}; {near_match(self.form, FORMS)}")
-        shape = self.shape
+        family = self.family
         for name in self.settings:
-            if name not in shape.settings:
-                raise ModelError(f"{self.label}: unknown setting {name!r}; {near_match(name, shape.settings)}")
-        missing = [n for n, default in shape.settings.items() if default is None and n not in self.settings]
+            if name not in family.settings:
+                raise ModelError(f"{self.label}: unknown setting {name!r}; {near_match(name, family.settings)}")
+        missing = [n for n, default in family.settings.items() if default is None and n not in self.settings]
         if missing:
             raise ModelError(f"{self.label}: setting {missing[0]!r} is missing; give it")
         for name, setting in self.settings.items():
@@ -79,20 +79,34 @@ class Effect:
                 raise ModelError(f"{self.label}: {name} = {value:g} is outside [{c.lower:g}, {c.upper:g}] {c.unit}")
 
     @property
-    def shape(self) -> Form:
-        """The family it belongs to."""
+    def family(self) -> Form:
+        """The form itself: its law, its kind and what it may be asked."""
         return FORMS[self.form]
 
     @property
     def full_settings(self) -> Settings:
         """Settings with the defaults of the form filled in."""
-        defaults = {k: v for k, v in self.shape.settings.items() if v is not None}
+        defaults = {k: v for k, v in self.family.settings.items() if v is not None}
         return {**defaults, **self.settings}
 
     @property
     def terms(self) -> tuple[Coefficient, ...]:
         """Coefficients of the form with these settings."""
-        return self.shape.coefficients(self.full_settings)
+        return self.family.coefficients(self.full_settings)
+
+    def names(self, *roles: CoefficientRole) -> tuple[str, ...]:
+        """Names of the coefficients with one of these roles, in the order of the form."""
+        return tuple(c.name for c in self.terms if c.role in roles)
+
+    def values(self, *roles: CoefficientRole) -> list[float]:
+        """Values of the given coefficients with one of these roles, in the order in which they are given."""
+        wanted = self.names(*roles)
+        return [value for name, value in self.coefficients.items() if name in wanted]
+
+    @property
+    def levels(self) -> list[float]:
+        """Values of the given coefficients that are a change at the site itself: levels, and values at knots."""
+        return self.values(CoefficientRole.LEVEL, CoefficientRole.KNOT_VALUE)
 
     @property
     def label(self) -> str:
@@ -122,12 +136,12 @@ class Effect:
         g = "-" if (self.mode or mode) == "factor" else site
         known = {"g": g, "value": site, "driver": driver, "value/driver": slope}
         words = {c.name: c.unit for c in self.terms}
-        words |= {name: self.shape.setting_units.get(name, "-") for name in self.shape.settings}
+        words |= {name: self.family.setting_units.get(name, "-") for name in self.family.settings}
         return {name: known.get(word, word) for name, word in words.items()}
 
     def parameters(self, units: Mapping[str, str | None] | None = None) -> tuple[Parameter, ...]:
         """Coefficients as model parameters, with their `units` where these are known."""
-        source = f"effect: {self.shape.description}"
+        source = f"effect: {self.family.description}"
         return tuple(
             Parameter(
                 self.parameter(c.name),
@@ -145,20 +159,20 @@ class Effect:
     def states(self) -> tuple[Quantity, ...]:
         """Its own states, scaled by the setting `scale`."""
         return tuple(
-            Quantity(f"{self.label}.{n}", "-", f"{self.shape.description} at {self.site}")
-            for n in self.shape.states(self.full_settings)
+            Quantity(f"{self.label}.{n}", "-", f"{self.family.description} at {self.site}")
+            for n in self.family.states(self.full_settings)
         )
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for YAML and JSON."""
         settings = {k: list(v) if isinstance(v, tuple) else float(v) for k, v in self.settings.items()}
-        found: dict[str, Any] = {"site": self.site, "driver": self.driver, "form": self.form}
-        found["coefficients"] = {k: float(v) for k, v in self.coefficients.items()}
+        plain: dict[str, Any] = {"site": self.site, "driver": self.driver, "form": self.form}
+        plain["coefficients"] = {k: float(v) for k, v in self.coefficients.items()}
         if settings:
-            found["settings"] = settings
+            plain["settings"] = settings
         if self.mode:
-            found["mode"] = self.mode
-        return found
+            plain["mode"] = self.mode
+        return plain
 
 
 def check_distinct(effects: Iterable[Effect]) -> None:
@@ -179,11 +193,11 @@ def check_distinct(effects: Iterable[Effect]) -> None:
 def apply(effect: Effect, scope: Any, value: ca.SX, driver: ca.SX, mode: Mode) -> ca.SX:
     """Value of the site with the effect; `scope` gives parameter symbols and the effect's own states."""
     coefficients = {c.name: scope.parameter(effect.parameter(c.name)) for c in effect.terms}
-    shape, settings = effect.shape, effect.full_settings
-    if shape.direct is not None:
-        return shape.direct(_Own(scope, effect.label), value, driver, coefficients, settings)
-    assert shape.static is not None  # a form has one law or the other
-    g = shape.static(driver, coefficients, settings)
+    family, settings = effect.family, effect.full_settings
+    if family.direct is not None:
+        return family.direct(_Own(scope, effect.label), value, driver, coefficients, settings)
+    assert family.static is not None  # a form has one law or the other
+    g = family.static(driver, coefficients, settings)
     return value + g if mode == "offset" else value * ca.exp(g)
 
 

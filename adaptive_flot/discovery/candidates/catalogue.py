@@ -61,7 +61,8 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
             variants = tuple(_variants(site, driver, time, responses))
             if site.role == "sensor" and driver not in DYNAMIC_DRIVERS:
                 # the other kind of error: a gain where an offset is usual, an offset where a gain is
-                variants += tuple(_otherwise(v, site) for v in variants if v.effect.form in ("shift", "curve"))
+                either = [v for v in variants if v.effect.family.is_constant or v.effect.family.is_curve]
+                variants += tuple(_otherwise(v, site) for v in either)
             if variants:
                 nameable = (site.name, driver) in known or _nameable(site, driver, bool(known))
                 found.append(Candidate(site, driver, nameable, variants))
@@ -199,7 +200,7 @@ def _knots(values: FloatArray) -> tuple[float, ...] | None:
 def finer(variant: Variant, start: Mapping[str, float]) -> tuple[Variant, dict[str, float]] | None:
     """The same curve with more knots, and the start values that draw the coarse one; None for others and for a line."""
     effect = variant.effect
-    if effect.form != "curve":
+    if not effect.family.is_curve:
         return None
     coarse = knots_of(effect)
     if len(coarse) == 2:

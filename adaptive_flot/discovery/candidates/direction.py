@@ -6,17 +6,18 @@ import numpy as np
 
 from adaptive_flot.discovery.candidates.spline import knots_of, values_of
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import KnownEffect
 
 
 def trend(effect: Effect) -> float:
     """Positive where the value at the site rises with the driver over the record (or, of a constant, is larger)."""
-    c = effect.coefficients
-    if effect.form == "curve":
+    if effect.family.is_curve:
         knots = np.array(knots_of(effect))
         return float((knots - knots.mean()) @ np.array(values_of(effect)))
-    return float(next((c[name] for name in ("exponent", "slope", "amplitude") if name in c), 0.0))
+    order = CoefficientRole.SLOPE, CoefficientRole.GAIN, CoefficientRole.LEVEL, CoefficientRole.BLEND
+    return float(next((value for role in order for value in effect.values(role)), 0.0))
 
 
 def listed(model: Model, effect: Effect) -> KnownEffect | None:

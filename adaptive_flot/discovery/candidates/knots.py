@@ -47,7 +47,7 @@ def trimmed(fit: Fit, effect: Effect, price: float) -> Trimmed | None:
     price
         What a knot must bring in minus two log-likelihood to stay.
     """
-    if effect.form != "curve":
+    if not effect.family.is_curve:
         return None
     knots = knots_of(effect)
     if effect.driver == "time" and not is_even(knots):

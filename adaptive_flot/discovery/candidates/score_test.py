@@ -18,6 +18,7 @@ from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.noise import CLIP, Noise, noise_by_differences, with_rows_before, without_spikes
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 
 REFINED = 33
@@ -131,7 +132,8 @@ class Scorer:
         """Noise left by a ridge fit of the constant, the slow and the power-law profiles of all sites together."""
         wanted, at = [], 0
         for v in variants:
-            if v.effect.form in ("shift", "power") or (v.effect.form == "curve" and v.effect.driver == "time"):
+            family = v.effect.family
+            if family.is_linear and (v.effect.driver == "time" or not family.is_curve):
                 wanted += list(range(at, at + len(v.profiles)))
             at += len(v.profiles)
         std = np.maximum(np.nan_to_num(noise_by_differences(residual)), self.problem.floor)
@@ -190,16 +192,18 @@ class Scorer:
 
     def refined(self, score: Score) -> Score:
         """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima."""
-        start = dict(score.variant.start)
-        if "onset" not in start:
+        effect, start = score.variant.effect, dict(score.variant.start)
+        if not effect.family.is_event:
             return score
+        (onset_name,) = effect.names(CoefficientRole.ONSET)
+        lengths = effect.names(CoefficientRole.DURATION, CoefficientRole.TIME_CONSTANT)
         time = self.problem.record.time
         reach = (time[-1] - time[0]) / (ONSETS + 1)
-        length = start.get("duration", start.get("time_constant", 0.0))
-        site, form = score.candidate.site, score.variant.effect.form
+        length = next((start[name] for name in lengths), 0.0)
+        site, form = score.candidate.site, effect.form
         variants = [
             event(site, form, time, float(onset), length * factor, site.mode == "offset")
-            for onset in start["onset"] + reach * np.linspace(-1, 1, REFINED)
+            for onset in start[onset_name] + reach * np.linspace(-1, 1, REFINED)
             for factor in (LENGTHS if length else (1.0,))
             if time[0] < onset < time[-1]
         ]

@@ -16,6 +16,7 @@ from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.candidates.spline import drawn, knots_of, through
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 
 POINTS = 300
@@ -51,9 +52,9 @@ def event_scores(score: Score, curve: Effect) -> list[Score]:
     values = drawn(curve, t)
     span = float(t[-1] - t[0])
     found = []
-    for form, second in (("ramp", "duration"), ("washout", "time_constant")):
-        amplitude, onset, length = _best(form, t, values, span)
-        found.append(_event(score, form, amplitude, (("onset", onset), (second, length)), curve, {}))
+    for form, role in (("ramp", CoefficientRole.DURATION), ("washout", CoefficientRole.TIME_CONSTANT)):
+        amplitude, onset, length = _best(role, t, values, span)
+        found.append(_event(score, form, amplitude, (("onset", onset), (role.name.lower(), length)), curve, {}))
     return found
 
 
@@ -62,12 +63,11 @@ def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
 
     `span` is the length of the record [s].
     """
-    c = fitted.coefficients
-    length = {"ramp": c.get("duration"), "washout": c.get("time_constant")}.get(fitted.form)
+    length = _length(fitted) if fitted.family.is_event else None
     if length is None or length > SUDDEN * span:
         return None
-    shape = (("onset", c["onset"] + length / 2),)
-    return _event(score, "step", c["amplitude"], shape, fitted, {"width": max(2.0, span / 1000)})
+    (amplitude,), (onset,) = fitted.levels, fitted.values(CoefficientRole.ONSET)
+    return _event(score, "step", amplitude, (("onset", onset + length / 2),), fitted, {"width": max(2.0, span / 1000)})
 
 
 def _event(
@@ -89,24 +89,22 @@ def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, f
     The record lasts from `low` to `high` [s]. None for a step, which has no shape, for a curve that has the knots, and
     for a slow ramp, of which a curve with even knots is the freer form.
     """
-    c = effect.coefficients
-    if effect.form == "step" or (effect.form == "ramp" and slow(effect)):
-        return None
-    if effect.form == "curve":
+    if effect.family.is_curve:
         if len(knots_of(effect)) >= MOST_KNOTS:
             return None
         at = np.linspace(low, high, MOST_KNOTS)
         values = drawn(effect, at)
     else:
-        length = c["duration"] if effect.form == "ramp" else 2 * c["time_constant"]
-        around = c["onset"] + length * np.array(AROUND)
+        length = _length(effect)
+        if length is None or slow(effect):
+            return None
+        role = CoefficientRole.DURATION if effect.values(CoefficientRole.DURATION) else CoefficientRole.TIME_CONSTANT
+        (amplitude,), (onset,) = effect.levels, effect.values(CoefficientRole.ONSET)
+        lasts = length if role is CoefficientRole.DURATION else 2 * length
+        around = onset + lasts * np.array(AROUND)
         inside = around[(around > low + KNOT_GAP * (high - low)) & (around < high - KNOT_GAP * (high - low))]
         at = np.concatenate([[low], inside, [high]])
-        since = np.maximum(at - c["onset"], 0)
-        ramp = effect.form == "ramp"
-        values = c["amplitude"] * (
-            np.minimum(since / c["duration"], 1) if ramp else 1 - np.exp(-since / c["time_constant"])
-        )
+        values = amplitude * _rise(role, at - onset, length)
     return through(effect, at, values)
 
 
@@ -115,10 +113,25 @@ def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
 
     Such a curve is an event after all where it changes much, and half of that at once: in less than `shortest` [s].
     """
-    if effect.form == "curve":
+    if effect.family.is_curve:
         knots = knots_of(effect)
         return is_even(knots) and not _jumps(effect, knots, shortest)
-    return effect.form == "ramp" and effect.coefficients["duration"] >= shortest
+    return any(duration >= shortest for duration in effect.values(CoefficientRole.DURATION))
+
+
+def _length(effect: Effect) -> float | None:
+    """Duration or time constant [s] of a fitted event; None for a step, which takes no time."""
+    return next(iter(effect.values(CoefficientRole.DURATION, CoefficientRole.TIME_CONSTANT)), None)
+
+
+def _rise(role: CoefficientRole, since: FloatArray, length: float) -> FloatArray:
+    """Part of an event (N,) that has happened at times since its onset (N,) [s]; `role` is that of its length [s]."""
+    after = np.maximum(since, 0)
+    if role is CoefficientRole.DURATION:
+        straight: FloatArray = np.minimum(after / length, 1)
+        return straight
+    exponential: FloatArray = 1 - np.exp(-after / length)
+    return exponential
 
 
 def _jumps(effect: Effect, knots: list[float], shortest: float) -> bool:
@@ -130,18 +143,16 @@ def _jumps(effect: Effect, knots: list[float], shortest: float) -> bool:
     return whole > LARGE and bool(np.max(np.abs(values[ahead:] - values[:-ahead]), initial=0.0) > whole / 2)
 
 
-def _best(form: str, t: FloatArray, values: FloatArray, span: float) -> tuple[float, float, float]:
+def _best(role: CoefficientRole, t: FloatArray, values: FloatArray, span: float) -> tuple[float, float, float]:
     """Amplitude, onset and duration whose event, up to a constant, is nearest to the values."""
     best = (np.inf, 0.0, float(t[len(t) // 2]), 0.1 * span)
     centred = values - values.mean()
     for onset in np.linspace(t[0], t[-1], ONSETS + 2)[1:-1]:
         for share in DURATIONS:
             length = share * span
-            if form == "ramp":
-                profile = np.clip((t - onset) / length, 0, 1)
-            else:
+            if role is CoefficientRole.TIME_CONSTANT:
                 length /= 3  # a washout of this time constant is done after about that duration
-                profile = 1 - np.exp(-np.maximum(t - onset, 0) / length)
+            profile = _rise(role, t - onset, length)
             profile = profile - profile.mean()
             amplitude = float(profile @ centred / max(profile @ profile, 1e-300))
             left = float(np.sum((centred - amplitude * profile) ** 2))

@@ -36,13 +36,11 @@ constant change more."""
 
 START_FRACTIONS = (1.0, 0.3, 0.1)
 """Fractions of a first-order estimate that are tried as the start."""
-ABRUPT = ("step", "lag", "lags", "delay", "stiction")
-"""Forms with events or fast states between the nodes of a record, which are simulated at every row."""
 
 
 def is_smooth(model: Model) -> bool:
-    """Whether a model's effects do nothing sudden between the nodes of a record."""
-    return not any(e.form in ABRUPT for e in model.effects)
+    """Whether a model's effects do nothing abrupt between the nodes of a record; else every row is simulated."""
+    return not any(e.family.abrupt for e in model.effects)
 
 
 class Descent:

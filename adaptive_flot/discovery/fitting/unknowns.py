@@ -59,7 +59,7 @@ class Unknowns:
         self.scale = np.array([p.scale for p in parameters])
         low = [max(p.lower, bounds.get(p.name, (-np.inf, np.inf))[0]) for p in parameters]
         high = [min(p.upper, bounds.get(p.name, (-np.inf, np.inf))[1]) for p in parameters]
-        shapes = {e.parameter(c.name) for e in model.effects for c in e.terms if c.shape}
+        shapes = {e.parameter(c.name) for e in model.effects for c in e.terms if c.is_shape}
         self.shaped = any(p.name in shapes for p in parameters)
         unbound = [i < len(problem.adapted) or p.name in shapes for i, p in enumerate(parameters)]
         self._range = np.array(low) / self.scale, np.array(high) / self.scale

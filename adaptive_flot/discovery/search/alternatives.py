@@ -16,7 +16,8 @@ from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, Effect
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray, Model
 
 SHORTLIST = 12
@@ -155,7 +156,7 @@ def fit_variant(
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
     first = first if drawn else limited(model, effect, first)
     found = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
-    in_time = effect.driver == "time" and effect.form == "curve" and len(names) <= FINE_TIME_KNOTS
+    in_time = effect.driver == "time" and effect.family.is_curve and len(names) <= FINE_TIME_KNOTS
     if found is not None and steps == MOST_STEPS and in_time:
         return fitter.settled(found, bounds, WORTH_A_RESTART)
     return found
@@ -176,7 +177,7 @@ def _warmed(start: Fit, warm: Fit) -> Fit:
 
 def fixed_coefficients(effect: Effect) -> dict[str, float]:
     """Coefficients that a search holds: the fraction of a lag, a dead time or a limit."""
-    return {"amplitude": 1.0} if effect.driver in DYNAMIC_DRIVERS else {}
+    return dict.fromkeys(effect.names(CoefficientRole.BLEND), 1.0)
 
 
 def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:
@@ -187,34 +188,28 @@ def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, 
         if name in start:
             parameter = model.parameters[model.index("parameters", name)]
             value = float(np.clip(start[name], parameter.lower, parameter.upper))
-            log_factor = _is_change(c.name) and effect.shape.static is not None
-            found[name] = float(np.clip(value, -0.9, 0.9)) if log_factor else value
+            found[name] = float(np.clip(value, -0.9, 0.9)) if c.is_level else value
     return found
 
 
 def effect_bounds(problem: Problem, model: Model, effect: Effect) -> dict[str, tuple[float, float]]:
     """Ranges of an effect's coefficients by full name: those of its shape, and of the change of a quantity."""
-    bounds = {effect.parameter(k): b for k, b in shape_bounds(problem).items()}
+    bounds = shape_bounds(problem, effect)
     site = next(s for s in model.sites if s.name == effect.site)
     if (effect.mode or site.mode) == "factor":
-        bounds |= {effect.parameter(c.name): (-MOST_CHANGE, MOST_CHANGE) for c in effect.terms if _is_change(c.name)}
+        bounds |= {effect.parameter(c.name): (-MOST_CHANGE, MOST_CHANGE) for c in effect.terms if c.is_level}
     return bounds
 
 
-def _is_change(coefficient: str) -> bool:
-    """Whether a coefficient is a change at the site itself."""
-    return coefficient.startswith(("amplitude", "value"))
-
-
-def shape_bounds(problem: Problem) -> dict[str, tuple[float, float]]:
-    """Ranges of shape coefficients that the record sets: an event inside it, a duration not longer than it."""
+def shape_bounds(problem: Problem, effect: Effect) -> dict[str, tuple[float, float]]:
+    """Ranges of an effect's shape by full name that the record sets: an event inside it, a duration at most its own."""
     t = problem.record.time
     span = float(t[-1] - t[0])
     margin = 0.02 * span
-    return {
-        "onset": (float(t[0]) + margin, float(t[-1]) - margin),
-        "duration": (1.0, span),
-        "time_constant": (0.2 * problem.record.dt, span),
-        "time_constant_2": (0.2 * problem.record.dt, span),
-        "dead_time": (2.0 * problem.record.dt, LONGEST_DELAY * span),
+    by_role = {
+        CoefficientRole.ONSET: (float(t[0]) + margin, float(t[-1]) - margin),
+        CoefficientRole.DURATION: (1.0, span),
+        CoefficientRole.TIME_CONSTANT: (0.2 * problem.record.dt, span),
+        CoefficientRole.DEAD_TIME: (2.0 * problem.record.dt, LONGEST_DELAY * span),
     }
+    return {effect.parameter(c.name): by_role[c.role] for c in effect.terms if c.role in by_role}

@@ -17,6 +17,7 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.search.alternatives import Alternative, fit_variant, variant_model
 from adaptive_flot.discovery.search.search import Search, scorer_of, threshold_of, what_is_left
+from adaptive_flot.greybox.forms.form import FormKind
 
 MINOR = 0.5
 """What is left must be less than this share of what the best has gained: else it is the matter, and not beside it."""
@@ -86,8 +87,9 @@ def _lacking(scorer: Scorer, best: Alternative) -> Score | None:
     for score in scorer.scores():
         if score.candidate.name in best.names:
             continue
-        forms = {s.variant.effect.form: s for s in reversed(scorer.variant_scores(score.candidate))}
-        for form in ("curve", "power", "shift"):
-            if form in forms:
-                return forms[form]
+        variants = scorer.variant_scores(score.candidate)
+        for kind in (FormKind.CURVE, FormKind.LINE, FormKind.CONSTANT):
+            for variant in variants:
+                if variant.variant.effect.family.kind is kind:
+                    return variant
     return None

@@ -13,6 +13,7 @@ from adaptive_flot.discovery.candidates.step_events import event_scores, freer, 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.search.alternatives import Alternative
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole
 
 FORMS_EACH = 3
 MOST_CONSTANTS = 4
@@ -59,8 +60,8 @@ def first_forms(linearisation: ScoredLinearisation, score: Score) -> list[Score]
     """The forms of the first rung: the best one, and for what depends on time its curve too."""
     if score.candidate.driver != "time":
         return [score]
-    curves = [s for s in linearisation.scorer.variant_scores(score.candidate) if s.variant.effect.form == "curve"][:1]
-    return [score] if score.variant.effect.form == "curve" else [score, *curves]
+    curves = [s for s in linearisation.scorer.variant_scores(score.candidate) if s.variant.effect.family.is_curve][:1]
+    return [score] if score.variant.effect.family.is_curve else [score, *curves]
 
 
 def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
@@ -75,10 +76,10 @@ def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
     in_time = score.candidate.driver == "time"
     kept = list(found.values())[:FORMS_EACH]
     if in_time:  # the curve, which events start from
-        kept = [s for k, s in found.items() if k[0] == "curve"] or [score]
+        kept = [s for s in found.values() if s.variant.effect.family.is_curve] or [score]
     jobs = []
     for s in kept:
-        same = s.variant.effect.form == "curve" and s.variant.effect == fitted.score.variant.effect
+        same = s.variant.effect.family.is_curve and s.variant.effect == fitted.score.variant.effect
         warm = None if in_time and not same else ended.fit
         fine = finer(s.variant, ended.effects[-1].coefficients if same else s.start)
         if fine:
@@ -99,15 +100,14 @@ def constants(scorer: Scorer, ended: list[Alternative]) -> list[tuple[Score, Fit
     found: dict[str, tuple[Score, Fit]] = {}
     for a in ended[:MOST_CONSTANTS]:
         effect = a.effects[-1]
-        site, c = effect.site, effect.coefficients
-        values = [v for k, v in c.items() if k.startswith(("value", "amplitude"))]
-        if effect.driver in ("constant", *DYNAMIC_DRIVERS) or site not in at or site in found or not values:
+        site, levels = effect.site, effect.levels
+        if effect.driver in ("constant", *DYNAMIC_DRIVERS) or site not in at or site in found or not levels:
             continue
         nearly = at[site].gain > NEARLY * scores.get((site, effect.driver), np.inf)
         if not nearly and (effect.driver == "time" or _bend(a.fit, effect) > BENT * max(a.gain, 0.0)):
             continue
         shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
-        found[site] = replace(shift, start={"amplitude": float(np.mean(values))}), a.fit
+        found[site] = replace(shift, start={"amplitude": float(np.mean(levels))}), a.fit
     return list(found.values())
 
 
@@ -127,17 +127,17 @@ def unbent(constant: FittedJob, ended: list[FittedJob], scorer: Scorer) -> list[
             continue
         if fitted.alternative.gain < (1 + ADDS) * reached.gain:
             level = effect.coefficients["amplitude"] * scorer.in_mode(effect.site, effect.mode, own.mode)
-            start = {c.name: level if c.name.startswith(("value", "amplitude")) else 0.0 for c in own.terms}
+            start = {c.name: level if c.is_level else 0.0 for c in own.terms}
             jobs.append(Job(constant.linearisation, replace(fitted.score, start=start), reached.fit))
     return jobs
 
 
 def _bend(fit: Fit, effect: Effect) -> float:
     """How much minus two log-likelihood would rise if the dependence were flat, to second order (Wald's test)."""
-    names = [effect.parameter(c) for c in effect.coefficients if c.startswith("value") or c in ("exponent", "slope")]
+    names = map(effect.parameter, effect.names(CoefficientRole.KNOT_VALUE, CoefficientRole.SLOPE))
     where = [fit.names.index(n) for n in names if n in fit.names]
     values, covariance = fit.values[where], fit.covariance[np.ix_(where, where)]
-    if effect.form == "curve":
+    if effect.family.is_curve:
         difference = np.diff(np.eye(len(where)), axis=0)
         values, covariance = difference @ values, difference @ covariance @ difference.T
     return float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)
@@ -149,7 +149,7 @@ def events(scores: list[Score], ended: list[Alternative]) -> list[Score]:
     found: dict[tuple[str, str], list[Score]] = {}
     for a in ended:
         effect, name = a.effects[-1], a.names[-1]
-        wanted = effect.driver == "time" and effect.form == "curve" and name not in found
+        wanted = effect.driver == "time" and effect.family.is_curve and name not in found
         if wanted and len(found) < MOST_PROFILES:
             found[name] = event_scores(by_name[name], effect)
     return [s for group in found.values() for s in group]
@@ -201,7 +201,7 @@ def from_scratch(jobs: list[Job]) -> list[Job]:
 
 def is_curve(fitted: FittedJob) -> bool:
     """Whether the form that was fitted is a free curve."""
-    return fitted.score.variant.effect.form == "curve"
+    return fitted.score.variant.effect.family.is_curve
 
 
 def best_of_each(found: list[FittedJob]) -> list[FittedJob]:

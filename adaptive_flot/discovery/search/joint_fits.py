@@ -17,6 +17,7 @@ from adaptive_flot.discovery.record.noise import correlation_times
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.search.alternatives import Alternative, fixed_coefficients, limited, shape_bounds
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole, FormKind
 from adaptive_flot.greybox.model import FloatArray, Model
 
 BEAM = 3
@@ -122,9 +123,9 @@ class JointFits:
             first = {c.name: c.scale * rng.uniform(0.1, 1.0) if c.lower == 0 else c.default for c in e.terms}
             start |= limited(model, e, {e.parameter(n): x for n, x in {**first, **dict(v.variant.start), **h}.items()})
             free += [e.parameter(c.name) for c in e.terms if c.name not in h]
-            bounds |= {e.parameter(n): b for n, b in shape_bounds(self.problem).items()}
+            bounds |= shape_bounds(self.problem, e)
             if e.driver in self.ranges:
-                bounds[e.parameter("threshold")] = self.ranges[e.driver]
+                bounds |= {e.parameter(n): self.ranges[e.driver] for n in e.names(CoefficientRole.THRESHOLD)}
         if k:
             factors = np.exp(np.log(SCATTER) * rng.uniform(-1, 1, len(self.base.names)))
             start |= dict(zip(self.base.names, map(float, self.base.values * factors), strict=True))
@@ -151,8 +152,9 @@ def _form(score: Score) -> tuple[str, str | None]:
 
 def _joint_form(scorer: Scorer, score: Score) -> tuple[str, str | None]:
     """The form in which an effect takes part: the spill of a flow where it has one, else the form that scores best."""
-    forms = [_form(v) for v in scorer.variant_scores(score.candidate)]
-    return next((f for f in forms if f[0] == "overflow"), forms[0])
+    variants = scorer.variant_scores(score.candidate)
+    spill = next((v for v in variants if v.variant.effect.family.kind is FormKind.THRESHOLD), variants[0])
+    return _form(spill)
 
 
 def correlation_time(problem: Problem, fit: Fit) -> float:

@@ -23,7 +23,7 @@ def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
     found = []
     for k, effect in enumerate(a.effects):
         constant = (effect.site, "constant")
-        if effect.driver in STATELESS_DRIVERS or constant in a.names or effect.shape.static is None:
+        if effect.driver in STATELESS_DRIVERS or constant in a.names or effect.family.static is None:
             continue
         others = [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k]
         shift = Effect(effect.site, "constant", "shift", mode=effect.mode)
@@ -37,8 +37,7 @@ def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
 
 def _middle(effect: Effect) -> float:
     """The constant that a dependence comes to: the mean of its values, or its amplitude."""
-    values = [v for k, v in effect.coefficients.items() if k.startswith(("value", "amplitude"))]
-    return float(np.mean(values)) if values else 0.0
+    return float(np.mean(effect.levels)) if effect.levels else 0.0
 
 
 def _refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], middle: float) -> Fit | None:

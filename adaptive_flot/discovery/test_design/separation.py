@@ -68,9 +68,9 @@ def hold_time(model: Model, time: float) -> Model:
     """The model with every effect of time kept as it is at `time` [s]: nobody knows how it would go on."""
     effects = []
     for e in model.fitted_effects():
-        if e.driver == "time" and e.shape.static is not None:
+        if e.driver == "time" and e.family.static is not None:
             values = {k: ca.SX(v) for k, v in e.coefficients.items()}
-            g = float(ca.evalf(ca.SX(e.shape.static(ca.SX(time), values, e.full_settings))))
+            g = float(ca.evalf(ca.SX(e.family.static(ca.SX(time), values, e.full_settings))))
             past = {"amplitude": g, "onset": time - LONG_AGO}
             effects.append(Effect(e.site, "time", "step", past, mode=e.mode))
         else:
@@ -81,8 +81,8 @@ def hold_time(model: Model, time: float) -> Model:
 def _uncertain(fit: Fit, held: Model, problem: Problem) -> tuple[tuple[str, ...], FloatArray]:
     """Uncertain parameters of a test, and a root of their covariance: that of the fit, and drift on top."""
     timed = [e.parameter("amplitude") for e in held.effects if e.driver == "time"]
-    of_time = tuple(f"{e.label}." for e in held.effects if e.driver == "time")
-    kept = [i for i, n in enumerate(fit.names) if not n.startswith(of_time)] if of_time else list(range(len(fit.names)))
+    of_time = {e.parameter(c.name) for e in fit.model.effects if e.driver == "time" for c in e.terms}
+    kept = [i for i, n in enumerate(fit.names) if n not in of_time]
     names = (*(fit.names[i] for i in kept), *timed)
     values = held.parameter_values[held.indices("parameters", names)]
     covariance = np.zeros((len(names), len(names)))

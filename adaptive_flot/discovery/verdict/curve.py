@@ -94,7 +94,7 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     model = fit.model
     site = next(s for s in model.sites if s.name == effect.site)
     units = {q.name: q.unit for q in (*model.inputs, *model.states, *model.signals)} | {"time": "s"}
-    relative = effect.shape.static is not None and (effect.mode or site.mode) == "factor"
+    relative = effect.family.static is not None and (effect.mode or site.mode) == "factor"
     x = np.linspace(float(np.min(seen)), float(np.max(seen)), POINTS)
     g, slope = _law(effect, value)
     names = [effect.parameter(c.name) for c in effect.terms]
@@ -103,7 +103,7 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     gradient = np.array([np.array(slope(v, c)).ravel() for v in x])
     covariance, anchor = _covariance(fit, names), None
     std = _spread(gradient, covariance)
-    if effect.shape.static is not None:
+    if effect.family.static is not None:
         typical = float(np.median(seen))
         there = np.array(slope(typical, c)).ravel()
         shape_only = _spread(gradient - there, covariance)
@@ -134,12 +134,12 @@ def _law(effect: Effect, value: float) -> tuple[ca.Function, ca.Function]:
     """The change g(driver, coefficients) of an effect without states at a typical value of its site, and its slope."""
     x, c = ca.SX.sym("x"), ca.SX.sym("c", len(effect.terms))
     coefficients = {t.name: c[i] for i, t in enumerate(effect.terms)}
-    shape, settings = effect.shape, effect.full_settings
-    if shape.static is not None:
-        g = ca.SX(shape.static(x, coefficients, settings))
+    family, settings = effect.family, effect.full_settings
+    if family.static is not None:
+        g = ca.SX(family.static(x, coefficients, settings))
     else:
-        assert shape.direct is not None  # a form has one law or the other
-        g = shape.direct(_Stateless(), ca.SX(value), x, coefficients, settings) - value
+        assert family.direct is not None  # a form has one law or the other
+        g = family.direct(_Stateless(), ca.SX(value), x, coefficients, settings) - value
     return ca.Function("g", [x, c], [g]), ca.Function("slope", [x, c], [ca.gradient(g, c)])
 
 

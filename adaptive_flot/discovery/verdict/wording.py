@@ -14,7 +14,7 @@ def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
     assert judgement.best is not None  # drift is a kind of alternative
     said = []
     for effect in after.model.fitted_effects()[-len(judgement.best.names) :]:
-        values = [v for k, v in effect.coefficients.items() if k.startswith(("amplitude", "value"))]
+        values = effect.levels
         change = values[0] if len(values) == 1 else _largest_move(values)
         site = next(s for s in after.model.sites if s.name == effect.site)
         offset = (effect.mode or site.mode) == "offset"

@@ -5,10 +5,12 @@ from __future__ import annotations
 import casadi as ca
 
 from adaptive_flot.greybox.forms.form import (
-    SHARE,
+    BLEND,
     Coefficient,
+    CoefficientRole,
     Coefs,
     Form,
+    FormKind,
     Settings,
     SiteScope,
     fixed,
@@ -37,10 +39,11 @@ DIRECT_FORMS: tuple[Form, ...] = (
     Form(
         "overflow",
         "a further flow in proportion to the driver, and what stands above a threshold of it spills",
+        FormKind.THRESHOLD,
         fixed(
-            Coefficient("slope", unit="value/driver", scale=0.01),
-            Coefficient("gain", 0.0, 0.0, scale=0.1, unit="value/driver"),
-            Coefficient("threshold", 0.0, scale=1.0, unit="driver", shape=True),
+            Coefficient("slope", CoefficientRole.SLOPE, unit="value/driver", scale=0.01),
+            Coefficient("gain", CoefficientRole.GAIN, 0.0, 0.0, scale=0.1, unit="value/driver"),
+            Coefficient("threshold", CoefficientRole.THRESHOLD, 0.0, scale=1.0, unit="driver"),
         ),
         ("signal",),
         {"width": 0.05},
@@ -50,7 +53,8 @@ DIRECT_FORMS: tuple[Form, ...] = (
     Form(
         "proportional",
         "a further flow in proportion to the driver",
-        fixed(Coefficient("slope", unit="value/driver", scale=0.01)),
+        FormKind.PROPORTIONAL,
+        fixed(Coefficient("slope", CoefficientRole.SLOPE, unit="value/driver", scale=0.01)),
         ("signal",),
         {},
         direct=_extra_linear,
@@ -58,7 +62,8 @@ DIRECT_FORMS: tuple[Form, ...] = (
     Form(
         "saturation",
         "the value can not pass a limit",
-        fixed(SHARE, Coefficient("limit", 0.0, scale=1.0, unit="value", shape=True)),
+        FormKind.LIMIT,
+        fixed(BLEND, Coefficient("limit", CoefficientRole.LIMIT, 0.0, scale=1.0, unit="value")),
         ("saturation",),
         {"width": 0.01},
         {"width": "value"},

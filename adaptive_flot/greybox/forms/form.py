@@ -1,6 +1,6 @@
-"""What a form of an effect is: the words of which each family of `forms` is made.
+"""What a form of an effect is: the terms in which each family of `forms` is declared.
 
-Two kinds. A *static* form gives a number g(driver); the site's value becomes `value exp(g)` (mode "factor") or
+Two kinds of law. A *static* form gives a number g(driver); the site's value becomes `value exp(g)` (mode "factor") or
 `value + g` (mode "offset"). A *direct* form transforms the value itself and may own states (lag, dead time, valve).
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum, unique
 from typing import Protocol
 
 import casadi as ca
@@ -22,21 +23,86 @@ RELATIVE_UNITS = ("g", "value", "driver", "value/driver")
 offset), `value` the site's unit, `driver` the driver's."""
 
 
+@unique
+class CoefficientRole(Enum):
+    """What a coefficient does in its form; the value says it in words."""
+
+    LEVEL = "size of the change at the site, or its constant part"
+    KNOT_VALUE = "value of a curve at one of its knots"
+    SLOPE = "how much the change grows with the driver"
+    GAIN = "how much the change grows with what the driver exceeds a threshold by"
+    BLEND = "fraction of the way from the value as it was (0) to the value transformed (1)"
+    ONSET = "time at which an event begins"
+    DURATION = "time that an event takes"
+    TIME_CONSTANT = "time constant of an exponential approach or of a first-order lag"
+    DEAD_TIME = "time by which the value is delayed"
+    THRESHOLD = "value of the driver at which something begins"
+    LIMIT = "value that can not be passed"
+    BAND = "half the width of a dead band"
+
+
+_AMPLITUDES = frozenset(
+    {
+        CoefficientRole.LEVEL,
+        CoefficientRole.KNOT_VALUE,
+        CoefficientRole.SLOPE,
+        CoefficientRole.GAIN,
+        CoefficientRole.BLEND,
+    }
+)
+
+
+@unique
+class FormKind(Enum):
+    """What kind of dependence a form describes; the value says it in words."""
+
+    CONSTANT = "the same change always"
+    LINE = "a straight line in the driver or its logarithm, with a free constant"
+    CURVE = "a spline in the driver whose shape is free"
+    THRESHOLD = "something begins where the driver exceeds a threshold"
+    PROPORTIONAL = "a change in proportion to the driver"
+    EVENT = "something begins at a time"
+    LIMIT = "the value can not pass a limit"
+    MEMORY = "the value answers to its own past"
+
+
 @dataclass(frozen=True)
 class Coefficient:
-    """A coefficient of a form: value at which the form does nothing, physical range, a change that matters, unit.
+    """A coefficient of a form.
 
-    `unit` is an SI unit or one of `RELATIVE_UNITS`, since a form knows neither its site nor its driver.
+    Attributes
+    ----------
+    name
+        Name in files and of the parameter.
+    role
+        What it does in the form.
+    default
+        Value where it is not given: that of an amplitude makes the form do nothing.
+    lower, upper
+        Physical range, in the unit.
+    scale
+        Size of a change that matters, in the unit.
+    unit
+        An SI unit or one of `RELATIVE_UNITS`, since a form knows neither its site nor its driver.
     """
 
     name: str
+    role: CoefficientRole
     default: float = 0.0
     lower: float = -np.inf
     upper: float = np.inf
     scale: float = 0.1
     unit: str = "-"
-    shape: bool = False
-    """A shape coefficient (onset, time constant, threshold) alone does nothing; an amplitude switches the form on."""
+
+    @property
+    def is_level(self) -> bool:
+        """Whether it is a change at the site itself: a level, or the value of a curve at a knot."""
+        return self.role in (CoefficientRole.LEVEL, CoefficientRole.KNOT_VALUE)
+
+    @property
+    def is_shape(self) -> bool:
+        """Whether it only shapes the form (onset, time constant, threshold): alone it does nothing."""
+        return self.role not in _AMPLITUDES
 
 
 class SiteScope(Protocol):
@@ -64,6 +130,8 @@ class Form:
     ----------
     name, description
         What it is called, and what it is in words.
+    kind
+        What kind of dependence it describes.
     coefficients
         Its coefficients, from the settings.
     settings
@@ -77,10 +145,13 @@ class Form:
         Names of the states it owns, from the settings.
     drivers
         "constant", "time", "signal" (any quantity of the model), or a dynamic form's own name.
+    abrupt
+        Whether its effect may change much within seconds, so that a coarse grid of times would miss it.
     """
 
     name: str
     description: str
+    kind: FormKind
     coefficients: Callable[[Settings], tuple[Coefficient, ...]]
     drivers: tuple[str, ...]
     settings: Mapping[str, float | tuple[float, ...] | None]
@@ -88,6 +159,32 @@ class Form:
     static: StaticLaw | None = None
     direct: DirectLaw | None = None
     states: Callable[[Settings], tuple[str, ...]] = lambda settings: ()
+    abrupt: bool = False
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is the same change always."""
+        return self.kind is FormKind.CONSTANT
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether it is a spline whose shape is free."""
+        return self.kind is FormKind.CURVE
+
+    @property
+    def is_event(self) -> bool:
+        """Whether something begins at a time, its onset."""
+        return self.kind is FormKind.EVENT
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the law is linear in all coefficients."""
+        return self.kind in (FormKind.CONSTANT, FormKind.LINE, FormKind.CURVE, FormKind.PROPORTIONAL)
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether the value answers to its own past, by states of the form."""
+        return self.kind is FormKind.MEMORY
 
 
 def number(settings: Settings, name: str) -> float:
@@ -113,8 +210,8 @@ def wrong_setting(name: str, value: float | tuple[float, ...]) -> str | None:
     return "give a whole number" if name == "stages" and several[0] % 1 else None
 
 
-SHARE = Coefficient("amplitude", 0.0, 0.0, 1.0, 1.0)
-"""Share of the way from the value as it was (0) to the value transformed (1)."""
+BLEND = Coefficient("amplitude", CoefficientRole.BLEND, 0.0, 0.0, 1.0, 1.0)
+"""Fraction of the way from the value as it was (0) to the value transformed (1)."""
 
 
 def fixed(*coefficients: Coefficient) -> Callable[[Settings], tuple[Coefficient, ...]]:

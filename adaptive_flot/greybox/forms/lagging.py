@@ -1,14 +1,16 @@
-"""Forms with states of their own: the value comes late (lags, dead time, a valve that sticks)."""
+"""Forms with states of their own: the value is delayed (lags, dead time, a valve that sticks)."""
 
 from __future__ import annotations
 
 import casadi as ca
 
 from adaptive_flot.greybox.forms.form import (
-    SHARE,
+    BLEND,
     Coefficient,
+    CoefficientRole,
     Coefs,
     Form,
+    FormKind,
     Settings,
     SiteScope,
     fixed,
@@ -74,46 +76,54 @@ LAGGING_FORMS: tuple[Form, ...] = (
     Form(
         "lag",
         "first-order lag",
-        fixed(SHARE, Coefficient("time_constant", 30.0, 1.0, scale=10.0, unit="s", shape=True)),
+        FormKind.MEMORY,
+        fixed(BLEND, Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 30.0, 1.0, scale=10.0, unit="s")),
         ("lag",),
         {"scale": None},
         {"scale": "value"},
         direct=_lag,
         states=lambda settings: ("lagged",),
+        abrupt=True,
     ),
     Form(
         "lags",
         "two first-order lags in a row",
+        FormKind.MEMORY,
         fixed(
-            SHARE,
-            Coefficient("time_constant", 20.0, 1.0, scale=10.0, unit="s", shape=True),
-            Coefficient("time_constant_2", 10.0, 1.0, scale=10.0, unit="s", shape=True),
+            BLEND,
+            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 20.0, 1.0, scale=10.0, unit="s"),
+            Coefficient("time_constant_2", CoefficientRole.TIME_CONSTANT, 10.0, 1.0, scale=10.0, unit="s"),
         ),
         ("lag",),
         {"scale": None},
         {"scale": "value"},
         direct=_lags,
         states=lambda settings: ("lagged_1", "lagged_2"),
+        abrupt=True,
     ),
     Form(
         "delay",
         "dead time, as a chain of equal lags",
-        fixed(SHARE, Coefficient("dead_time", 30.0, 2.0, scale=10.0, unit="s", shape=True)),
+        FormKind.MEMORY,
+        fixed(BLEND, Coefficient("dead_time", CoefficientRole.DEAD_TIME, 30.0, 2.0, scale=10.0, unit="s")),
         ("delay",),
         {"scale": None, "stages": 12.0},
         {"scale": "value"},
         direct=_delay,
         states=_delay_states,
+        abrupt=True,
     ),
     Form(
         "stiction",
         "the value follows only when the demand leaves a band",
-        fixed(SHARE, Coefficient("band", 0.0, 0.0, unit="value", shape=True)),
+        FormKind.MEMORY,
+        fixed(BLEND, Coefficient("band", CoefficientRole.BAND, 0.0, 0.0, unit="value")),
         ("lag",),
         {"scale": None, "follow_s": 2.0},
         {"scale": "value", "follow_s": "s"},
         direct=_stiction,
         states=lambda settings: ("position",),
+        abrupt=True,
     ),
 )
-"""Each is switched on by a share of one; its times are shapes."""
+"""Each is switched on by its blend; its times and its band are shapes."""

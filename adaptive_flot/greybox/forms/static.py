@@ -5,10 +5,21 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from adaptive_flot.greybox.forms.form import Coefficient, Coefs, Form, Settings, fixed, number, numbers, softplus
+from adaptive_flot.greybox.forms.form import (
+    Coefficient,
+    CoefficientRole,
+    Coefs,
+    Form,
+    FormKind,
+    Settings,
+    fixed,
+    number,
+    numbers,
+    softplus,
+)
 from adaptive_flot.greybox.quantities import FloatArray
 
-LEAST_SHARE = 1e-6
+LEAST_BLEND = 1e-6
 """A driver of a power law is taken as at least this share of its reference: keeps the logarithm finite."""
 
 
@@ -19,7 +30,7 @@ def _shift(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
 
 def _power(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     reference = number(s, "reference")
-    return c["amplitude"] + c["exponent"] * ca.log(ca.fmax(driver / reference, LEAST_SHARE))
+    return c["amplitude"] + c["exponent"] * ca.log(ca.fmax(driver / reference, LEAST_BLEND))
 
 
 def _linear(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
@@ -83,18 +94,22 @@ def _hinge(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
 
 
 def _curve_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
-    return tuple(Coefficient(f"value_{k + 1}", unit="g") for k in range(len(numbers(settings, "knots"))))
+    return tuple(
+        Coefficient(f"value_{k + 1}", CoefficientRole.KNOT_VALUE, unit="g")
+        for k in range(len(numbers(settings, "knots")))
+    )
 
 
-_AMPLITUDE = Coefficient("amplitude", unit="g")
-_ONSET = Coefficient("onset", 0.0, scale=60.0, unit="s", shape=True)
+_AMPLITUDE = Coefficient("amplitude", CoefficientRole.LEVEL, unit="g")
+_ONSET = Coefficient("onset", CoefficientRole.ONSET, 0.0, scale=60.0, unit="s")
 
 STATIC_FORMS: tuple[Form, ...] = (
-    Form("shift", "constant factor or offset", fixed(_AMPLITUDE), ("constant",), {}, static=_shift),
+    Form("shift", "constant factor or offset", FormKind.CONSTANT, fixed(_AMPLITUDE), ("constant",), {}, static=_shift),
     Form(
         "power",
         "power law in the driver, with a free constant",
-        fixed(_AMPLITUDE, Coefficient("exponent", 0.0, -10.0, 10.0, unit="g")),
+        FormKind.LINE,
+        fixed(_AMPLITUDE, Coefficient("exponent", CoefficientRole.SLOPE, 0.0, -10.0, 10.0, unit="g")),
         ("signal",),
         {"reference": None},
         {"reference": "driver"},
@@ -103,7 +118,8 @@ STATIC_FORMS: tuple[Form, ...] = (
     Form(
         "linear",
         "straight line in the driver, with a free constant",
-        fixed(_AMPLITUDE, Coefficient("slope", unit="g")),
+        FormKind.LINE,
+        fixed(_AMPLITUDE, Coefficient("slope", CoefficientRole.SLOPE, unit="g")),
         ("signal",),
         {"reference": None},
         {"reference": "driver"},
@@ -112,6 +128,7 @@ STATIC_FORMS: tuple[Form, ...] = (
     Form(
         "curve",
         "natural cubic spline of free shape",
+        FormKind.CURVE,
         _curve_coefficients,
         ("signal", "time"),
         {"knots": None},
@@ -121,7 +138,11 @@ STATIC_FORMS: tuple[Form, ...] = (
     Form(
         "hinge",
         "nothing below a threshold of the driver, a straight line above",
-        fixed(Coefficient("slope", unit="g"), Coefficient("threshold", 0.0, unit="driver", shape=True)),
+        FormKind.THRESHOLD,
+        fixed(
+            Coefficient("slope", CoefficientRole.GAIN, unit="g"),
+            Coefficient("threshold", CoefficientRole.THRESHOLD, 0.0, unit="driver"),
+        ),
         ("signal",),
         {"reference": None, "width": 0.02},
         {"reference": "driver"},
@@ -130,16 +151,19 @@ STATIC_FORMS: tuple[Form, ...] = (
     Form(
         "step",
         "a step at an onset",
+        FormKind.EVENT,
         fixed(_AMPLITUDE, _ONSET),
         ("time",),
         {"width": 2.0},
         {"width": "s"},
         static=_step,
+        abrupt=True,
     ),
     Form(
         "ramp",
         "a ramp from an onset, then constant",
-        fixed(_AMPLITUDE, _ONSET, Coefficient("duration", 600.0, 1.0, scale=100.0, unit="s", shape=True)),
+        FormKind.EVENT,
+        fixed(_AMPLITUDE, _ONSET, Coefficient("duration", CoefficientRole.DURATION, 600.0, 1.0, scale=100.0, unit="s")),
         ("time",),
         {},
         static=_ramp,
@@ -147,7 +171,12 @@ STATIC_FORMS: tuple[Form, ...] = (
     Form(
         "washout",
         "an exponential approach from an onset, as a reagent that is washed out",
-        fixed(_AMPLITUDE, _ONSET, Coefficient("time_constant", 300.0, 1.0, scale=100.0, unit="s", shape=True)),
+        FormKind.EVENT,
+        fixed(
+            _AMPLITUDE,
+            _ONSET,
+            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 300.0, 1.0, scale=100.0, unit="s"),
+        ),
         ("time",),
         {},
         static=_washout,
