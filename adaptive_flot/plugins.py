@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import sys
-from collections.abc import Mapping
+import traceback
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -29,6 +31,14 @@ CONTROLLERS: Mapping[str, str] = {
     "pi": "controllers.pi:Pi",
     "schedule": "controllers.schedule:Schedule",
 }
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "estimator": ("init", "update"),
+    "controller": ("init", "decide"),
+    "batch estimator": ("fit",),
+}
+"""What a plug-in of a kind must have."""
+_user_files: set[str] = set()
+"""Files of the plug-ins that a user named, which errors are traced back to."""
 
 
 def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | None = None) -> Any:
@@ -61,9 +71,13 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
         raise PluginError(
             f"{what} {address!r}: no module {error.name!r}; put {stem}.py beside the file that names it or here"
         ) from error
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
+    except (Exception, SystemExit) as error:
+        file = module_file(module_name, folder)
+        place = _place(error, {str(file.resolve())}) if file is not None else None
+        reason = f"{type(error).__name__}: {error}" + (f" ({place})" if place else "")
         raise PluginError(f"{what} {address!r}: importing {module_name!r} failed: {reason}; correct it") from error
+    if full == address and module.__file__ is not None:
+        _user_files.add(module.__file__)
     if not hasattr(module, attribute):
         names = [n for n in vars(module) if not n.startswith("_")]
         raise PluginError(
@@ -115,10 +129,38 @@ def construct(factory: Any, address: str, what: str, *arguments: Any, **options:
     Raises
     ------
     PluginError
-        The constructor does not take the options given.
+        The constructor does not take the options given, or what it makes is no plug-in of that kind.
     """
     try:
-        return factory(*arguments, **options)
+        made = factory(*arguments, **options)
     except TypeError as error:
+        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
+            raise  # from inside the constructor
         given = ", ".join(f"{k}={v!r}" for k, v in options.items()) or "no options"
         raise PluginError(f"{what} {address!r} can not be made with {given}: {error}") from error
+    for method in METHODS.get(what, ()):
+        if not callable(getattr(made, method, None)):
+            kind = "None" if made is None else f"a {type(made).__name__}"
+            raise PluginError(f"{what} {address!r} is {kind} without a method {method!r}; write it")
+    return made
+
+
+def plugin_failure(error: BaseException) -> PluginError | None:
+    """The error in one line, where it comes from the code of a plug-in that a user named; else None."""
+    place = _place(error, _user_files)
+    if place is None:
+        return None
+    said = "ends the program" if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
+    return PluginError(f"{place}: {said}; correct the plug-in")
+
+
+def _place(error: BaseException, files: Collection[str]) -> str | None:
+    """File and line of the innermost frame in one of these files."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
+    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else None
+
+
+def method_place(plugin: object, method: str) -> str:
+    """File and line of a plug-in's method, for messages on what it returned."""
+    code = inspect.unwrap(getattr(type(plugin), method)).__code__
+    return f"{code.co_filename}, line {code.co_firstlineno}, {type(plugin).__name__}.{method}"

@@ -10,6 +10,7 @@ from pathlib import Path
 from adaptive_flot.child_processes import Terminated, terminable
 from adaptive_flot.cli.commands import app
 from adaptive_flot.errors import AdaptiveFlotError
+from adaptive_flot.plugins import plugin_failure
 
 DEFECT = 1
 USER_ERROR = 2
@@ -34,7 +35,12 @@ def main() -> None:
         _end(error, str(error), USER_ERROR, debug)
     except MemoryError as error:
         _end(error, "not enough memory; give a shorter record, or fewer processes", DEFECT, debug)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        failure = plugin_failure(error)
+        if failure is not None:
+            _end(error, str(failure), USER_ERROR, debug)
+        if isinstance(error, SystemExit):
+            raise
         hint = "report it" if debug else f"run it again with {DEBUG} and report what it prints"
         _end(error, f"a defect of this program ({_place(error)}): {_described(error)}; {hint}", DEFECT, debug)
 

@@ -17,7 +17,7 @@ def run(
         list[str] | None, typer.Option(help="Controller (repeatable); default the scenario's.")
     ] = None,
     seed: Annotated[
-        list[int] | None, typer.Option(min=0, help="Noise seed (repeatable); default the scenario's.")
+        list[int] | None, typer.Option(min=0, max=2**63 - 1, help="Noise seed (repeatable); default the scenario's.")
     ] = None,
     out: Out = None,
     json: Json = None,

@@ -133,12 +133,21 @@ class Model:
         return [self.index(kind, name) for name in names]
 
     def expand_parameters(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Full parameter names for names, symbols and group prefixes (`floatability` is all its minerals)."""
+        """Full parameter names for names, symbols and group prefixes (`floatability` is all its minerals).
+
+        Raises
+        ------
+        ModelError
+            Unknown parameter, or one that is named twice.
+        """
         full: list[str] = []
         for name in names:
             group = [p.name for p in self.parameters if p.name.startswith(name + ".")]
             full += group or [self.parameters[self.index("parameters", name)].name]
-        return tuple(dict.fromkeys(full))
+        twice = next((name for i, name in enumerate(full) if name in full[:i]), None)
+        if twice is not None:
+            raise ModelError(f"parameter {twice!r} is named twice, alone, by its symbol or in a group; name it once")
+        return tuple(full)
 
     @property
     def parameter_values(self) -> FloatArray:

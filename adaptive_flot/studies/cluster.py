@@ -79,7 +79,7 @@ def _embedded(workers: int) -> LocalCluster:
 def _remote(address: str) -> Iterator[Client]:
     try:
         client = Client(address, timeout=CONNECT_S)
-    except (OSError, TimeoutError, ValueError) as error:
+    except Exception as error:  # of many kinds: TLS without certificates is a TypeError
         reason = " ".join(str(error).split())
         raise StudyError(
             f"--scheduler {address}: no scheduler answers there ({reason}); start one with `dask scheduler`, or leave "

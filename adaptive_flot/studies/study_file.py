@@ -13,13 +13,14 @@ from adaptive_flot.errors import StudyError, located, near_match
 from adaptive_flot.plugins import module_file
 from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
-from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.keys import LARGEST_SEED, Plugin, Seed
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.yaml_files import read_yaml
 from adaptive_flot.yaml_problems import first_problem
 
-Seed = Annotated[int, Field(ge=0)]
+MOST_SEEDS = 1_000_000
+"""Largest study: its list of runs still fits into memory."""
 
 
 class _Part(BaseModel):
@@ -30,7 +31,7 @@ class Seeds(_Part):
     """`{first: 1, count: 1000}`, or a plain list of numbers."""
 
     first: Seed = 1
-    count: int | None = Field(default=None, ge=1)
+    count: int | None = Field(default=None, ge=1, le=MOST_SEEDS)
     listed: list[Seed] | None = Field(default=None, min_length=1)
 
     @model_validator(mode="before")
@@ -42,6 +43,8 @@ class Seeds(_Part):
     def _one_way(self) -> Seeds:
         if (self.count is None) == (self.listed is None):
             raise ValueError("give a list of seeds, or first and count")
+        if self.count is not None and self.first > LARGEST_SEED - self.count + 1:
+            raise ValueError(f"the last seed is above the largest, {LARGEST_SEED}; give a smaller first")
         return self
 
     def values(self) -> tuple[int, ...]:

@@ -14,6 +14,7 @@ from typing import Any
 
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.errors import PluginError, StudyError
+from adaptive_flot.plugins import plugin_failure
 from adaptive_flot.runner.commands.run import initial_fit, run_one
 from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.commands.runs_table import run_rows
@@ -86,7 +87,7 @@ def fit_start(order: Order, controller: str, seed: int) -> BatchFit | str:
             return initial_fit(prepared, controller, Realisation(prepared.scenario, seed))
         except PluginError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             return _message(error)
 
 
@@ -125,7 +126,7 @@ def run(
             row = run_rows(plain(run_summary(prepared.scenario, [finished])))[0]
     except (PluginError, StudyError):
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         return Result({**head, "outcome": "failed", "message": _message(error)}, _timing(head, begin))
     times = {key: row.pop(key) for key in TIMES if key in row}
     return Result({**row, **head, "outcome": "ok", "message": ""}, {**times, **_timing(head, begin)})
@@ -157,5 +158,6 @@ def _timing(head: Mapping[str, Any], begin: tuple[float, float]) -> dict[str, An
     return {"run": head["run"], "worker": where, **{key: round(value, 4) for key, value in spent.items()}}
 
 
-def _message(error: Exception) -> str:
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+def _message(error: BaseException) -> str:
+    said = f"{type(error).__name__}: {error}" if (failure := plugin_failure(error)) is None else str(failure)
+    return " ".join(said.split())

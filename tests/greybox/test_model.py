@@ -132,8 +132,11 @@ def test_unknown_name_is_refused_with_the_nearest_one() -> None:
         tank(good).index("parameters", "dischrge")
 
 
-def test_groups_and_symbols_expand_to_full_names_once() -> None:
-    assert tank(good).expand_parameters(["size", "k", "discharge"]) == ("size.small", "size.large", "discharge")
+def test_groups_and_symbols_expand_to_full_names() -> None:
+    assert tank(good).expand_parameters(["size", "k"]) == ("size.small", "size.large", "discharge")
+    for twice in (["k", "discharge"], ["size", "size.small"], ["k", "k"]):
+        with pytest.raises(ModelError, match="is named twice"):
+            tank(good).expand_parameters(twice)
     with pytest.raises(ModelError, match="no 'sizes'"):
         tank(good).expand_parameters(["sizes"])
 

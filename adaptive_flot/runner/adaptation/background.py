@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 
 from adaptive_flot.child_processes import end_with_parent, forking
 from adaptive_flot.errors import AdaptiveFlotError
+from adaptive_flot.plugins import plugin_failure
 
 Result = TypeVar("Result")
 
@@ -72,8 +73,8 @@ def _call(function: Callable[[], object], sender: Connection, parent: int) -> No
     end_with_parent(parent)
     try:
         answer: tuple[bool, object] = (True, function())
-    except Exception as error:
-        answer = (False, error)
+    except (Exception, SystemExit) as error:
+        answer = (False, plugin_failure(error) or error)  # the traceback stays here
     try:
         sender.send(answer)
     except Exception as error:  # what does not pickle is said, not waited for

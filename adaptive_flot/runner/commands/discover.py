@@ -75,11 +75,13 @@ def read_limits(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     Raises
     ------
     ModelError
-        Not of that form.
+        Not of that form, or an input given twice.
     """
     found = {}
     for text in given:
         name, _, ends = text.partition("=")
+        if name in found:
+            raise ModelError(f"--limit: {name!r} is given twice; give one range an input")
         low, _, high = ends.partition(":")
         try:
             found[name] = (float(low), float(high))

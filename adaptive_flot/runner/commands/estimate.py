@@ -182,12 +182,15 @@ def estimate_record(
     Raises
     ------
     DataError, ModelError, PluginError
-        Nothing measured, unknown names, or an estimator that can not be loaded.
+        Nothing measured, unknown names, an estimator that can not be loaded, or one that needs the truth.
     """
     names = model.expand_parameters(fit) if fit else tuple(p.name for p in model.parameters if p.role == "estimated")
     if not names:
         raise ModelError(f"model '{model.name}' has no parameter with the role 'estimated'; name them with --fit")
     plugins = dict(estimators) if isinstance(estimators, Mapping) else {n: shipped_plugin(n) for n in estimators}
+    for name, plugin in plugins.items():
+        if plugin.use not in BATCH_ESTIMATORS and plugin.needs_truth(folder):
+            raise PluginError(f"estimator {name!r} is shown the true parameters, which no record holds; leave it out")
     driving = tuple(outputs) or blocks.fit.measured(model)
     model.indices("outputs", driving)
     unmeasured = [o for o in driving if o not in blocks.fit.measured(model)]

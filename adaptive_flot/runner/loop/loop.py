@@ -19,6 +19,7 @@ from adaptive_flot.contracts import (
     Sample,
 )
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.runner.loop.returned import checked_decision, checked_estimate
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ class Running:
         if now.prior is None:
             prior = make_prior()
             now = replace(now, prior=prior, estimator_state=now.estimator.init(prior))
-        state, estimate = now.estimator.update(now.estimator_state, now.told(sample))
+        returned = now.estimator.update(now.estimator_state, now.told(sample))
+        state, estimate = checked_estimate(now.estimator, returned)
         return replace(now, estimator_state=state, estimate=estimate)
 
 
@@ -113,11 +115,13 @@ def run_loop(
         One an interval.
     """
     plant_state, now = plant.init(), Running(estimator, controller, controller.init(0.0))
+    inputs = len(estimator.setup.model.inputs)
     steps: list[Step] = []
     sample: Sample | None = None
     for k in range(intervals):
         told = None if sample is None else now.told(sample)
-        controller_state, decision = now.controller.decide(now.controller_state, told, now.estimate)
+        returned = now.controller.decide(now.controller_state, told, now.estimate)
+        controller_state, decision = checked_decision(now.controller, returned, inputs)
         plant_state, record = plant.apply(plant_state, decision.inputs)
         sample, now = record.sample, replace(now, controller_state=controller_state)
         if k >= initial_intervals:

@@ -15,6 +15,10 @@ from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.faults import Fault
 from adaptive_flot.runner.scenario.profiles import InputProfile, ParameterProfile
 
+LARGEST_SEED = 2**63 - 1
+"""Seeds are a column of 64-bit integers in the table of runs."""
+Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -164,7 +168,7 @@ class ScenarioFile(_Part):
     """Further effects of the model."""
     duration_s: float = Field(gt=0)
     sampling_s: float = Field(default=1.0, gt=0)
-    seeds: list[Annotated[int, Field(ge=0)]] = Field(default=[1], min_length=1)
+    seeds: list[Seed] = Field(default=[1], min_length=1)
     inputs: dict[str, InputProfile]
     parameters: dict[str, ParameterProfile] = Field(default_factory=dict)
     disturbances: dict[str, DisturbancePart] = Field(default_factory=dict)
