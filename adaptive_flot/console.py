@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.kit import page as report

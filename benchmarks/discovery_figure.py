@@ -15,8 +15,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.files import replace_path
 from adaptive_flot.greybox.model import FloatArray

@@ -24,7 +24,7 @@ from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.separation import hold_time
-from adaptive_flot.discovery.verdict.verdict import judge
+from adaptive_flot.discovery.verdict.judge import judge
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper

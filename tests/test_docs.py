@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.discovery.verdict.verdict import Word
+from adaptive_flot.discovery.results import Word
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.keys import EconomicsPart
 from tests.discovery.heated import Truth, tank_record

@@ -14,11 +14,10 @@ from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.progress import staged
 from adaptive_flot.api.records import AnyRecord, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
-from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.discovery.results import Discovery, Verdict
 from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
-from adaptive_flot.discovery.verdict.verdict import Verdict
 from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.extension import effect_units

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.discover import Discovery, discover
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.greybox.data.dataset import Dataset
 from tests.discovery.heated import Truth, heated_tank, moves, tank_record
 

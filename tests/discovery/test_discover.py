@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from adaptive_flot.discovery.discover import Discovery, discover
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.stepping.record import RecordSimulator

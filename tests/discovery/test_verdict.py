@@ -8,20 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.assessment.verification import (
-    Verification,
-    changes,
-    loglik_difference_sds,
-    verify,
-    whiteness,
-)
-from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.assessment.verification import changes, loglik_difference_sds, verify, whiteness
 from adaptive_flot.discovery.fitting.fit import row_losses
-from adaptive_flot.discovery.search.alternatives import Alternative
-from adaptive_flot.discovery.search.search import Search
+from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
 from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.verdict import held_up, judge
+from adaptive_flot.discovery.verdict.judge import held_up, judge
 from adaptive_flot.discovery.verdict.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import heated_tank
@@ -31,7 +23,7 @@ CONFIRMED = Verification(0.5, (0.4, 0.6), (), True)
 
 
 def _search(draught: Discovery, *found: tuple[tuple[str, str], bool, float], left: float = 0.0,
-            verification: Verification | None = CONFIRMED) -> Search:  # fmt: skip
+            verification: Verification | None = CONFIRMED) -> SearchResult:  # fmt: skip
     """Alternatives by name, whether known, and how much worse than the first."""
     assert draught.search is not None
     own = draught.search.alternatives[0]

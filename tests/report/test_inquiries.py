@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from adaptive_flot.discovery.verdict.verdict import Verdict
+from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.run.page import run_report
 from adaptive_flot.runner.adaptation import supervisor

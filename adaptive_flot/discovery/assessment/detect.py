@@ -7,9 +7,6 @@ inputs (positive lags only, so feedback is no reason), that its size is that of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, norm
@@ -19,6 +16,7 @@ from statsmodels.stats.multitest import multipletests
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.noise import correlation_times, without_spikes
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.results import Detection, Symptom
 from adaptive_flot.greybox.model import FloatArray
 
 LEVEL = 0.05
@@ -30,74 +28,6 @@ WINDOWS = 12
 """Windows of the record between which a jump is looked for."""
 FEWEST = 200
 """Rows that a test asks for."""
-
-
-@dataclass(frozen=True)
-class Symptom:
-    """What one output shows.
-
-    Attributes
-    ----------
-    output
-        Its name.
-    size
-        Root mean square of the residual over the noise seen from row to row; 1 when nothing is missing.
-    white
-        p value of whiteness (Ljung-Box, of the residual itself).
-    inputs
-        p value of independence of the past of each input, by name; of the whitened residual.
-    follows
-        Inputs of which it is not independent.
-    onset_s
-        Time at which the mean of the residual changes most; None when it does not (moving sums of the residual itself).
-    shows
-        Whether any of the tests rejects; by Holm's procedure over all tests of all outputs, as `follows` and `onset_s`.
-    """
-
-    output: str
-    size: float
-    white: float
-    inputs: dict[str, float]
-    follows: tuple[str, ...]
-    onset_s: float | None
-    shows: bool
-
-    def __str__(self) -> str:
-        if not self.shows:
-            return f"{self.output}: nothing beyond noise (residual {self.size:.2f} x the noise)"
-        said = f"{self.output}: residual {self.size:.1f} x the noise"
-        said += f", follows {', '.join(self.follows)}" if self.follows else ""
-        return said + (f", which changes most at about {self.onset_s:.0f} s" if self.onset_s is not None else "")
-
-
-@dataclass(frozen=True)
-class Detection:
-    """What the outputs show together."""
-
-    symptoms: tuple[Symptom, ...]
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Outputs in which something is missing."""
-        return tuple(s.output for s in self.symptoms if s.shows)
-
-    def __str__(self) -> str:
-        return "\n".join(map(str, self.symptoms))
-
-    def as_dict(self) -> list[dict[str, Any]]:
-        """Entry of the machine-readable verdict."""
-        return [
-            {
-                "output": s.output,
-                "shows": s.shows,
-                "residual_over_noise": s.size,
-                "ljung_box": s.white,
-                "independence": s.inputs,
-                "follows": list(s.follows),
-                "onset_s": s.onset_s,
-            }
-            for s in self.symptoms
-        ]
 
 
 def detect(problem: Problem, base: Fit) -> Detection:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import bootstrap
@@ -12,14 +11,13 @@ from statsmodels.stats.diagnostic import acorr_ljungbox
 from adaptive_flot.discovery.fitting.fit import Fit, row_losses
 from adaptive_flot.discovery.record.noise import correlation_times
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.discovery.results import OutputChange, Verification
 from adaptive_flot.greybox.model import FloatArray
 
 BLOCK_ROWS = 20
 """Rows of a block of the paired block bootstrap: longer than the noise remembers."""
 COMPARISON_BLOCK_ROWS = 60
 """Rows of a block in which two fits are compared: what both lack is slower than the noise."""
-SURE = 2.0
-"""Standard deviations by which an alternative must be worse to be told apart."""
 SHORTEST_BLOCK = 4
 MANY_BLOCKS = 8
 """A split too short for so many blocks gets shorter ones."""
@@ -27,53 +25,6 @@ DRAWS = 500
 WORSE = 0.02
 """Share by which no output's error may grow."""
 LAGS = 20
-
-
-@dataclass(frozen=True)
-class OutputChange:
-    """Free-run error of one output on one split: before, after, its noise, and a 95 % interval of the reduction."""
-
-    output: str
-    unit: str
-    before: float
-    after: float
-    noise: float
-    reduction95: tuple[float, float]
-
-    def __str__(self) -> str:
-        low, high = (100 * r for r in self.reduction95)
-        return (
-            f"{self.output}: {self.before:.3g} -> {self.after:.3g} {self.unit} "
-            f"(noise {self.noise:.3g}; reduction {low:.0f} to {high:.0f} %)"
-        )
-
-
-@dataclass(frozen=True)
-class Verification:
-    """Whether an alternative stands on rows to which it was not fitted.
-
-    Attributes
-    ----------
-    reduction, reduction95
-        Drop of the root mean square error over all outputs, in units of their noise, and its 95 % interval.
-    worse
-        Outputs whose error grew.
-    confirmed
-        Interval above zero and no output worse.
-    where
-        The rows it was measured on, in words.
-    """
-
-    reduction: float
-    reduction95: tuple[float, float]
-    worse: tuple[str, ...]
-    confirmed: bool
-    where: str = "on the confirm split"
-
-    def __str__(self) -> str:
-        low, high = (100 * r for r in self.reduction95)
-        word = "confirmed" if self.confirmed else "not confirmed"
-        return f"{word}: error {100 * self.reduction:.0f} % smaller ({low:.0f} to {high:.0f} %) {self.where}"
 
 
 def verify(problem: Problem, before: Fit, after: Fit) -> Verification:

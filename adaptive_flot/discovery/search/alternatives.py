@@ -6,7 +6,7 @@ A name is (site, driver); its forms compete inside it, so that no name wins or l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,48 +32,6 @@ WORTH_A_RESTART = 10.0
 """Gain of another start of a free time profile, which has most places to rest in, that is worth yet another."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
-
-
-@dataclass(frozen=True)
-class Alternative:
-    """A model with one or more further effects, fitted.
-
-    Attributes
-    ----------
-    names
-        (site, driver) of each effect, in the order they were added.
-    known
-        Whether each of them may be called by name.
-    fit
-        Its fit.
-    gain
-        Drop of minus two log-likelihood against the base model.
-    delta_bic
-        Its criterion less that of the base model; negative is better.
-    loglik_difference_sd
-        Standard deviation of the difference between its minus two log-likelihood and that of the best one.
-    adjusted_bic
-        Its criterion with the common nuisance added, where that was worked out (see `adjust_for_common_nuisance`).
-    """
-
-    names: tuple[tuple[str, str], ...]
-    known: tuple[bool, ...]
-    fit: Fit
-    gain: float
-    delta_bic: float
-    loglik_difference_sd: float = 0.0
-    adjusted_bic: float | None = None
-
-    def worse_than(self, best: Alternative) -> float:
-        """How much worse its criterion is than that of another, adjusted for a common nuisance where both are."""
-        if self.adjusted_bic is not None and best.adjusted_bic is not None:
-            return self.adjusted_bic - best.adjusted_bic
-        return self.fit.bic - best.fit.bic
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """Its effects with fitted coefficients."""
-        return self.fit.model.fitted_effects()[-len(self.names) :] if self.names else ()
 
 
 def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:

@@ -15,8 +15,9 @@ from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.search.alternatives import Alternative, fit_variant, variant_model
-from adaptive_flot.discovery.search.search import Search, scorer_of, threshold_of, what_is_left
+from adaptive_flot.discovery.results import Alternative, SearchResult
+from adaptive_flot.discovery.search.alternatives import fit_variant, variant_model
+from adaptive_flot.discovery.search.search import scorer_of, threshold_of, what_is_left
 from adaptive_flot.greybox.forms.form import FormKind
 
 MINOR = 0.5
@@ -25,8 +26,8 @@ MOST_RIVALS = 8
 
 
 def adjust_for_common_nuisance(
-    problem: Problem, found: Search, near: Sequence[Alternative], processes: int = 1
-) -> Search:
+    problem: Problem, found: SearchResult, near: Sequence[Alternative], processes: int = 1
+) -> SearchResult:
     """The search with its best and those that are `near` it compared anew, each with what the best one lacks added.
 
     Unchanged when nothing of the kind is left, when too many are near, or when who wins does not stand on fresh rows.

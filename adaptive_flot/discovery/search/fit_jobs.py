@@ -11,7 +11,7 @@ from adaptive_flot.discovery.candidates.knots import trimmed
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.step_events import event_scores, freer, step_score
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
 

@@ -15,7 +15,8 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.noise import correlation_times
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.search.alternatives import Alternative, fixed_coefficients, limited, shape_bounds
+from adaptive_flot.discovery.results import Alternative
+from adaptive_flot.discovery.search.alternatives import fixed_coefficients, limited, shape_bounds
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, FormKind
 from adaptive_flot.greybox.model import FloatArray, Model

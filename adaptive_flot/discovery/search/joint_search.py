@@ -16,6 +16,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.noise import noise_by_differences
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.results import Round, SearchResult
 from adaptive_flot.discovery.search.joint_fits import (
     LAST_STEPS,
     JointFits,
@@ -24,13 +25,7 @@ from adaptive_flot.discovery.search.joint_fits import (
     discount,
     discounted,
 )
-from adaptive_flot.discovery.search.search import (
-    LEAST_EVIDENCE,
-    Round,
-    Search,
-    scorer_of,
-    what_is_left,
-)
+from adaptive_flot.discovery.search.search import LEAST_EVIDENCE, scorer_of, what_is_left
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CHEAP = 30_000
@@ -40,7 +35,7 @@ DOMINATES = 3.0
 """Model error this many times as large as the noise is what a noise model would wrongly explain."""
 
 
-def wants_joint(problem: Problem, found: Search) -> bool:
+def wants_joint(problem: Problem, found: SearchResult) -> bool:
     """Whether fits are cheap and the error of the best alternative outweighs the noise by far."""
     best = found.alternatives[0].fit if found.alternatives else found.base
     steps = len(problem.record) * Stepper(best.model, problem.record.dt).substeps
@@ -58,11 +53,11 @@ def dominated(problem: Problem, fit: Fit) -> bool:
 
 def search_jointly(
     problem: Problem,
-    found: Search,
+    found: SearchResult,
     *,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
-) -> tuple[Problem, Search]:
+) -> tuple[Problem, SearchResult]:
     """Search combinations of named effects.
 
     Residuals are neither whitened nor clipped: the error of such a model outweighs the noise by far, a noise model
@@ -79,7 +74,7 @@ def search_jointly(
 
     Returns
     -------
-    tuple of Problem and Search
+    tuple of Problem and SearchResult
         The problem as it was searched, and what was found; both unchanged when no combination brings evidence.
     """
     chosen = np.where(problem.splits == "confirm", "estimate", problem.splits)
@@ -120,7 +115,7 @@ def search_jointly(
     )
 
 
-def _better(problem: Problem, base: Fit, joint: Fit, found: Search, rows_per_effective_sample: float) -> bool:
+def _better(problem: Problem, base: Fit, joint: Fit, found: SearchResult, rows_per_effective_sample: float) -> bool:
     """Whether effects that were found at once beat what one after the other came to, fitted to the same rows."""
     if not found.alternatives:
         return True

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import (
-    Verification,
-    loglik_difference_sds,
-    rows_per_effective_sample,
-    verify,
-)
+from adaptive_flot.discovery.assessment.verification import loglik_difference_sds, rows_per_effective_sample, verify
 from adaptive_flot.discovery.candidates.catalogue import catalogue
 from adaptive_flot.discovery.candidates.responses import Responses
-from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.search.alternatives import SHORTLIST, Alternative, shortlist
+from adaptive_flot.discovery.results import Alternative, Round, SearchResult
+from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist
 from adaptive_flot.discovery.search.fit_jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.simplify import simpler
 from adaptive_flot.discovery.search.successive_halving import refit
@@ -44,65 +40,6 @@ BEAM = 2
 """Alternatives of one round that the next extends."""
 
 
-@dataclass(frozen=True)
-class Round:
-    """One round: what was scored on top of which alternative, what was fitted, and what it left.
-
-    Attributes
-    ----------
-    scores
-        First-order scores of the whole catalogue, best first.
-    threshold
-        Penalised score that noise alone passes once in a hundred records.
-    alternatives
-        Full fits, best first.
-    """
-
-    scores: tuple[Score, ...]
-    threshold: float
-    alternatives: tuple[Alternative, ...]
-
-
-@dataclass(frozen=True)
-class Search:
-    """Everything a search found.
-
-    Attributes
-    ----------
-    base
-        Fit of the model as it is.
-    rounds
-        The rounds, in order.
-    alternatives
-        All full fits of the accepted number of effects, best first; empty when nothing was found.
-    verification
-        Of the best of them, on the confirm split.
-    left
-        First-order gain that the best alternative leaves on the table: what it still lacks.
-    left_threshold
-        The same quantity that noise alone would show once in a hundred records.
-    adapted_sites
-        Sites whose constant change is that of an adapted parameter.
-    rows_per_effective_sample
-        Rows of the best alternative's innovations for each effective sample: evidence counts once for so many.
-    common_nuisance
-        Site and driver of the effect that was added to the leading alternatives to compare them, if any.
-    slow_s
-        Seconds from which a change of an adapted parameter is a drift.
-    """
-
-    base: Fit
-    rounds: tuple[Round, ...]
-    alternatives: tuple[Alternative, ...]
-    verification: Verification | None
-    left: float
-    left_threshold: float
-    adapted_sites: tuple[str, ...]
-    rows_per_effective_sample: float = 1.0
-    common_nuisance: tuple[str, str] | None = None
-    slow_s: float = SLOW_S
-
-
 def search(
     problem: Problem,
     base: Fit,
@@ -110,7 +47,7 @@ def search(
     *,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
-) -> Search:
+) -> SearchResult:
     """Search effects on top of a base fit.
 
     Parameters
@@ -144,7 +81,7 @@ def search(
         beam = _beam(rounds[-1], best, BEAM)
         rounds.append(_round(problem, fitter, base, [scorer], beam, processes, progress))
     slow_s = max(SLOW_S, SLOW_ROWS * problem.record.dt)
-    return _confirmed(problem, Search(base, tuple(rounds), (), None, *left, sites, slow_s=slow_s), accepted)
+    return _confirmed(problem, SearchResult(base, tuple(rounds), (), None, *left, sites, slow_s=slow_s), accepted)
 
 
 def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
@@ -161,7 +98,7 @@ def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
     return fitter.fit(nominal, bounds=bounds, rounds=2)
 
 
-def _confirmed(problem: Problem, found: Search, accepted: list[Round]) -> Search:
+def _confirmed(problem: Problem, found: SearchResult, accepted: list[Round]) -> SearchResult:
     """Keep the largest model that stands on the confirm split; failing that, the first, with what it left."""
     for r in reversed(accepted):
         verification = verify(problem, found.base, r.alternatives[0].fit)

@@ -11,7 +11,8 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.search.alternatives import Alternative, effect_bounds, fixed_coefficients, limited
+from adaptive_flot.discovery.results import Alternative
+from adaptive_flot.discovery.search.alternatives import effect_bounds, fixed_coefficients, limited
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 
 

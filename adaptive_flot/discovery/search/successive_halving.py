@@ -18,7 +18,8 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.search.alternatives import Alternative, effect_bounds, fit_variant, variant_model
+from adaptive_flot.discovery.results import Alternative
+from adaptive_flot.discovery.search.alternatives import effect_bounds, fit_variant, variant_model
 from adaptive_flot.discovery.search.fit_jobs import (
     FittedJob,
     Job,

@@ -1,9 +1,10 @@
-"""What is told.
+"""What is said of a record.
 
 Map
 ---
-verdict.py  One of six words, and what stands behind it.
-wording.py  The verdict in plain words.
-locate.py   Where in the process the missing effect acts.
-curve.py    The curve of a fitted effect with its band.
+judge.py     One of six words, from the ranked alternatives.
+conclude.py  The verdict: that word with errors, tests, intervals and reasons.
+wording.py   The verdict in plain words.
+locate.py    Where in the process the missing effect acts.
+curve.py     The curve of a fitted effect with its band.
 """

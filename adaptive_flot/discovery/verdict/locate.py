@@ -7,46 +7,11 @@ one of each kind of place, and of each kind of cause, says how well it would do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
-from adaptive_flot.discovery.assessment.detect import Detection
 from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.results import Detection, Location, Place
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 
 CAUSES = {"constant": "all the time", "time": "with time", **dict.fromkeys(DYNAMIC_DRIVERS, "late or limited")}
-
-
-@dataclass(frozen=True)
-class Place:
-    """A kind of place or cause, its best candidate, and the share of the best gain of all that this has."""
-
-    kind: str
-    site: str
-    driver: str
-    share: float
-
-
-@dataclass(frozen=True)
-class Location:
-    """Places and causes by what the best candidate of each would explain, best first, and the outputs that show it."""
-
-    outputs: tuple[str, ...]
-    places: tuple[Place, ...]
-    causes: tuple[Place, ...]
-
-    def __str__(self) -> str:
-        where = ", ".join(f"{p.kind} {100 * p.share:.0f} %" for p in self.places)
-        when = ", ".join(f"{p.kind} {100 * p.share:.0f} %" for p in self.causes)
-        return f"shows in {', '.join(self.outputs) or 'no output'}; to first order: {where}; {when}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Entry of the machine-readable verdict."""
-
-        def rows(places: tuple[Place, ...]) -> list[dict[str, Any]]:
-            return [{"kind": p.kind, "site": p.site, "driver": p.driver, "share": round(p.share, 3)} for p in places]
-
-        return {"outputs": list(self.outputs), "places": rows(self.places), "causes": rows(self.causes)}
 
 
 def locate(detection: Detection, scores: tuple[Score, ...]) -> Location:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.search.search import Search
-from adaptive_flot.discovery.verdict.verdict import Judgement, NamedEffect
+from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 
 
 def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
@@ -29,7 +28,9 @@ def _largest_move(values: list[float]) -> float:
     return (values[high] - values[low]) * (1 if high > low else -1)
 
 
-def reason_words(judgement: Judgement, found: Search, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
+def reason_words(
+    judgement: Judgement, found: SearchResult, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]
+) -> str:
     """The verdict in one paragraph."""
     if judgement.word == "none" and drift:
         return (

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import SURE
-from adaptive_flot.discovery.discover import Discovery
-from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.discovery.results import SURE, Alternative, Discovery
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.extension import effect_units
 from adaptive_flot.report.kit.figures import p_text

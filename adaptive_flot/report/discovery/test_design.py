@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.discovery.test_design.experiment import Experiment
+from adaptive_flot.discovery.results import Experiment
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.report.discovery.tables import effect_text, words
 from adaptive_flot.report.kit import figures

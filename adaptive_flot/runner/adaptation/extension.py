@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from adaptive_flot.contracts import Setup
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.verdict.verdict import Verdict
+from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from adaptive_flot.discovery.verdict.verdict import Verdict
+from adaptive_flot.discovery.results import Verdict
 
 
 @dataclass(frozen=True)

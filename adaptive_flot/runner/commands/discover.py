@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from adaptive_flot.discovery.discover import Discovery, discover
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import Source

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.assessment.detect import Detection, Symptom, detect, independence
-from adaptive_flot.discovery.discover import Discovery
+from adaptive_flot.discovery.assessment.detect import detect, independence
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.results import Detection, Discovery, Symptom
 from adaptive_flot.discovery.verdict.locate import locate
 from tests.discovery.heated import DT, Truth, heated_tank, tank_record
 

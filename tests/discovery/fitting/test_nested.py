@@ -11,7 +11,8 @@ from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
-from adaptive_flot.discovery.search.alternatives import Alternative, fit_variant
+from adaptive_flot.discovery.results import Alternative
+from adaptive_flot.discovery.search.alternatives import fit_variant
 from adaptive_flot.discovery.search.fit_jobs import ADDS, FittedJob, constants, unbent
 from adaptive_flot.discovery.search.search import scorer_of
 from adaptive_flot.greybox.model import FloatArray

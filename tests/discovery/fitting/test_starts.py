@@ -14,7 +14,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
 from adaptive_flot.discovery.record.problem import Problem, make_problem
-from adaptive_flot.discovery.search.alternatives import Alternative
+from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.simplify import simpler
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect

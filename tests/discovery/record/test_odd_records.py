@@ -14,7 +14,7 @@ import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.record.noise import MOST_LAGS, Noise, is_dense, noise_by_differences
-from adaptive_flot.discovery.verdict.verdict import Verdict
+from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from tests.discovery.heated import CAPACITY, DT, NOISE, ROOM, Truth, equations, heated_tank, moves, tank_record

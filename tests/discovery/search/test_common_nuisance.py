@@ -9,16 +9,17 @@ import pytest
 
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.results import SearchResult
 from adaptive_flot.discovery.search.common_nuisance import MOST_RIVALS, adjust_for_common_nuisance
-from adaptive_flot.discovery.search.search import Search, search
-from adaptive_flot.discovery.verdict.verdict import judge
+from adaptive_flot.discovery.search.search import search
+from adaptive_flot.discovery.verdict.judge import judge
 from tests.discovery.heated import heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")
 
 
 @pytest.fixture(scope="module")
-def wandering() -> tuple[Problem, Search]:
+def wandering() -> tuple[Problem, SearchResult]:
     """A draught, and a thermometer that wanders by some hundredths of a kelvin beside it."""
     model, record = heated_tank(), tank_record()
     wander = 0.03 * np.sin(2 * np.pi * record.time / 4000.0)
@@ -29,12 +30,12 @@ def wandering() -> tuple[Problem, Search]:
     return problem, search(problem, base, model)
 
 
-def _first_round(found: Search) -> Search:
+def _first_round(found: SearchResult) -> SearchResult:
     """The search as it stood with one effect: the wander is what the best of them leaves."""
     return replace(found, alternatives=found.rounds[0].alternatives, left=500.0, left_threshold=10.0)
 
 
-def test_what_all_lack_is_added_to_all(wandering: tuple[Problem, Search]) -> None:
+def test_what_all_lack_is_added_to_all(wandering: tuple[Problem, SearchResult]) -> None:
     problem, found = wandering
     first = _first_round(found)
     near = first.alternatives[1:]
@@ -50,7 +51,7 @@ def test_what_all_lack_is_added_to_all(wandering: tuple[Problem, Search]) -> Non
         assert a.worse_than(best) == pytest.approx((a.adjusted_bic or 0.0) - (best.adjusted_bic or 0.0))
 
 
-def test_the_comparison_settles_what_the_shortcoming_left_open(wandering: tuple[Problem, Search]) -> None:
+def test_the_comparison_settles_what_the_shortcoming_left_open(wandering: tuple[Problem, SearchResult]) -> None:
     problem, found = wandering
     first = _first_round(found)
     assert judge(first).word != "named"
@@ -59,7 +60,7 @@ def test_the_comparison_settles_what_the_shortcoming_left_open(wandering: tuple[
     assert verdict.best.names == (("heat_loss", "fan_speed"),)
 
 
-def test_there_is_no_comparison_with_no_one_or_with_too_many(wandering: tuple[Problem, Search]) -> None:
+def test_there_is_no_comparison_with_no_one_or_with_too_many(wandering: tuple[Problem, SearchResult]) -> None:
     problem, found = wandering
     assert adjust_for_common_nuisance(problem, found, ()) is found
     assert adjust_for_common_nuisance(problem, found, found.alternatives[:1] * (MOST_RIVALS + 1)) is found

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.console import print_discovery
-from adaptive_flot.discovery.discover import Discovery, discover
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.test_design.experiment import plan_experiment
 from adaptive_flot.discovery.test_design.separation import Prediction, hold_time, separation
 from adaptive_flot.discovery.test_design.signals import candidate_tests, input_range

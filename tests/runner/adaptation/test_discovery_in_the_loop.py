@@ -13,9 +13,8 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.contracts import Setup
-from adaptive_flot.discovery.discover import Discovery
 from adaptive_flot.discovery.record.screening import Screening
-from adaptive_flot.discovery.verdict.verdict import Verdict, Word
+from adaptive_flot.discovery.results import Discovery, Verdict, Word
 from adaptive_flot.errors import AdaptiveFlotError, ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect

@@ -1,0 +1,39 @@
+"""What the stages come to: plain data that everybody may read, and that imports no stage of the search.
+
+Map
+---
+evidence.py      Of residual tests, of the comparison of two fits, and of first-order scores.
+alternatives.py  Of a search: fitted alternatives, rounds, and the judgement on them.
+experiment.py    Of the design of a test.
+verdict.py       Of a discovery: the verdict, its named effects, and all of the above.
+state.py         What the stages of `discover` hand on.
+"""
+
+from adaptive_flot.discovery.results.alternatives import SURE, Alternative, Judgement, Round, SearchResult, Word
+from adaptive_flot.discovery.results.evidence import Detection, Location, OutputChange, Place, Symptom, Verification
+from adaptive_flot.discovery.results.experiment import WATCHING, Experiment, Pair, Tried
+from adaptive_flot.discovery.results.state import State
+from adaptive_flot.discovery.results.verdict import Discovery, NamedEffect, Verdict
+
+__all__ = [
+    "SURE",
+    "WATCHING",
+    "Alternative",
+    "Detection",
+    "Discovery",
+    "Experiment",
+    "Judgement",
+    "Location",
+    "NamedEffect",
+    "OutputChange",
+    "Pair",
+    "Place",
+    "Round",
+    "SearchResult",
+    "State",
+    "Symptom",
+    "Tried",
+    "Verdict",
+    "Verification",
+    "Word",
+]

@@ -1,0 +1,99 @@
+"""What the stages of `discover` hand on: the question, and what has been worked out so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.screening import Screening
+from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult
+from adaptive_flot.discovery.results.evidence import Detection
+from adaptive_flot.discovery.results.experiment import Experiment
+from adaptive_flot.discovery.results.verdict import Discovery, Verdict
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+
+
+@dataclass(frozen=True)
+class State:
+    """What a stage of `discover` receives and hands on.
+
+    Attributes
+    ----------
+    model
+        The model as it came.
+    adapted
+        Full names of the parameters that are free in every alternative.
+    report_record
+        A further record that reports, and for which no part of the first one is kept; None without.
+    limits
+        Lowest and highest value of inputs by name in the test that is proposed; None for where the record has been.
+    processes
+        Fits that run at once.
+    progress
+        Called with a word for each stage.
+    screening
+        The record, and from the first stage on what in it can not be used.
+    problem, base
+        The record in splits, and the fit of the model as it is to the estimation split.
+    detection
+        What the residual of that fit shows.
+    search, judgement
+        The ranked alternatives, and what they amount to.
+    before, after
+        Fits of the plain and of the extended model to the estimation and confirm splits.
+    experiment
+        Input moves that would tell the leading alternatives apart.
+    """
+
+    model: Model
+    adapted: tuple[str, ...]
+    report_record: Dataset | None
+    limits: Mapping[str, tuple[float, float]] | None
+    processes: int
+    progress: Callable[[str], None]
+    screening: Screening
+    problem: Problem | None = None
+    base: Fit | None = None
+    detection: Detection | None = None
+    search: SearchResult | None = None
+    judgement: Judgement | None = None
+    before: Fit | None = None
+    after: Fit | None = None
+    experiment: Experiment | None = None
+
+    @property
+    def fitted(self) -> tuple[Problem, Fit]:
+        """The problem, and the fit of the model as it is: of the stages after that fit."""
+        assert self.problem is not None and self.base is not None
+        return self.problem, self.base
+
+    @property
+    def searched(self) -> tuple[Problem, SearchResult]:
+        """The problem, and the ranked alternatives: of the stages after the search."""
+        assert self.problem is not None and self.search is not None
+        return self.problem, self.search
+
+    @property
+    def judged(self) -> Judgement:
+        """What the alternatives amount to: of the stages after the judgement."""
+        assert self.judgement is not None
+        return self.judgement
+
+    @property
+    def refitted(self) -> tuple[Fit, Fit]:
+        """Fits of the plain and of the extended model: of the stages after the last fits."""
+        assert self.before is not None and self.after is not None
+        return self.before, self.after
+
+    def ended(self, verdict: Verdict) -> Discovery:
+        """The verdict with everything that stands behind it, at whatever stage it was given."""
+        screening = self.screening
+        if verdict.word == "insufficient":
+            screening = Screening(screening.record, verdict.shortcomings, verdict.notes)
+        before, after = self.before or self.base, self.after or self.base
+        told = after if verdict.word in ("named", "class", "unnamed") else before
+        model = told.model if told is not None else self.model
+        return Discovery(verdict, model, screening, self.problem, self.search, self.judgement, before, after)

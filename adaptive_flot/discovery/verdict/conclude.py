@@ -1,0 +1,127 @@
+"""The verdict itself: what was judged, with errors, tests, intervals and words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.verification import changes, whiteness
+from adaptive_flot.discovery.candidates.direction import against, listed
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.screening import Screening
+from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
+from adaptive_flot.discovery.verdict.locate import locate
+from adaptive_flot.discovery.verdict.wording import drift_words, reason_words
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+
+NORMAL95 = 1.96
+"""Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
+
+
+def insufficient(screening: Screening) -> Verdict:
+    """The verdict on a record that says too little, with every reason."""
+    reason = "The record does not say enough: " + "; ".join(screening.reasons) + "."
+    return Verdict("insufficient", reason, notes=screening.notes, shortcomings=screening.reasons)
+
+
+def conclude(state: State) -> Verdict:
+    """The verdict on a record that was searched."""
+    (problem, result), judgement, (before, after) = state.searched, state.judged, state.refitted
+    tells = judgement.word in ("named", "class", "unnamed")
+    final = before if judgement.best is None else after
+    labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
+    values = final.values[: len(labels)]
+    effects = _effects(judgement, after) if tells else ()
+    drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
+    return Verdict(
+        word=judgement.word,
+        reason=reason_words(judgement, result, effects, drift),
+        effects=effects,
+        members=judgement.members,
+        error=_errors(problem, before, final, state.report_record),
+        report_times=problem.spans("report") if state.report_record is None else (),
+        tests=_tests(problem, before, final),
+        parameters=dict(zip(labels, map(float, values), strict=True)),
+        drift=drift,
+        absorbed={
+            k: float(b / a - 1) if a else float("nan")
+            for k, b, a in zip(labels, before.values[: len(labels)], values, strict=True)
+        },
+        notes=state.screening.notes + _common_nuisance_note(result),
+        detection=state.detection,
+        location=locate(state.detection, result.rounds[0].scores) if state.detection else None,
+        experiment=state.experiment,
+    )
+
+
+def _tests(problem: Problem, before: Fit, after: Fit) -> dict[str, float]:
+    """Ljung-Box p value of the residual of each output before and after, and of the first output by itself."""
+    tests = {f"ljung_box_before_{k}": p for k, p in whiteness(problem, before, raw=True).items()}
+    tests |= {f"ljung_box_after_{k}": p for k, p in whiteness(problem, after, raw=True).items()}
+    first = before.model.outputs[problem.columns[0]].name
+    return tests | {f"ljung_box_{k}": tests.get(f"ljung_box_{k}_{first}", float("nan")) for k in ("before", "after")}
+
+
+def _errors(problem: Problem, before: Fit, after: Fit, report: Dataset | None) -> tuple[OutputChange, ...]:
+    """Free-run errors on the report split, or on a record of its own that reports."""
+    if report is None:
+        return changes(problem, before, after, "report")
+    return changes(*_on_record(problem, report, before, after), "report")
+
+
+def _on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tuple[Problem, Fit, Fit]:
+    """Free runs of fits over another record from their own initial state: its problem and the fits with them."""
+    n, columns = len(record), list(problem.columns)
+    everywhere = np.full(n, "report", dtype="<U8")
+    there = replace(problem, record=record, splits=everywhere, weights=np.ones((n, len(columns))))
+
+    def run(fit: Fit) -> Fit:
+        free = RecordSimulator(fit.model, record.dt).outputs(record, fit.initial_state, fit.model.parameter_values)
+        return replace(fit, predicted=free[:, columns])
+
+    return there, run(before), run(after)
+
+
+def _common_nuisance_note(result: SearchResult) -> tuple[str, ...]:
+    if result.common_nuisance is None:
+        return ()
+    site, driver = result.common_nuisance
+    return (f"close alternatives were compared with what they leave, {site} by {driver}, added to each",)
+
+
+def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
+    """Each effect of the best alternative, with Wald intervals c -+ 1.96 sd(c) and the names that could replace it."""
+    assert judgement.best is not None  # a verdict that names has an alternative
+    model, best = after.model, judgement.best
+    std = dict(zip(after.names, after.std(), strict=True))
+    named = []
+    for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
+        own = best.names[i]
+        others = tuple(
+            (*instead[0], a.worse_than(best), a.loglik_difference_sd)
+            for a in judgement.rivals
+            if len(instead := [n for n in a.names if n not in best.names]) == 1
+            and set(best.names) - set(a.names) == {own}
+        )
+        interval = {
+            c: (v - NORMAL95 * std[effect.parameter(c)], v + NORMAL95 * std[effect.parameter(c)])
+            for c, v in effect.coefficients.items()
+            if effect.parameter(c) in std
+        }
+        named.append(NamedEffect(effect, _meaning(model, effect), interval, others))
+    return tuple(named)
+
+
+def _meaning(model: Model, effect: Effect) -> str:
+    """What the table of known effects says of an effect."""
+    if not model.known_effects:
+        return "named by the model's own site and driver"
+    known = listed(model, effect)
+    if known is None:
+        return "not listed among the effects known for this model"
+    return f"the other way than: {known.meaning}" if against(model, effect) else known.meaning
