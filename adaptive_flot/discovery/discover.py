@@ -85,27 +85,34 @@ def discover(
     raise AssertionError("the last stage gives a verdict")
 
 
-def check_record(state: State) -> State | Verdict:
-    """Leave out what can not be used; a record that then says too little ends here."""
+def screen_record(state: State) -> State:
+    """Leave out what in the record can not be used."""
     state.progress("check the data")
-    screening = screen(state.screening.record, state.model)
-    return insufficient(screening) if screening.reasons else replace(state, screening=screening)
+    return replace(state, screening=screen(state.screening.record, state.model))
 
 
-def fit_model_as_it_is(state: State) -> State | Verdict:
-    """Split the record, and fit the model without any effect: the base of every comparison."""
+def check_sufficient(state: State) -> State | Verdict:
+    """Give up where what is left of the record says too little."""
+    return insufficient(state.screening) if state.screening.reasons else state
+
+
+def split_rows(state: State) -> State:
+    """Split the rows: to estimate, to confirm and, where no other record reports, to report."""
     state.progress("fit the model as it is")
     cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
     problem, screening = split_record(state.screening, state.model, state.adapted, cycle)
-    if screening.reasons:
-        return insufficient(screening)
-    prepared = prepare(problem, state.model)
+    return replace(state, problem=problem, screening=screening)
+
+
+def fit_model_as_it_is(state: State) -> State | Verdict:
+    """Fit the model without any effect: the base of every comparison."""
+    prepared = prepare(state.known_problem, state.model)
     if prepared is None:
         name = state.model.name
         reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
-        return insufficient(replace(screening, reasons=(reason,)))
+        return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
-    return replace(state, screening=screening, problem=problem, base=base)
+    return replace(state, problem=problem, base=base)
 
 
 def check_explained(state: State) -> State | Verdict:
@@ -182,7 +189,10 @@ def plan_test(state: State) -> State:
 
 
 STAGES: tuple[Callable[[State], State | Verdict], ...] = (
-    check_record,
+    screen_record,
+    check_sufficient,
+    split_rows,
+    check_sufficient,
     fit_model_as_it_is,
     check_explained,
     examine_residual,

@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.results import Discovery
+from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -39,6 +39,20 @@ def test_the_extended_model_predicts_a_record_that_nobody_has_seen(draught: Disc
         return float(np.sqrt(np.mean((free - fresh.outputs)[50:] ** 2)))
 
     assert error(draught, True) < 0.15 * error(draught, False)
+
+
+def test_a_stage_that_gives_a_verdict_ends_the_procedure(monkeypatch: pytest.MonkeyPatch, draught: Discovery) -> None:
+    """Nothing that comes after it is run, and what was known before it is kept."""
+
+    def late(state: State) -> State:
+        raise AssertionError("a stage after the verdict was run")
+
+    assert draught.problem is not None
+    stages = (lambda state: replace(state, problem=draught.problem), lambda state: Verdict("abstain", "so"), late)
+    monkeypatch.setattr("adaptive_flot.discovery.discover.STAGES", stages)
+    model = heated_tank()
+    ended = discover(model, tank_record(Truth()))
+    assert (ended.verdict.word, ended.problem, ended.model) == ("abstain", draught.problem, model)
 
 
 def test_linear_algebra_takes_one_thread_and_gives_the_others_back() -> None:

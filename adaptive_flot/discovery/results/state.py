@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
@@ -65,16 +65,22 @@ class State:
     experiment: Experiment | None = None
 
     @property
+    def known_problem(self) -> Problem:
+        """The problem: of the stages after the record is split."""
+        assert self.problem is not None
+        return self.problem
+
+    @property
     def fitted(self) -> tuple[Problem, Fit]:
         """The problem, and the fit of the model as it is: of the stages after that fit."""
-        assert self.problem is not None and self.base is not None
-        return self.problem, self.base
+        assert self.base is not None
+        return self.known_problem, self.base
 
     @property
     def searched(self) -> tuple[Problem, SearchResult]:
         """The problem, and the ranked alternatives: of the stages after the search."""
-        assert self.problem is not None and self.search is not None
-        return self.problem, self.search
+        assert self.search is not None
+        return self.known_problem, self.search
 
     @property
     def judged(self) -> Judgement:
@@ -92,7 +98,7 @@ class State:
         """The verdict with everything that stands behind it, at whatever stage it was given."""
         screening = self.screening
         if verdict.word == "insufficient":
-            screening = Screening(screening.record, verdict.shortcomings, verdict.notes)
+            screening = replace(screening, reasons=verdict.shortcomings)
         before, after = self.before or self.base, self.after or self.base
         told = after if verdict.word in ("named", "class", "unnamed") else before
         model = told.model if told is not None else self.model

@@ -68,6 +68,7 @@ def test_a_record_that_says_nothing_is_insufficient_with_its_reason(change: Chan
     found = discover(heated_tank(), _record(change, rows=rows))
     assert found.verdict.word == "insufficient" and found.verdict.effects == ()
     assert says in " ".join([found.verdict.reason, *found.verdict.notes])
+    assert found.screening.reasons == found.verdict.shortcomings != () and found.search is None
 
 
 def test_inputs_that_never_move_are_insufficient() -> None:
@@ -122,5 +123,6 @@ def test_a_model_that_breaks_down_is_insufficient() -> None:
         m.output("temperature", t + m.parameter("loss"))
 
     model = replace(heated_tank(), equations=equations, outputs=heated_tank().outputs)
-    verdict = discover(model, _record()).verdict
-    assert verdict.word == "insufficient" and "can not simulate" in verdict.reason
+    found = discover(model, _record())
+    assert found.verdict.word == "insufficient" and "can not simulate" in found.verdict.reason
+    assert found.screening.reasons == found.verdict.shortcomings and found.model is model and found.before is None
