@@ -134,8 +134,8 @@ def construct(factory: Any, address: str, what: str, *arguments: Any, **options:
     try:
         made = factory(*arguments, **options)
     except TypeError as error:
-        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
-            raise  # from inside the constructor
+        if plugin_failure(error) is not None:
+            raise  # from inside the constructor of a user
         given = ", ".join(f"{k}={v!r}" for k, v in options.items()) or "no options"
         raise PluginError(f"{what} {address!r} can not be made with {given}: {error}") from error
     for method in METHODS.get(what, ()):
