@@ -1,10 +1,9 @@
-"""What the checks run on: an estimator or a controller, and a short record of the laboratory cell."""
+"""What the checks run on: an estimator or a controller, and a short record of a process."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from adaptive_flot.contracts import (
     ControllerSetup,
     Decision,
     Estimate,
-    Limits,
     Prior,
     Sample,
     Setup,
@@ -24,18 +22,15 @@ from adaptive_flot.contracts import (
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from adaptive_flot.processes import flotation
-from adaptive_flot.processes.flotation.economics import Prices
+from adaptive_flot.testing.processes import ROWS, CaseProcess, flotation_process
 
-ADAPTED = ("growth_exponent", "coalescence_rate")
-ROWS = 40
 NOISE_STD = 1e-3
 """As a share of an output."""
 
 
 @dataclass(frozen=True)
 class EstimatorCase:
-    """An estimator, where it starts, and a short record of the laboratory cell with drifting n."""
+    """An estimator, where it starts, and a short record of a process with one drifting parameter."""
 
     estimator: AnyEstimator
     prior: Prior
@@ -56,23 +51,33 @@ def estimator_case(
     factory: Callable[..., AnyEstimator],
     seed: int = 1,
     *,
+    process: CaseProcess | None = None,
     model: Model | None = None,
-    parameters: Sequence[str] = ADAPTED,
-    outputs: Sequence[str] = ("concentrate_grade",),
+    parameters: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
     **options: Any,
 ) -> EstimatorCase:
     """Build a case for an estimator class or factory, called as `factory(setup, **options)`.
 
-    `model` is the laboratory cell unless given: a cell with effects, say; `parameters` are those to adapt, `outputs`
-    those that drive the adaptation.
+    Parameters
+    ----------
+    factory, options
+        The estimator.
+    seed
+        Of the record's noise.
+    process
+        What the record is of; default the laboratory flotation cell.
+    model, parameters, outputs
+        Instead of those of the process: a model with effects, say, other parameters to adapt, other outputs that drive.
     """
-    setup = Setup(model or _cell(), 1.0, tuple(parameters), tuple(outputs))
-    inputs, samples, _ = _record(setup, seed)
+    process = _with(process or flotation_process(), model, parameters, outputs)
+    setup = Setup(process.model, process.dt, tuple(process.parameters), tuple(process.outputs))
+    samples, _ = _record(process, seed)
     size = np.abs([sample.outputs for sample in samples]).mean(axis=0)[setup.model.indices("outputs", setup.outputs)]
     nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
     prior = Prior(
         time=0.0,
-        state=steady_state(setup.model, inputs[0]).state,
+        state=steady_state(setup.model, process.inputs[0]).state,
         parameters=nominal,
         covariance=np.diag((0.02 * nominal) ** 2),
         noise_std=NOISE_STD * size,
@@ -81,25 +86,26 @@ def estimator_case(
 
 
 def controller_case(
-    factory: Callable[..., AnyController], seed: int = 1, *, model: Model | None = None, **options: Any
+    factory: Callable[..., AnyController],
+    seed: int = 1,
+    *,
+    process: CaseProcess | None = None,
+    model: Model | None = None,
+    **options: Any,
 ) -> ControllerCase:
-    """Build a case for a controller class or factory, called as `factory(setup, **options)`; `model` as above."""
-    setup = Setup(model or _cell(), 1.0, ADAPTED, ("concentrate_grade",))
-    inputs, samples, states = _record(setup, seed)
-    nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
-    limits = Limits(
-        outputs={"concentrate_grade": (0.20, np.inf)},
-        states={"level": (0.33, 0.42)},
-        inputs={"air_flow": (9.05e-4, 2.17e-3), "level_setpoint": (0.33, 0.42)},
-        moves={"air_flow": 2e-4, "level_setpoint": 0.01},
+    """Build a case for a controller class or factory, called as `factory(setup, **options)`; the rest as above."""
+    process = _with(process or flotation_process(), model, None, None)
+    samples, states = _record(process, seed)
+    nominal = process.model.parameter_values[process.model.indices("parameters", process.parameters)]
+    setup = ControllerSetup(
+        process.model, process.dt, process.inputs.copy(), tuple(process.parameters), process.limits, process.economics
     )
-    controller_setup = ControllerSetup(setup.model, setup.dt, inputs, setup.parameters, limits, Prices())
     estimates = tuple(
         Estimate(
             time=sample.time,
             prediction=sample.outputs,
             innovation=np.zeros_like(sample.outputs),
-            innovation_std=np.full(len(setup.outputs), NOISE_STD),
+            innovation_std=np.full(len(process.outputs), NOISE_STD),
             parameters=nominal,
             covariance=np.diag((0.02 * nominal) ** 2),
             state=state,
@@ -107,26 +113,26 @@ def controller_case(
         )
         for sample, state in zip(samples, states, strict=True)
     )
-    return ControllerCase(factory(controller_setup, **options), controller_setup, samples, estimates)
+    return ControllerCase(factory(setup, **options), setup, samples, estimates)
 
 
-@cache
-def _cell() -> Model:
-    # one model for all checks: what is compiled for it is compiled once
-    return flotation.make_model()
+def _with(
+    process: CaseProcess, model: Model | None, parameters: Sequence[str] | None, outputs: Sequence[str] | None
+) -> CaseProcess:
+    given = {"model": model, "parameters": parameters, "outputs": outputs}
+    return replace(process, **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
 
 
-def _record(setup: Setup, seed: int) -> tuple[FloatArray, tuple[Sample, ...], FloatArray]:
+def _record(process: CaseProcess, seed: int) -> tuple[tuple[Sample, ...], FloatArray]:
+    """Samples of a record with noise, and the true state at each (ROWS, nx)."""
     generator = np.random.default_rng(seed)
-    model = setup.model
-    inputs = np.tile([1.5e-3, 1.67e-4, 0.38], (ROWS, 1))
-    inputs[ROWS // 2 :, 0], inputs[ROWS // 4 :, 2] = 1.7e-3, 0.36
+    model, inputs = process.model, process.inputs.copy()
     p = np.tile(model.parameter_values, (ROWS, 1))
-    p[:, model.index("parameters", "n")] *= np.linspace(1.0, 1.02, ROWS)
-    run = Stepper(model, setup.dt).simulate(steady_state(model, inputs[0]).state, inputs, p)
+    p[:, model.index("parameters", process.drifting)] *= np.linspace(1.0, 1.02, ROWS)
+    run = Stepper(model, process.dt).simulate(steady_state(model, inputs[0]).state, inputs, p)
     outputs = run.outputs * (1 + NOISE_STD * generator.standard_normal(run.outputs.shape))
     samples = (Sample(float(t), u, y) for t, u, y in zip(run.time, inputs, outputs, strict=True))
-    return inputs, tuple(samples), run.states
+    return tuple(samples), run.states
 
 
 def run_estimator(estimator: AnyEstimator, state: Any, samples: Sequence[Sample]) -> tuple[Any, list[Estimate]]:

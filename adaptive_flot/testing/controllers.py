@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.contracts import Status
+from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.testing.cases import ControllerCase, run_controller
 from adaptive_flot.testing.comparing import assert_frozen, same
 
@@ -26,7 +27,10 @@ def check_controller_decides_within_bounds(case: ControllerCase) -> None:
     samples, estimates = [None, *case.samples, lost], [None, *case.estimates, blind]
     _, decisions = run_controller(case, case.controller.init(0.0), samples, estimates)
     for decision in decisions:
-        case.setup.model.check_inputs(decision.inputs)
+        try:
+            case.setup.model.check_inputs(decision.inputs)
+        except AdaptiveFlotError as error:
+            raise AssertionError(f"a decision is outside the model's range: {error}") from error
         assert decision.decided_by, "a decision says who took it"
 
 

@@ -93,7 +93,8 @@ def check_prediction_comes_before_the_measurement(case: EstimatorCase) -> None:
     _, a = case.estimator.update(state, case.samples[0])
     _, b = case.estimator.update(state, other)
     assert np.array_equal(a.prediction, b.prediction), "the prediction depends on the sample it predicts"
-    assert np.allclose(a.prediction + a.innovation, case.samples[0].outputs, equal_nan=True, rtol=1e-12)
+    added = np.allclose(a.prediction + a.innovation, case.samples[0].outputs, equal_nan=True, rtol=1e-12)
+    assert added, "prediction and innovation do not add up to the measurement"
 
 
 def check_wrong_shape_is_a_named_error(case: EstimatorCase) -> None:

@@ -19,10 +19,12 @@ def check_missing_measurement_is_a_status(case: EstimatorCase) -> None:
     missing = replace(case.samples[1], outputs=np.full_like(case.samples[1].outputs, np.nan))
     after, estimate = case.estimator.update(state, missing)
     assert estimate.status is not Status.OK, "a missing measurement must give a status"
-    assert np.isfinite(estimate.prediction).all() and np.isfinite(estimate.parameters).all()
+    finite = np.isfinite(estimate.prediction).all() and np.isfinite(estimate.parameters).all()
+    assert finite, "without a measurement prediction and parameters must stay finite"
     assert np.isnan(estimate.innovation).all(), "there is no innovation without a measurement"
     _, following = case.estimator.update(after, case.samples[2])
-    assert np.isfinite(following.parameters).all() and following.status is Status.OK
+    goes_on = np.isfinite(following.parameters).all() and following.status is Status.OK
+    assert goes_on, "the sample after a missing one must be taken as any other"
 
 
 def check_several_rates(case: EstimatorCase) -> None:
@@ -37,7 +39,8 @@ def check_several_rates(case: EstimatorCase) -> None:
     _, estimates = run_estimator(case.estimator, case.estimator.init(case.prior), thinned)
     for k, (sample, e) in enumerate(zip(thinned, estimates, strict=True)):
         assert np.array_equal(np.isnan(e.innovation), np.isnan(sample.outputs)), f"innovations of sample {k}"
-        assert np.isfinite(e.parameters).all() and np.isfinite(e.state).all() and np.isfinite(e.prediction).all()
+        finite = all(np.isfinite(value).all() for value in (e.parameters, e.state, e.prediction))
+        assert finite, f"parameters, state or prediction of sample {k} are not finite"
         assert (e.status is Status.MISSING) == ((k + 1) % 4 != 0), f"status {e.status.name} of sample {k}"
 
 
@@ -60,12 +63,17 @@ def check_delayed_value_is_as_good_as_one_in_time(case: EstimatorCase) -> None:
     assert estimates[arrives].status is Status.DELAYED, (
         f"status {estimates[arrives].status.name} where a delayed value was used"
     )
-    assert [(v.output, v.time) for v in estimates[arrives].delayed] == [(output, case.samples[taken].time)]
-    assert np.isclose(estimates[arrives].delayed[0].value, expected[taken].innovation[j], rtol=1e-6)
+    used = [(v.output, v.time) for v in estimates[arrives].delayed]
+    assert used == [(output, case.samples[taken].time)], f"the estimate tells {used} of the delayed value"
+    innovation = estimates[arrives].delayed[0].value
+    assert np.isclose(innovation, expected[taken].innovation[j], rtol=1e-6), (
+        "the innovation of the delayed value is off"
+    )
     for a, b in zip(estimates[arrives:], expected[arrives:], strict=True):
         for x, y in ((a.parameters, b.parameters), (a.state, b.state), (a.prediction, b.prediction)):
             assert np.allclose(x, y, rtol=1e-6), "the estimate differs from the one with the value in time"
-        assert np.allclose(a.covariance, b.covariance, rtol=1e-4, atol=1e-18)
+        alike = np.allclose(a.covariance, b.covariance, rtol=1e-4, atol=1e-18)
+        assert alike, "the covariance differs from the one with the value in time"
 
 
 def check_delayed_value_without_a_sample_is_a_status(case: EstimatorCase) -> None:
@@ -80,7 +88,8 @@ def check_delayed_value_without_a_sample_is_a_status(case: EstimatorCase) -> Non
         assert estimates[5].status is Status.TOO_OLD and estimates[5].delayed == (), (
             f"a delayed value of time {time} was taken"
         )
-        assert same(estimates[5].parameters, expected[5].parameters) and same(estimates[6:], expected[6:])
+        unchanged = same(estimates[5].parameters, expected[5].parameters) and same(estimates[6:], expected[6:])
+        assert unchanged, f"a refused value of time {time} changed the estimates"
 
 
 def _without(sample: Sample, j: int) -> Sample:

@@ -1,15 +1,12 @@
-"""Every shipped estimator and controller keeps the contract; the kit itself notices a plug-in that does not."""
+"""Every shipped estimator and controller keeps the contract, on the flotation cell and on another process."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import pytest
 
-from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.plugins import CONTROLLERS, ESTIMATORS, load
 from adaptive_flot.testing import (
     CONTROLLER_CHECKS,
@@ -18,8 +15,8 @@ from adaptive_flot.testing import (
     EstimatorCase,
     controller_case,
     estimator_case,
+    tanks_process,
 )
-from estimators.fixed import Fixed, FixedState
 
 ESTIMATOR_CASES: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for name in ESTIMATORS} | {
     "ekf-integrated": ("ekf", {"walk": "integrated"}),
@@ -43,47 +40,21 @@ def test_controller(name: str, check: Callable[[ControllerCase], None]) -> None:
     check(controller_case(load(name, CONTROLLERS, "controller")))
 
 
-@dataclass
-class _Thawed:
-    time: float
+TANK_ESTIMATORS = {name: case for name, case in ESTIMATOR_CASES.items() if name != "rpem-corrected"}
+"""Without the one whose options name sensors of the cell."""
 
 
-class _Bad(Fixed):
-    """Breaks the contract in one chosen way."""
-
-    def __init__(self, setup: Setup, *, fault: str) -> None:
-        super().__init__(setup)
-        self.fault = fault
-        self.calls = 0
-        self.takes_delayed_values = fault == "deaf"
-
-    def init(self, prior: Prior) -> FixedState:
-        return _Thawed(0.0) if self.fault == "thawed" else super().init(prior)  # type: ignore[return-value]
-
-    def update(self, state: FixedState, sample: Sample) -> tuple[FixedState, Estimate]:
-        self.calls += 1
-        if self.fault == "mutates":
-            state.theta[0] += 1.0
-        new, estimate = super().update(state, sample)
-        if self.fault == "forgetful":
-            estimate = replace(estimate, parameters=estimate.parameters + 1e-15 * self.calls)
-        if self.fault == "aliases":
-            estimate = replace(estimate, state=new.x)
-        if self.fault == "lopsided":
-            estimate = replace(estimate, covariance=np.array([[1.0, 0.5], [0.0, 1.0]]))
-        if self.fault == "wild":
-            estimate = replace(estimate, parameters=estimate.parameters + 100.0)
-        if self.fault == "peeks":
-            estimate = replace(estimate, prediction=sample.outputs)
-        return new, estimate
-
-
-@pytest.mark.parametrize("fault", ["thawed", "mutates", "forgetful", "aliases", "lopsided", "wild", "peeks", "deaf"])
-def test_the_kit_catches(fault: str) -> None:
-    failures = 0
+@pytest.mark.parametrize("name", TANK_ESTIMATORS)
+def test_estimator_on_another_process(name: str) -> None:
+    """All checks of the kit on the cascaded tanks, which have another sampling interval and a single output."""
+    address, options = TANK_ESTIMATORS[name]
+    case = estimator_case(load(address, ESTIMATORS, "estimator"), process=tanks_process(), **options)
     for check in ESTIMATOR_CHECKS:
-        try:
-            check(estimator_case(_Bad, fault=fault))
-        except (AssertionError, AttributeError):
-            failures += 1
-    assert failures > 0
+        check(case)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_controller_on_another_process(name: str) -> None:
+    case = controller_case(load(name, CONTROLLERS, "controller"), process=tanks_process())
+    for check in CONTROLLER_CHECKS:
+        check(case)

@@ -14,6 +14,9 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiled import compiled
 
+ONE_NUMBER = ((), (1,), (1, 1))
+"""Shapes that fit an argument of one number."""
+
 
 class FastCall:
     """A CasADi function with dense arguments, called through its buffers (a few microseconds instead of about 40).
@@ -66,7 +69,7 @@ class FastCall:
         for target, value in zip(self._arguments, arguments, strict=True):
             # NumPy would stretch a value of size 1 over a longer argument without a word
             shape = value.shape if isinstance(value, np.ndarray) else np.shape(value)
-            if shape != target.shape and target.shape != (1,):
+            if shape != target.shape and (target.shape != (1,) or shape not in ONE_NUMBER):
                 name = self.function.name_in([a is target for a in self._arguments].index(True))
                 raise ModelError(f"argument {name!r} has the shape {shape}, the model takes {target.shape}")
             target[...] = value

@@ -88,3 +88,13 @@ def test_wrong_shape_of_an_argument_is_named(size: int) -> None:
     """In particular one element is not spread over the vector, as CasADi itself would do."""
     with pytest.raises(ModelError, match=rf"'x' has the shape \({size},\), the model takes \(2,\)"):
         FastCall(_function())(np.ones(size), np.ones((2, 3)))
+
+
+@pytest.mark.parametrize("size", [0, 2])
+def test_no_value_and_several_are_no_number(size: int) -> None:
+    """An argument of one number takes a number, or an array of one."""
+    t = ca.SX.sym("t")
+    call = FastCall(ca.Function("f", [t], [2 * t], ["t"], ["y"]))
+    assert call(1.5)[0].tolist() == call(np.array([1.5]))[0].tolist() == [3.0]
+    with pytest.raises(ModelError, match=rf"'t' has the shape \({size},\), the model takes \(1,\)"):
+        call(np.ones(size))
