@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.testing.cases import ROWS, EstimatorCase, run_estimator
+from adaptive_flot.testing.cases import EstimatorCase, run_estimator
 from adaptive_flot.testing.comparing import arrays, assert_frozen, same
 from adaptive_flot.testing.measurements import MEASUREMENT_CHECKS
+from adaptive_flot.testing.processes import ROWS
 
 
 def check_state_is_frozen(case: EstimatorCase) -> None:
