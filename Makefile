@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check format bench bench-discovery bench-discovery-quick bench-measured lock clean
+.PHONY: help install demo test check format docs bench bench-discovery bench-discovery-quick bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -38,6 +38,10 @@ check: $(READY) ## Run the static checks: ruff, mypy, import contracts
 format: $(READY) ## Format the code and apply ruff's safe fixes
 	$(BIN)/ruff check --fix --quiet .
 	$(BIN)/ruff format --quiet .
+
+docs: $(READY) ## Build the documentation site in build/docs
+	$(BIN)/python -m sphinx -q -W --keep-going -j auto -b html docs build/docs
+	@echo "Built: build/docs/index.html"
 
 bench: $(READY) ## Run the benchmarks
 	@$(BIN)/python -m benchmarks
@@ -62,7 +66,7 @@ lock: ## Pin the dependencies again in requirements.lock (uv, in a throw-away en
 	  --output-file requirements.lock pyproject.toml
 
 clean: ## Remove .venv, caches and build output
-	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build dist docs/reference/generated .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(READY): $(PINS) pyproject.toml

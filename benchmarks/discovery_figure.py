@@ -1,4 +1,4 @@
-"""Draw the README's picture of discovery: `python -m benchmarks.discovery_figure` writes docs/discovery.png.
+"""Draw the README's picture of discovery: `python -m benchmarks.discovery_figure` writes docs/pictures/discovery.png.
 
 Residual, cause, error before and after: one record of `benchmarks.hidden_effects`, whose generator is a package apart.
 Its cell entrains less rock when the froth is deep, with a kink that the catalogue of discovery does not hold.
@@ -29,7 +29,7 @@ from benchmarks.hidden_effects.generate import record_file, write_record
 from benchmarks.hidden_effects.record import make_record
 
 SEED, RECORD = 1, 32
-PICTURE = Path(__file__).parents[1] / "docs" / "discovery.png"
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "discovery.png"
 OUTPUT = "concentrate_grade"
 
 
@@ -114,7 +114,7 @@ def main() -> None:
     draw(found, answer).savefig(stream, format="png", dpi=130, bbox_inches="tight")
     with replace_path(PICTURE) as temporary:
         temporary.write_bytes(stream.getvalue())
-    print(f"docs/{PICTURE.name}")
+    print(f"docs/pictures/{PICTURE.name}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Draw the README's pictures: `python -m benchmarks.readme_figure` writes them to docs/."""
+"""Draw the README's pictures: `python -m benchmarks.readme_figure` writes them to docs/pictures/."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from adaptive_flot.report.run import closed_loop, series
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 
-FOLDER = Path(__file__).parents[1] / "docs"
+FOLDER = Path(__file__).parents[1] / "docs" / "pictures"
 CLOSED_LOOP = ("air flow", "concentrate grade", "recovery")
 
 
@@ -40,4 +40,4 @@ if __name__ == "__main__":
         draw().savefig(stream, format="png", dpi=130, bbox_inches="tight")
         with replace_path(FOLDER / name) as temporary:
             temporary.write_bytes(stream.getvalue())
-        print(f"docs/{name}")
+        print(f"docs/pictures/{name}")

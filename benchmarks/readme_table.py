@@ -1,7 +1,7 @@
-"""Put the comparison of closed loops into the README: `python -m benchmarks.readme_table results/a results/b ...`.
+"""Put the comparison of closed loops into the documentation: `python -m benchmarks.readme_table results/a results/b ...`.
 
 The results are folders that `adaptive-flot run` wrote, one or more a scenario. What stands between the two marks in
-README.md is replaced by the overview that `adaptive-flot compare` prints.
+docs/results/closed_loop.md is replaced by the overview that `adaptive-flot compare` prints.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from adaptive_flot.report.compare.tables import markdown, overview_table
 from adaptive_flot.runner.commands.comparison import compare
 from adaptive_flot.runner.commands.runs_table import read_runs
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "results" / "closed_loop.md"
 BEGIN = "<!-- comparison: begin, written by `python -m benchmarks.readme_table` -->"
 END = "<!-- comparison: end -->"
 
@@ -31,7 +31,7 @@ def table_text(results: Sequence[Path]) -> str:
     """
     overview = overview_table(compare(read_runs(results)))
     if overview is None:
-        raise ResultError("the README compares several closed-loop scenarios; give a result of each")
+        raise ResultError("the page compares several closed-loop scenarios; give a result of each")
     return markdown(overview).split("\n\n", 1)[1].strip()
 
 
@@ -42,4 +42,4 @@ def put(text: str, table: str) -> str:
 
 
 if __name__ == "__main__":
-    write_text(README, put(README.read_text(encoding="utf-8"), table_text([Path(name) for name in sys.argv[1:]])))
+    write_text(PAGE, put(PAGE.read_text(encoding="utf-8"), table_text([Path(name) for name in sys.argv[1:]])))

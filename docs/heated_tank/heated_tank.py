@@ -1,4 +1,4 @@
-"""A tank with a heater in a room: the example of the README."""
+"""A tank with a heater in a room: the example of the documentation."""
 
 from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
 

@@ -15,7 +15,7 @@ from adaptive_flot.report.kit.distributions import cumulative_figure
 from adaptive_flot.report.kit.page import Table
 from adaptive_flot.report.kit.plotdata import Role, Spread
 from adaptive_flot.runner.commands.comparison import Comparison, compare
-from benchmarks.readme_table import BEGIN, END, README, put
+from benchmarks.readme_table import BEGIN, END, PAGE, put
 from tests.report.test_run_report import Links
 
 VALUES = {("mpc", "rpem"): 11.5, ("mpc", "fixed"): 10.0, ("mpc", "oracle"): 12.0, ("pi", "fixed"): 9.0}
@@ -90,7 +90,7 @@ def test_the_overview_joins_scenarios_and_keeps_columns_in_their_place() -> None
 def test_the_table_of_the_readme_is_replaced_between_its_marks() -> None:
     text = f"before\n{BEGIN}\nold\n{END}\nafter\n"
     assert put(text, "| new |") == f"before\n{BEGIN}\n\n| new |\n\n{END}\nafter\n"
-    assert BEGIN in README.read_text() and END in README.read_text()
+    assert BEGIN in PAGE.read_text() and END in PAGE.read_text()
 
 
 def test_markdown_is_a_table_a_renderer_takes() -> None:

@@ -52,7 +52,7 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
     page = Page(
         title=f"Comparison: {', '.join(c.scenario for c in comparisons)}",
         lead=f"{runs} runs, {seed_list(seeds_of(comparisons))}. Costs, prices and terms are explained in "
-        "docs/economics.md.",
+        "docs/guides/economics.md.",
         contents=[(c.anchor, c.title) for c in chapters],
         made=made_by(command),
     )

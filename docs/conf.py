@@ -1,0 +1,51 @@
+"""Settings of the documentation site: `make docs` builds it into build/docs. It needs no network."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # the extension `mathml` beside this file
+
+project = "adaptive-flot"
+author = "The adaptive-flot developers"
+version = release = version_of("adaptive-flot")
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "myst_parser",
+    "sphinx_design",
+    "mathml",
+]
+exclude_patterns = ["heated_tank"]
+nitpicky = False
+default_role = "code"
+"""Docstrings of this project put names between single backticks."""
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+html_math_renderer = "mathml"
+
+templates_path = ["_templates"]
+html_theme = "pydata_sphinx_theme"
+html_title = "adaptive-flot"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_theme_options = {
+    "navbar_align": "left",
+    "navbar_end": ["theme-switcher"],
+    "header_links_before_dropdown": 7,
+    "show_toc_level": 2,
+    "footer_start": ["copyright"],
+    "footer_end": ["sphinx-version"],
+    "secondary_sidebar_items": ["page-toc"],
+}
