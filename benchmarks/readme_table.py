@@ -1,4 +1,4 @@
-"""Put the comparison of closed loops into the documentation: `python -m benchmarks.readme_table results/a results/b ...`.
+"""Put the comparison of closed loops into its page: `python -m benchmarks.readme_table results/a results/b ...`.
 
 The results are folders that `adaptive-flot run` wrote, one or more a scenario. What stands between the two marks in
 docs/results/closed_loop.md is replaced by the overview that `adaptive-flot compare` prints.

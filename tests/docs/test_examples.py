@@ -1,11 +1,9 @@
-"""Examples in the documents do what they say."""
+"""Numbers and examples of the documents are those of the code."""
 
 from __future__ import annotations
 
 import doctest
 import re
-import sys
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -16,17 +14,18 @@ from adaptive_flot.discovery.results import Word
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.keys import EconomicsPart
 from tests.discovery.heated import Truth, tank_record
+from tests.docs.pages import DOCS, fences
 
-DOCS = Path(__file__).parents[1] / "docs"
+ECONOMICS = DOCS / "guides" / "economics.md"
 
 
 def test_the_worked_example_of_the_economics_comes_out() -> None:
-    found = doctest.testfile(str(DOCS / "economics.md"), module_relative=False)
+    found = doctest.testfile(str(ECONOMICS), module_relative=False)
     assert (found.attempted, found.failed) == (8, 0)
 
 
 def test_the_price_table_holds_the_scenario_keys_and_their_defaults() -> None:
-    text = (DOCS / "economics.md").read_text()
+    text = ECONOMICS.read_text(encoding="utf-8")
     rows = dict(re.findall(r"\| `(\w+_per_\w+)` \| ([\d.]+) \|", text))
     assert {key: float(value) for key, value in rows.items()} == EconomicsPart().model_dump()
 
@@ -38,22 +37,9 @@ def test_the_defaults_read_backwards() -> None:
     assert Prices().treatment / Prices().metal == pytest.approx(0.04)
 
 
-def _readme_blocks(language: str) -> list[str]:
-    text = (DOCS.parent / "README.md").read_text()
-    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
-
-
-def test_the_example_of_a_process_of_ones_own_runs_as_printed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Model and ten lines of the README: the file beside it is what is printed there, and so is the outcome."""
-    monkeypatch.chdir(DOCS.parent)
-    monkeypatch.setattr(sys, "path", sys.path[:])
-    blocks = _readme_blocks("python")
-    assert (DOCS / "heated_tank" / "heated_tank.py").read_text() in blocks
-    (ten_lines,) = (b for b in blocks if "import make_model" in b)
-    exec(compile(ten_lines, "README.md", "exec"), {})
-    assert capsys.readouterr().out in _readme_blocks("text")
+def test_the_model_of_ones_own_is_the_file_beside_it() -> None:
+    page = DOCS / "extending" / "model.md"
+    assert (DOCS / "heated_tank" / "heated_tank.py").read_text(encoding="utf-8") in fences(page, "python")
 
 
 def test_the_record_of_the_example_is_that_of_the_tank_apart() -> None:
@@ -63,6 +49,6 @@ def test_the_record_of_the_example_is_that_of_the_tank_apart() -> None:
     assert np.std(table["temperature_K"] - truth.outputs[:, 0]) == pytest.approx(0.05, rel=0.1)
 
 
-def test_the_readme_explains_every_word_of_a_verdict() -> None:
-    text = (DOCS.parent / "README.md").read_text()
+def test_every_word_of_a_verdict_is_explained() -> None:
+    text = (DOCS / "discovery" / "verdicts.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `(\w+)` \| ", text, re.MULTILINE)) >= set(get_args(Word))

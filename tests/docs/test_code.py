@@ -1,0 +1,29 @@
+"""Code of the documents runs, from the top of each page, as a reader would run it."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from pathlib import Path
+
+import pytest
+from sybil import Sybil
+from sybil.parsers.markdown import PythonCodeBlockParser
+
+from tests.docs.pages import DOCS, PAGES, fences, name_of
+
+WITH_CODE = [page for page in PAGES if fences(page, "python")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", WITH_CODE, ids=name_of)
+def test_the_code_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In order, in one namespace and an empty folder; what follows `>>>` prints what stands below it."""
+    shutil.copytree(DOCS / "heated_tank", tmp_path / "docs" / "heated_tank")
+    monkeypatch.chdir(tmp_path)
+    document = Sybil([PythonCodeBlockParser()]).parse(page)
+    examples = list(document.examples())
+    assert examples
+    with warnings.catch_warnings(action="error"):
+        for example in examples:
+            example.evaluate()
