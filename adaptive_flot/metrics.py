@@ -8,7 +8,7 @@ from adaptive_flot.greybox.model import FloatArray
 
 
 def fit(truth: FloatArray, estimate: FloatArray) -> float:
-    """Fit in percent, 100 (1 - |truth - estimate| / |truth|) in the 2-norm over time (paper, Section V).
+    """Fit in percent, `100 (1 - |truth - estimate| / |truth|)` in the 2-norm over time (paper, Section V).
 
     NaN where the estimate is not finite everywhere.
 

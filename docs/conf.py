@@ -5,6 +5,9 @@ from __future__ import annotations
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+from types import GenericAlias
+
+from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extension `mathml` beside this file
 
@@ -49,3 +52,13 @@ html_theme_options = {
     "footer_end": ["sphinx-version"],
     "secondary_sidebar_items": ["page-toc"],
 }
+
+
+def without_type_aliases(app: Sphinx, what: str, name: str, member: object, skip: bool, options: object) -> bool | None:
+    """Leave out aliases such as `Pair = tuple[A, B]`: autodoc takes them for classes."""
+    return True if isinstance(member, GenericAlias) else None
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what the settings above can not say."""
+    app.connect("autodoc-skip-member", without_type_aliases)

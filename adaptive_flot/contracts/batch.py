@@ -41,7 +41,7 @@ class Identifiability:
     parameters
         (label, relative standard deviation, "identified" | "weak" | "not identified" | "on a bound").
     pairs
-        (label, label, correlation) of the pairs with |correlation| >= 0.95.
+        (label, label, correlation) of the pairs with `|correlation|` >= 0.95.
     verdict
         One sentence.
     """

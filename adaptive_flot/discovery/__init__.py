@@ -3,7 +3,7 @@
 `discover.discover` is the entry. `discover.STAGES` lists its stages in order; each takes a `results.State` and returns
 one that knows more, or ends the search with a `results.Verdict`.
 
-Map, in the order in which a record passes through it. Each entry imports only those above it.
+Map, in the order in which a record passes through it; each entry imports only those above it
 ----------------------------------------------------------------------------------------------
 record/       The record as discovery sees it: screening, splits, measured outputs, noise.
 fitting/      Fits of one alternative: unknowns, descent, likelihood, many at once.

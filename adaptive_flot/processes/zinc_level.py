@@ -44,12 +44,14 @@ KNOWN_EFFECTS = (
 
 
 def make_model() -> Model:
-    """Balance of the pulp with an unrecorded PI loop on the level (deviations from the usual feed)::
+    """Balance of the pulp with an unrecorded PI loop on the level.
 
-    dh/dt = b (feed - 330) - v        level [scaled]
-    dz/dt = (h - r) / T               integral of the controller
-    v     = k ((h - r) + z)           outflow through the valve
-    """  # noqa: D400
+    The feed counts as its deviation from the usual one::
+
+        dh/dt = b (feed - 330) - v        level [scaled]
+        dz/dt = (h - r) / T               integral of the controller
+        v     = k ((h - r) + z)           outflow through the valve
+    """
     guess = "first guess; to be fitted"
     return Model(
         name="zinc-level",

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+import sys
 import warnings
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from sybil import Sybil
@@ -22,6 +24,9 @@ def test_the_code_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest
     shutil.copytree(DOCS / "heated_tank", tmp_path / "docs" / "heated_tank")
     monkeypatch.chdir(tmp_path)
     document = Sybil([PythonCodeBlockParser()]).parse(page)
+    module = ModuleType("page")  # classes of the page must be found by name, as those of a script
+    monkeypatch.setitem(sys.modules, "page", module)
+    document.namespace = vars(module)
     examples = list(document.examples())
     assert examples
     with warnings.catch_warnings(action="error"):

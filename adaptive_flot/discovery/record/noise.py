@@ -233,7 +233,7 @@ def without_spikes(residual: FloatArray) -> FloatArray:
 
 
 def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Weights (N, m): |prediction| over its mean where the noise grows with the value, else 1.
+    """Weights (N, m): `|prediction|` over its mean where the noise grows with the value, else 1.
 
     Judged on differences of the residual, in which slow model errors cancel, by the Gaussian likelihood.
     """
