@@ -16,8 +16,8 @@ import casadi as ca
 from adaptive_flot.greybox.model import Model
 
 SERIES_TERMS = 14
-"""Terms of the Taylor series of phi_3 and phi_1: error of `exp(-|decay| step)` below 1e-8 up to `|decay| step` = 2, 1e-4
-up to 4; a longer step needs substeps, as with any explicit method."""
+"""Terms of the Taylor series of phi_3 and phi_1: error of `exp(-|decay| step)` below 1e-8 up to `|decay| step` = 2,
+1e-4 up to 4; a longer step needs substeps, as with any explicit method."""
 
 Symbols = tuple[ca.SX, ca.SX, ca.SX, ca.SX]
 
