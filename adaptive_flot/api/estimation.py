@@ -19,8 +19,9 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.registry import find_cell
-from adaptive_flot.runner.commands.estimate import RecordEstimate, cut, estimate_record, read_blocks, shipped_plugin
+from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record, shipped_plugin
 from adaptive_flot.runner.commands.estimate_files import save_fitted_cell
+from adaptive_flot.runner.commands.record_blocks import cut, read_blocks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -46,7 +46,7 @@ def estimate(
     from adaptive_flot.console import print_estimate, progress_bar
     from adaptive_flot.errors import CellError
     from adaptive_flot.processes.registry import find_cell, make_model
-    from adaptive_flot.runner.commands.estimate import estimate_record, read_blocks
+    from adaptive_flot.runner.commands.estimate import estimate_record
     from adaptive_flot.runner.commands.estimate_files import (
         estimate_summary,
         replay_file,
@@ -54,6 +54,7 @@ def estimate(
         save_fitted_model,
         write_replays,
     )
+    from adaptive_flot.runner.commands.record_blocks import read_blocks
     from adaptive_flot.runner.commands.run_files import write_json
 
     if save_cell is not None and model != "flotation":

@@ -19,6 +19,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
+from adaptive_flot.processes.process import Measurements, Process
 
 BENCHMARK_COLUMNS = ("uEst", "uVal", "yEst", "yVal", "Ts")
 _DRY = 1e-6
@@ -147,3 +148,6 @@ def read_benchmark(path: Source) -> tuple[Dataset, Dataset]:
             Dataset(f"{file.stem}:{name}", dt * np.arange(len(u), dtype=float), dt, held[:, None], y[:, None])
         )
     return records[0], records[1]
+
+
+PROCESS = Process("cascaded-tanks", make_model, lambda source: Measurements(*read_benchmark(source)))

@@ -18,6 +18,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
+from adaptive_flot.processes.process import Measurements, Process
 
 HOUR = 3600.0
 HEMATITE = 159.69 / (2 * 55.845)
@@ -180,3 +181,6 @@ def fresh(assay: FloatArray) -> FloatArray:
     spell = np.cumsum(change)
     length = np.bincount(spell)[spell]
     return np.where((length >= HELD_HOURS) & ~change, np.nan, assay)
+
+
+PROCESS = Process("iron-columns", make_model, lambda source: Measurements(read_record(source)))

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from adaptive_flot.errors import CellError, ModelError, PluginError, located, near_match
+from adaptive_flot.greybox.data.dataset import TIME_COLUMN, read_dataset
+from adaptive_flot.greybox.data.tables import Source, read_table
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import construct, load, module_file
 from adaptive_flot.processes import cascaded_tanks, flotation, iron_columns, zinc_level
 from adaptive_flot.processes.model_file import find_model_file, is_model_file, load_model_file
+from adaptive_flot.processes.process import Measurements
 from adaptive_flot.resources import cell_file
 
-WITHOUT_CELL = {
-    "cascaded-tanks": cascaded_tanks.make_model,
-    "zinc-level": zinc_level.make_model,
-    "iron-columns": iron_columns.make_model,
-}
+WITHOUT_CELL = {p.name: p for p in (cascaded_tanks.PROCESS, zinc_level.PROCESS, iron_columns.PROCESS)}
 PROCESSES = ("flotation", *WITHOUT_CELL)
 
 
@@ -51,7 +51,7 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     if cell is not None:
         raise CellError(f"model {name!r} takes no cell file; leave 'cell' out")
     if name in WITHOUT_CELL:
-        return WITHOUT_CELL[name]()
+        return WITHOUT_CELL[name].make_model()
     try:
         model = construct(load(name, {}, "model", folder), name, "model")
     except ModelError as error:
@@ -59,6 +59,28 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     if not isinstance(model, Model):
         raise PluginError(f"model {name!r}: the factory returned a {type(model).__name__}; return a Model")
     return model
+
+
+def read_measurements(source: Source, model: Model, *, required_outputs: Sequence[str] = ()) -> Measurements:
+    """Read a measured record: a table with the model's columns, or the published file of a shipped process.
+
+    Parameters
+    ----------
+    source
+        File, or table at hand.
+    model
+        The model.
+    required_outputs
+        Outputs that a table with the model's columns must have.
+
+    Raises
+    ------
+    DataError, RangeError
+        The table can not be used.
+    """
+    if model.name in WITHOUT_CELL and TIME_COLUMN not in read_table(source).columns:
+        return WITHOUT_CELL[model.name].read_published(source)
+    return Measurements(read_dataset(source, model, required_outputs=required_outputs))
 
 
 def _read(path: Path, cell: str | None) -> Model:

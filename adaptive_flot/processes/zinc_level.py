@@ -15,6 +15,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
+from adaptive_flot.processes.process import Measurements, Process
 
 TIME = "Date and time"
 COLUMNS = {
@@ -117,3 +118,6 @@ def read_record(path: Source) -> Dataset:
     dt = float(np.mean(np.diff(seconds[rows])))
     inputs = np.column_stack([values[q.name] for q in make_model().inputs])
     return Dataset(file.stem, dt * np.arange(count, dtype=float), dt, inputs, values["level"][:, None])
+
+
+PROCESS = Process("zinc-level", make_model, lambda source: Measurements(read_record(source)))

@@ -50,7 +50,7 @@ def test_without_a_page_the_verdict_is_the_same(call: Call, table: WriteTable, t
         (["--cell", "nowhere.yaml"], "nowhere.yaml"),
         (["--save-model", "model.json"], ".yaml"),
         (["--processes", "0"], "--processes"),
-        (["--model", "cascaded-tanks"], "uEst"),
+        (["--model", "cascaded-tanks"], "pump_voltage"),
     ],
 )
 def test_a_mistake_is_told_before_the_search_and_writes_nothing(

@@ -156,7 +156,7 @@ def test_too_short_a_record_to_fit(call: Call, table: WriteTable, tmp_path: Path
         (["--model", "nowhere:make"], ["no module 'nowhere'"]),
         (["--cell", "lab_88l"], ["lab_88l", "did you mean 'lab_87l'"]),
         (["--model", "cascaded-tanks", "--cell", "lab_87l"], ["takes no cell"]),
-        (["--model", "cascaded-tanks"], ["record.csv", "'uEst' is missing"]),
+        (["--model", "cascaded-tanks"], ["record.csv", "pump_voltage"]),
     ],
     ids=" ".join,
 )

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,6 +18,7 @@ from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.metrics import rmse
 from adaptive_flot.processes.cascaded_tanks import make_model, read_benchmark
+from adaptive_flot.processes.registry import read_measurements
 from estimators.pem import Pem
 
 CONSTANTS = ("upper_outflow", "lower_inflow", "lower_outflow", "pump_gain")
@@ -116,3 +118,17 @@ def test_base_fit_of_the_benchmark(tanks: Model, shared_file: Callable[[str], Pa
     for record, expected in ((estimation, 0.603), (validation, 0.669)):
         outputs = simulator.outputs(record, fitted.initial_state, fitted.parameters)
         assert rmse(outputs - record.outputs) == pytest.approx(expected, abs=1e-3)
+
+
+def test_records_are_the_published_file_or_a_table_with_the_models_columns(tmp_path: Path) -> None:
+    """Two records from the published file; one from a table that anybody may write."""
+    published = pd.DataFrame(
+        {"uEst": [1.0, 2.0], "uVal": [3.0, 4.0], "yEst": [5.0, 6.0], "yVal": [7.0, 8.0], "Ts": 4.0}
+    )
+    measured = read_measurements(published, make_model())
+    assert measured.record.outputs[:, 0].tolist() == [5.0, 6.0]
+    assert measured.validation is not None and measured.validation.outputs[:, 0].tolist() == [7.0, 8.0]
+    own = pd.DataFrame({"time_s": [0.0, 4.0, 8.0], "pump_voltage_V": 2.0, "level_V": [5.0, 6.0, 7.0]})
+    own.to_csv(tmp_path / "own.csv", index=False)
+    measured = read_measurements(tmp_path / "own.csv", make_model())
+    assert measured.record.outputs[:, 0].tolist() == [5.0, 6.0, 7.0] and measured.validation is None

@@ -8,7 +8,7 @@ import pytest
 
 from adaptive_flot.report.kit import distributions, figures, style
 from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Spread, Trace
-from adaptive_flot.runner.commands.estimate import ljung_box_p
+from adaptive_flot.runner.results.whiteness import ljung_box_p
 
 TIME = np.arange(1.0, 401.0)
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.runner.commands.estimate import Blocks
+from adaptive_flot.runner.commands.record_blocks import Blocks
 from adaptive_flot.runner.commands.simulate import simulate_record
 
 NOISE: Mapping[str, float] = {"concentrate_grade": 1e-3, "level": 5e-4}

@@ -15,7 +15,9 @@ from adaptive_flot.report.kit import figures
 from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, number, render
 from adaptive_flot.report.kit.plotdata import Residuals
 from adaptive_flot.report.kit.style import exponent, unit_text
-from adaptive_flot.runner.commands.estimate import WHITENESS_LAGS, RecordEstimate, Replay
+from adaptive_flot.runner.commands.estimate import RecordEstimate
+from adaptive_flot.runner.commands.replay import Replay
+from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS
 
 BLOCKS: tuple[Block, ...] = ("fit", "test")
 

@@ -12,8 +12,8 @@ import pandas as pd
 from adaptive_flot.greybox.model import FloatArray, Quantity
 from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Spread, Trace
 from adaptive_flot.report.kit.style import amount
-from adaptive_flot.runner.commands.estimate import ljung_box_p
 from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.results.whiteness import ljung_box_p
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 FEWEST_SEEDS = 5

@@ -12,8 +12,8 @@ from adaptive_flot.report.kit.page import Table, number, seed_list
 from adaptive_flot.report.kit.plotdata import Role
 from adaptive_flot.report.kit.style import exponent, unit_text
 from adaptive_flot.report.run.series import Case, residuals
-from adaptive_flot.runner.commands.estimate import WHITENESS_LAGS
 from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS
 
 SIGNIFICANT = 0.05
 """p value below which innovations are called not white."""

@@ -8,7 +8,9 @@ run_files.py       Files that a run writes.
 runs_table.py      One row a run.
 comparison.py      Controllers and estimators side by side.
 fingerprint.py     What a scenario asks of its controllers: only like is compared with like.
-estimate.py        Replay a measured record through estimators.
+estimate.py        A batch fit to a measured record, then a replay through each estimator.
+record_blocks.py   A record in two blocks: one to fit, one to test.
+replay.py          Replay a record through one estimator.
 estimate_files.py  Files that `estimate` leaves.
 discover.py        Discovery on a file.
 simulate.py        Simulate a table of inputs.

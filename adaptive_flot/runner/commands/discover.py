@@ -8,31 +8,11 @@ from pathlib import Path
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import Source
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.processes import iron_columns, zinc_level
-from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
-
-
-def read_records(path: Source, model: Model) -> tuple[Dataset, Dataset | None]:
-    """Read the record to search and, from the published file of the tanks benchmark, the one that only reports.
-
-    The published files of the tanks, the zinc cell and the iron columns are read as they are; else see `read_dataset`.
-
-    Raises
-    ------
-    DataError, RangeError
-        The table can not be used.
-    """
-    if model.name == "cascaded-tanks":
-        return read_benchmark(path)
-    readers = {"zinc-level": zinc_level.read_record, "iron-columns": iron_columns.read_record}
-    if model.name in readers:
-        return readers[model.name](path), None
-    return read_dataset(path, model), None
+from adaptive_flot.processes.registry import read_measurements
 
 
 def discover_file(
@@ -63,8 +43,10 @@ def discover_file(
     DataError, RangeError, ModelError
         The table or the model can not be used.
     """
-    record, report = read_records(path, model)
-    return discover(model, record, report_record=report, limits=limits, processes=processes, progress=progress)
+    measured = read_measurements(path, model)
+    return discover(
+        model, measured.record, report_record=measured.validation, limits=limits, processes=processes, progress=progress
+    )
 
 
 def read_limits(given: Sequence[str]) -> dict[str, tuple[float, float]]:

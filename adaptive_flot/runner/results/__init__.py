@@ -5,6 +5,8 @@ Map
 timeseries.py        One row an interval, and the fits that are taken from it.
 accounts.py          What the run earned, and how it was decided.
 plans.py             What the controller expected.
+replay_table.py      The table of a replay, and its errors.
+whiteness.py         Are innovations white?
 prediction.py        How well the models in use predicted.
 cramer_rao_limit.py  The smallest error that any estimator could have.
 """

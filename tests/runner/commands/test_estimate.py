@@ -19,9 +19,11 @@ from adaptive_flot.processes.flotation import make_model as make_cell
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.resources import cell_file
-from adaptive_flot.runner.commands.estimate import Blocks, OutputError, RecordEstimate, estimate_record, read_blocks
+from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record
 from adaptive_flot.runner.commands.estimate_files import estimate_summary, save_fitted_cell, write_replays
+from adaptive_flot.runner.commands.record_blocks import Blocks, read_blocks
 from adaptive_flot.runner.commands.run_files import plain
+from adaptive_flot.runner.results.replay_table import ReplayErrors
 from tests.runner.records import NOISE, TRUTH, PlantRecord, plant_record
 
 CUT = 150
@@ -37,7 +39,7 @@ def result(model: Model, plant: PlantRecord) -> RecordEstimate:
     return estimate_record(plant.blocks(CUT), model)
 
 
-def errors(result: RecordEstimate) -> dict[tuple[str, str, str], OutputError]:
+def errors(result: RecordEstimate) -> dict[tuple[str, str, str], ReplayErrors]:
     return {(r.estimator, e.block, e.output): e for r in result.replays for e in r.errors}
 
 

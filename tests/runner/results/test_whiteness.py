@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from adaptive_flot.runner.commands.estimate import ljung_box_p
+from adaptive_flot.runner.results.whiteness import ljung_box_p
 
 
 def test_it_is_the_formula_of_ljung_and_box() -> None:
