@@ -1,7 +1,7 @@
 """The three contracts: Plant, Estimator, Controller. A plug-in imports this package and the engine, nothing else.
 
 State in, state out. An estimator or a controller is a frozen configuration plus compiled functions, ready when its
-constructor returns; what changes from sample to sample is a frozen dataclass that is passed in and handed back. So a
+constructor returns. What changes from sample to sample is a frozen dataclass that is passed in and handed back. So a
 run can be replayed, resumed from any step and compared to the bit. What the next step needs is *state*; what a plot or
 a test needs is the *info* record (`Estimate`, `Decision`).
 

@@ -1,7 +1,7 @@
 """The linearised optimal control problem in the moves alone: a small dense quadratic programme.
 
-With the equations of a stage linearised, its collocation points follow from the state at its begin and the moved inputs
-(one linear system a stage), and the states follow from the inputs before them. What is left are the inputs and slacks
+With the equations of a stage linearised, its collocation points follow from the state at its begin and the moved
+inputs: one linear system a stage. The states follow from the inputs before them. What is left are the inputs and slacks
 of the horizon (Bock and Plitt 1984; the names of the blocks below are those of a linear system dx' = A dx + B du + b).
 """
 

@@ -42,8 +42,8 @@ class EconomicMpc:
 
     Every `move_s` seconds an optimal control problem over `horizon` moves is solved from the estimated state with the
     newest parameter estimate (`collocation.py`). A solution is applied only if it is finite, within its bounds and
-    meets the constraints; else one cold start is tried, then the plan of the step before goes on, then the inputs are
-    held, then the first planned inputs are applied; `Decision` says which.
+    meets the constraints. Else one cold start is tried, then the plan of the step before goes on. Then the inputs are
+    held, and at last the first planned inputs are applied. `Decision` says which.
 
     Parameters
     ----------
