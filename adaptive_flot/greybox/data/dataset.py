@@ -5,7 +5,6 @@ Row k holds the inputs held during the interval that ends at `time[k]` and the o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ import pandas as pd
 from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.greybox.data.tables import Source, line, named, numeric_column, read_table, time_column
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.step_functions import steps_in
 
 TIME_COLUMN = "time_s"
 UNIFORMITY = 1e-3
@@ -186,7 +186,7 @@ def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
 
 
 def _check_steps(model: Model, dt: float, rows: int, file: Path) -> None:
-    steps = (rows - 1) * max(1, math.ceil(dt / model.max_step_s - 1e-9))
+    steps = (rows - 1) * steps_in(model, dt)
     if steps > MOST_STEPS:
         raise DataError(
             f"{file}: {rows} rows, {dt:g} s apart, take {steps:.3g} steps of model {model.name!r}, whose longest is "

@@ -8,6 +8,7 @@ flotation cell (bubble swarms that leave the pulp within a second) would else as
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import factorial
 
@@ -44,10 +45,10 @@ class Moving:
         return Moving(factor * self.value, factor * self.along)
 
 
-def fast_step(model: Model, dt: float | None, substeps: int) -> ca.Function:
+def fast_step(model: Model, dt: float | None, substeps: int, options: Mapping[str, bool]) -> ca.Function:
     """Map over one interval, `(x, t, u, p) -> (x_next, y, s)`; y and s at its end.
 
-    The interval lasts dt seconds; for None it is a further input, the last of u.
+    The interval lasts dt seconds; for None it is a further input, the last of u. `options` are those of CasADi.
     """
     t, x, u, p = model.ode.sx_in()
     h = ca.SX.sym("dt") if dt is None else dt
@@ -56,7 +57,7 @@ def fast_step(model: Model, dt: float | None, substeps: int) -> ca.Function:
     s = model.ode(t + h, end.value, u, p)[2]
     names = ["x", "t", "u", "p"], ["x_next", "y", "s"]
     given = ca.vertcat(u, h) if dt is None else u
-    return ca.Function("step", [x, t, given, p], [end.value, y.value, s], *names, {"cse": True})
+    return ca.Function("step", [x, t, given, p], [end.value, y.value, s], *names, {**options})
 
 
 def fast_step_along(

@@ -134,6 +134,9 @@ class NodeStepper(Stepper):
         super().__init__(model, 1.0, substeps=1)
         self.interval = Interval(None, 1)
 
+    def _input_columns(self) -> int:
+        return super()._input_columns() + 1
+
     def _tables(
         self, inputs: FloatArray, parameters: FloatArray | None, t0: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -5,6 +5,7 @@ Each builder takes a model and hashable arguments, as `Model.derived` asks for.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import casadi as ca
@@ -15,6 +16,11 @@ from adaptive_flot.greybox.stepping.compiled import compiled
 from adaptive_flot.greybox.stepping.fast_step import Moving, Symbols, fast_step, fast_step_along
 
 IDAS_TOLERANCE = 1e-11
+MOST_SIMPLIFIED = 20
+"""Steps in one function up to which common terms are looked for; with more it takes ten times as long as the rest, and
+saves a twentieth of the operations. The numbers are the same."""
+MOST_AT_ONCE = 120
+"""Most steps in one function, the form that an estimator needs: it takes up to a minute to make."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +41,49 @@ class Interval:
     substeps: int
     accurate: bool = False
 
+    @property
+    def options(self) -> dict[str, bool]:
+        """How CasADi makes a function of the interval."""
+        return {"cse": self.substeps <= MOST_SIMPLIFIED}
+
+
+def check_interval(model: Model, dt: float, substeps: int | None = None) -> None:
+    """Refuse a sampling interval that no estimator can step over at once; a record of it may still be simulated.
+
+    Parameters
+    ----------
+    model
+        The model, whose `max_step_s` is the longest step.
+    dt
+        Sampling interval [s].
+    substeps
+        Steps of the fast method in it; default as many as the model asks for.
+
+    Raises
+    ------
+    ModelError
+        It takes more than MOST_AT_ONCE steps.
+    """
+    count = substeps or steps_in(model, dt)
+    if count > MOST_AT_ONCE:
+        raise ModelError(
+            f"a sampling interval of {dt:g} s takes {count:g} steps of model {model.name!r}, whose longest is "
+            f"{model.max_step_s:g} s; at most {MOST_AT_ONCE} can be taken at once: sample more often"
+        )
+
+
+def steps_in(model: Model, dt: float) -> int:
+    """Steps of the fast method in dt [s], as many as the model's `max_step_s` asks for."""
+    return max(1, math.ceil(dt / model.max_step_s - 1e-9))
+
 
 def step(model: Model, interval: Interval) -> ca.Function:
     """`(x, t, u, p) -> (x_next, y, s)`: t [s] at the start of the interval, y and s at its end."""
     if interval.accurate:
         return _idas_step(model, interval)
-    return fast_step(model, interval.dt, interval.substeps)
+    if interval.dt is not None:
+        check_interval(model, interval.dt, interval.substeps)
+    return fast_step(model, interval.dt, interval.substeps, interval.options)
 
 
 def one_step_gradient(model: Model, interval: Interval, wrt: tuple[str, ...]) -> ca.Function:
@@ -48,7 +91,7 @@ def one_step_gradient(model: Model, interval: Interval, wrt: tuple[str, ...]) ->
     x, t, u, p = _symbols(model, interval)
     end, y = _along(model, interval, ca.SX(x.numel(), len(wrt)), _parameter_seeds(model, wrt))
     names = ["x", "t", "u", "p"], ["x_next", "y", "dy_dtheta"]
-    return ca.Function("one_step_gradient", [x, t, u, p], [end.value, y.value, y.along], *names, {"cse": True})
+    return ca.Function("one_step_gradient", [x, t, u, p], [end.value, y.value, y.along], *names, interval.options)
 
 
 def one_step_jacobians(model: Model, interval: Interval, wrt: tuple[str, ...]) -> ca.Function:
@@ -60,7 +103,7 @@ def one_step_jacobians(model: Model, interval: Interval, wrt: tuple[str, ...]) -
     end, y = _along(model, interval, moved, seeds)
     blocks = [m.along[:, columns] for m in (end, y) for columns in (slice(0, nx), slice(nx, nx + q))]
     names = ["x", "t", "u", "p"], ["x_next", "y", "dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"]
-    return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, {"cse": True})
+    return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, interval.options)
 
 
 def sensitivity_step(model: Model, interval: Interval, wrt: tuple[str, ...], unknowns: int) -> ca.Function:
@@ -75,7 +118,7 @@ def sensitivity_step(model: Model, interval: Interval, wrt: tuple[str, ...], unk
     results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
     names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
     # a search runs the step of varying length some thousand times: looking for common terms takes longer
-    options = {} if interval.dt is None else {"cse": True}
+    options = {} if interval.dt is None else interval.options
     return ca.Function(f"sensitivity_step_{unknowns}", [x, sensitivity, t, u, p], results, *names, options)
 
 

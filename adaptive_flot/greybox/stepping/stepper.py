@@ -82,6 +82,12 @@ class Stepper:
         Steps an interval of the fast method; default as many as the model's `max_step_s` asks for.
     accurate
         Integrate the DAE with IDAS at a relative tolerance of 1e-11 instead.
+
+    Raises
+    ------
+    ModelError
+        `dt` or `substeps` is not positive. Its functions of one interval refuse one of too many steps, see
+        `step_functions.check_interval`; `simulate` and `simulate_sensitivities` take any.
     """
 
     def __init__(self, model: Model, dt: float, *, substeps: int | None = None, accurate: bool = False) -> None:
@@ -89,7 +95,7 @@ class Stepper:
             raise ModelError(f"a stepper needs dt > 0 and substeps >= 1, got dt = {dt}, substeps = {substeps}")
         self.model = model
         self.dt = float(dt)
-        self.substeps = substeps or max(1, math.ceil(dt / model.max_step_s - 1e-9))
+        self.substeps = substeps or step_functions.steps_in(model, dt)
         self.accurate = accurate
         self.interval = Interval(self.dt, self.substeps, accurate)
         self._calls: FunctionCache[FastCall] = FunctionCache()
@@ -237,12 +243,16 @@ class Stepper:
             )
         return x
 
+    def _input_columns(self) -> int:
+        """Columns of the inputs; the step itself, slow to make where it is long, is not asked."""
+        return len(self.model.inputs)
+
     def _tables(
         self, inputs: FloatArray, parameters: FloatArray | None, t0: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         u = np.atleast_2d(np.asarray(inputs, dtype=float))
         p = self.model.parameter_values if parameters is None else np.asarray(parameters, dtype=float)
-        wanted = int(self.step.size1_in("u"))
+        wanted = self._input_columns()
         if u.shape[1] != wanted:
             raise ModelError(f"inputs have {u.shape[1]} columns, model '{self.model.name}' {wanted}")
         if p.shape not in ((len(self.model.parameters),), (len(u), len(self.model.parameters))):
