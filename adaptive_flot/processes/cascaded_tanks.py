@@ -15,8 +15,9 @@ import numpy as np
 
 from adaptive_flot.contracts.economics import OperatingPoint
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
+from adaptive_flot.greybox.data.columns import numeric_column
+from adaptive_flot.greybox.data.dataset import Dataset, check_record
+from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 from adaptive_flot.processes.process import Measurements, Process
@@ -130,6 +131,8 @@ def read_benchmark(path: Source) -> tuple[Dataset, Dataset]:
     ------
     DataError
         A column or the sampling interval is missing, or a cell is empty.
+    RangeError
+        A voltage outside the range of the pump.
     """
     file, table = named(path), read_table(path)
     missing = [c for c in BENCHMARK_COLUMNS if c not in table.columns]
@@ -138,15 +141,15 @@ def read_benchmark(path: Source) -> tuple[Dataset, Dataset]:
     dt = float(numeric_column(table, "Ts", file)[0])
     if not dt > 0:
         raise DataError(f"{file}: Ts = {dt} in its first row; give the sampling interval in seconds")
-    records = []
+    records, model = [], make_model()
     for name in ("Est", "Val"):
         u, y = (numeric_column(table, column + name, file) for column in ("u", "y"))
         if not np.isfinite(u).all():
             raise DataError(f"{file}: column 'u{name}' has an empty cell; inputs can not be missing")
         held = np.concatenate([u[:1], u[:-1]])
-        records.append(
-            Dataset(f"{file.stem}:{name}", dt * np.arange(len(u), dtype=float), dt, held[:, None], y[:, None])
-        )
+        time = dt * np.arange(len(u), dtype=float)
+        record = Dataset(f"{file.stem}:{name}", time, dt, held[:, None], y[:, None])
+        records.append(check_record(record, model, table, file))
     return records[0], records[1]
 
 

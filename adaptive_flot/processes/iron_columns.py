@@ -14,8 +14,9 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
+from adaptive_flot.greybox.data.columns import date_column, numeric_column
+from adaptive_flot.greybox.data.dataset import Dataset, check_record
+from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 from adaptive_flot.processes.process import Measurements, Process
@@ -148,11 +149,13 @@ def read_record(path: Source) -> Dataset:
     ------
     DataError
         A column is missing, an input is empty, or an hour.
+    RangeError
+        An input outside its physical range.
     """
     file, table = named(path), read_table(path)
     if "hour" not in table.columns:
         raise DataError(f"{file}: column 'hour' is missing; give the hourly table of the mining plant")
-    hour = pd.to_datetime(table["hour"], errors="coerce")
+    hour = date_column(table, "hour", file)
     table = table[(hour >= pd.Timestamp(FIRST_HOUR)).to_numpy()]
     hour = hour[hour >= pd.Timestamp(FIRST_HOUR)]
     if len(table) < 2 or (hour.diff().dropna() != pd.Timedelta(hours=1)).any():
@@ -172,7 +175,7 @@ def read_record(path: Source) -> Dataset:
     inputs += [mean("air", g) for g in GROUPS] + [mean("level", g) / 1000 for g in GROUPS]
     outputs = np.column_stack([fresh(column(f"{name}_conc_pct")) / 100 for name in ("silica", "iron")])
     time = HOUR * np.arange(1.0, len(table) + 1)
-    return Dataset(file.stem, time, HOUR, np.column_stack(inputs), outputs)
+    return check_record(Dataset(file.stem, time, HOUR, np.column_stack(inputs), outputs), make_model(), table, file)
 
 
 def fresh(assay: FloatArray) -> FloatArray:

@@ -8,11 +8,11 @@ the level loop are not recorded.
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import Source, named, numeric_column, read_table
+from adaptive_flot.greybox.data.columns import date_column, numeric_column
+from adaptive_flot.greybox.data.dataset import Dataset, check_record
+from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 from adaptive_flot.processes.process import Measurements, Process
@@ -97,27 +97,33 @@ def read_record(path: Source) -> Dataset:
     Raises
     ------
     DataError
-        A column is missing, or a time can not be read.
+        A column is missing, a time can not be read, or an input is empty.
+    RangeError
+        An input outside its physical range.
     """
     file, table = named(path), read_table(path)
     missing = [c for c in (TIME, *COLUMNS.values()) if c not in table.columns]
     if missing:
         wanted = ", ".join((TIME, *COLUMNS.values()))
         raise DataError(f"{file}: column {missing[0]!r} is missing; the file of the zinc cell has {wanted}")
-    when = pd.to_datetime(table[TIME], format="%d/%m/%Y %H:%M:%S", errors="coerce")
-    if when.isna().any():
-        raise DataError(f"{file}: {TIME!r} holds {table[TIME][when.isna()].iloc[0]!r}; write day/month/year h:min:s")
+    when = date_column(table, TIME, file, "%d/%m/%Y %H:%M:%S")
     seconds = (when - when.iloc[0]).dt.total_seconds().to_numpy()
     steps = np.diff(seconds)
+    if not (steps > 0).any():
+        raise DataError(f"{file}: {TIME!r} does not increase; give a record of at least 2 times, the oldest first")
     breaks = np.flatnonzero((steps > LONGEST_STEP * np.median(steps)) | (steps < np.median(steps) / LONGEST_STEP)) + 1
     edges = np.concatenate([[0], breaks, [len(seconds)]])
     k = int(np.argmax(np.diff(edges)))
     rows = slice(int(edges[k]), int(edges[k + 1]))
     values = {name: numeric_column(table, column, file)[rows] for name, column in COLUMNS.items()}
     count = rows.stop - rows.start
+    if count < 2:
+        raise DataError(f"{file}: no two rows in a row without a gap; give a longer record")
     dt = float(np.mean(np.diff(seconds[rows])))
-    inputs = np.column_stack([values[q.name] for q in make_model().inputs])
-    return Dataset(file.stem, dt * np.arange(count, dtype=float), dt, inputs, values["level"][:, None])
+    model = make_model()
+    inputs = np.column_stack([values[q.name] for q in model.inputs])
+    record = Dataset(file.stem, dt * np.arange(count, dtype=float), dt, inputs, values["level"][:, None])
+    return check_record(record, model, table.iloc[rows], file)
 
 
 PROCESS = Process("zinc-level", make_model, lambda source: Measurements(read_record(source)))

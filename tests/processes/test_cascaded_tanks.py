@@ -77,9 +77,9 @@ def test_empty_tank_stays_finite(tanks: Model) -> None:
 def test_inputs_move_down_by_a_row(tmp_path: Path) -> None:
     """The file holds an input after its sample, a record before its row; the first row's is never used."""
     file = tmp_path / "tanks.csv"
-    file.write_text(f"{HEADER}\n1,10,5,50,4,\n2,20,6,60,,\n3,30,7,70,,\n\n")
+    file.write_text(f"{HEADER}\n1,4,5,20,4,\n2,8,6,24,,\n3,12,7,28,,\n\n")
     estimation, validation = read_benchmark(file)
-    for record, factor in ((estimation, 1), (validation, 10)):
+    for record, factor in ((estimation, 1), (validation, 4)):
         np.testing.assert_array_equal(record.time, [0, 4, 8])
         np.testing.assert_array_equal(record.inputs[1:, 0], factor * np.array([1, 2]))
         np.testing.assert_array_equal(record.outputs[:, 0], factor * np.array([5, 6, 7]))

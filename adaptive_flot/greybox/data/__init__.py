@@ -3,5 +3,6 @@
 Map
 ---
 dataset.py  A record: read, checked, columns mapped to the names of a model.
+columns.py  Columns of a table as numbers, times and dates.
 tables.py   Tables in CSV and Parquet.
 """

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
-from adaptive_flot.greybox.data.tables import Source, line, named, numeric_column, read_table, time_column
+from adaptive_flot.greybox.data.columns import line, numeric_column, time_column
+from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.step_functions import steps_in
 
@@ -123,6 +124,35 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     return Dataset(file.stem, time, dt, inputs, outputs, parameters, _first_state(table, columns, model, file))
 
 
+def check_record(record: Dataset, model: Model, table: pd.DataFrame, file: Path) -> Dataset:
+    """Check what a process's own reader made of a table, and return it: `read_dataset` asks the same of any other.
+
+    Parameters
+    ----------
+    record
+        Row k comes from row k of the table.
+    model
+        The process.
+    table, file
+        Where it comes from, for messages.
+
+    Raises
+    ------
+    DataError
+        Fewer than 2 rows, a time that does not increase, an input without value, or too many integration steps.
+    RangeError
+        An input outside the model's physical range.
+    """
+    _check_count(len(record), file)
+    if not (record.dt > 0 and np.isfinite(record.time).all()):
+        raise DataError(f"{file}: the sampling interval is {record.dt:g} s; correct the times")
+    _check_steps(model, record.dt, len(record), file)
+    for q, values in zip(model.inputs, record.inputs.T, strict=True):
+        _check_input(table, q.name, values, file)
+    model.check_inputs(record.inputs, record.time, where=str(file))
+    return record
+
+
 def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path) -> str:
     if column in columns:
         return column
@@ -149,18 +179,26 @@ def _looks_like_unit(suffix: str) -> bool:
 
 def _input(table: pd.DataFrame, columns: Sequence[str], name: str, column: str, unit: str, file: Path) -> FloatArray:
     values = numeric_column(table, _find(columns, name, column, unit, file), file)
+    _check_input(table, column, values, file)
+    return values
+
+
+def _check_input(table: pd.DataFrame, column: str, values: FloatArray, file: Path) -> None:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise DataError(
             f"{file}: input {column!r} has no value in line {line(table, int(bad[0]))} ({bad.size} in all); "
             "inputs can not be missing: fill in the value that was applied, or cut the record there"
         )
-    return values
+
+
+def _check_count(rows: int, file: Path) -> None:
+    if rows < 2:
+        raise DataError(f"{file}: {rows} row; a record needs at least 2")
 
 
 def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
-    if len(time) < 2:
-        raise DataError(f"{file}: {len(time)} row; a record needs at least 2")
+    _check_count(len(time), file)
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise DataError(

@@ -1,4 +1,4 @@
-"""Read and write tables (CSV or Parquet by suffix) with errors that name the file, the line and the column."""
+"""Read and write tables (CSV or Parquet by suffix) with errors that name the file and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -7,37 +7,16 @@ import warnings
 from pathlib import Path
 from typing import TypeAlias
 
-import numpy as np
 import pandas as pd
 import pyarrow.parquet
 
 from adaptive_flot.errors import DataError, OutputError
 from adaptive_flot.files import replace_path
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.data.columns import shown
 
-FIRST_LINE = 2
-"""Line of a CSV file that holds row 0: messages count lines as an editor does."""
 MOST_ROWS = 2_000_000
 """Longest table: 23 days, one row a second."""
-LARGEST = 1e30
-"""Largest number that counts as measured; a logger writes 3.4e38 where it has none."""
-LONGEST_SHOWN = 60
-"""Characters of a wrong cell that a message repeats."""
 SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
-NO_NUMBERS = {
-    "boolean": "true and false",
-    "bytes": "binary data",
-    "complex": "complex numbers",
-    "date": "dates",
-    "datetime": "dates",
-    "datetime64": "dates",
-    "timedelta": "durations",
-    "timedelta64": "durations",
-    "time": "times of day",
-    "period": "periods",
-}
-"""Kinds of columns that pandas would turn into numbers without a word, by its name for them."""
-
 
 Source: TypeAlias = Path | str | pd.DataFrame
 """Where a table comes from: a file, or a table at hand."""
@@ -134,13 +113,13 @@ def _plain(table: pd.DataFrame, file: Path) -> pd.DataFrame:
 def _check_repeated(names: pd.Series, file: Path) -> None:
     repeated = names[names.duplicated()]
     if len(repeated):
-        raise DataError(f"{file}: column {_shown(repeated.iloc[0])} is there twice; rename or remove one of them")
+        raise DataError(f"{file}: column {shown(repeated.iloc[0])} is there twice; rename or remove one of them")
 
 
 def _check_header(table: pd.DataFrame, file: Path) -> None:
     for number, name in enumerate(table.columns[1:], start=2):
         if any(unicodedata.category(c) in ("Cc", "Cs") for c in name):
-            raise DataError(f"{file}: the name of column {number}, {_shown(name)}, can not be printed; rename it")
+            raise DataError(f"{file}: the name of column {number}, {shown(name)}, can not be printed; rename it")
 
 
 def _unreadable(file: Path, error: OSError) -> str:
@@ -149,63 +128,6 @@ def _unreadable(file: Path, error: OSError) -> str:
 
 def _too_long(file: Path) -> str:
     return f"{file}: more than {MOST_ROWS} rows; cut the record or take every second row"
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
-
-
-def line(table: pd.DataFrame, row: int) -> int:
-    """Line of the file that holds a row of the table."""
-    return int(table.index[row]) + FIRST_LINE
-
-
-def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatArray:
-    """Return one column as floats (N,), empty cells as NaN.
-
-    Raises
-    ------
-    DataError
-        The column holds text, an infinite or absurdly large number, or no numbers at all (true and false, dates,
-        binary data). The message names the line and what stands there.
-    """
-    raw = table[column]
-    if isinstance(raw.dtype, pd.CategoricalDtype):
-        raw = raw.astype(raw.cat.categories.dtype)
-    kind = NO_NUMBERS.get(pd.api.types.infer_dtype(raw, skipna=True))
-    if kind is not None:
-        raise DataError(f"{file}: column {column!r} holds {kind}; write numbers")
-    values = pd.to_numeric(raw, errors="coerce")
-    bad = np.flatnonzero((values.isna() & raw.notna()).to_numpy())
-    if bad.size:
-        where = f"{file}: column {column!r}, line {line(table, int(bad[0]))}"
-        raise DataError(f"{where}: {_shown(raw.iloc[bad[0]])} is not a number; correct it")
-    found = np.asarray(values, dtype=float)
-    large = np.flatnonzero(np.abs(found) > LARGEST)
-    if large.size:
-        where = f"{file}: column {column!r}, line {line(table, int(large[0]))}"
-        raise DataError(
-            f"{where}: {found[large[0]]:g} is no measured value ({large.size} in all); "
-            "correct it, or leave the cell empty where nothing was measured"
-        )
-    return found
-
-
-def time_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatArray:
-    """Return the times of the rows [s] (N,): numbers as they are, dates as seconds since the first, durations.
-
-    Raises
-    ------
-    DataError
-        Neither; see `numeric_column`.
-    """
-    raw = table[column]
-    if pd.api.types.is_datetime64_any_dtype(raw.dtype):
-        raw = raw - raw.min()
-    if pd.api.types.is_timedelta64_dtype(raw.dtype):
-        return np.asarray(raw.dt.total_seconds(), dtype=float)
-    return numeric_column(table, column, file)
 
 
 def check_table_path(path: Path) -> None:
