@@ -9,8 +9,9 @@ from pathlib import Path
 from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
-from adaptive_flot.errors import DataError, ModelError, PluginError, near_match
+from adaptive_flot.errors import DataError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
 from adaptive_flot.runner.commands.record_blocks import Blocks
 from adaptive_flot.runner.commands.replay import Replay, replay
@@ -66,7 +67,8 @@ def estimate_record(
     Raises
     ------
     DataError, ModelError, PluginError
-        Nothing measured, unknown names, an estimator that can not be loaded, or one that needs the truth.
+        Nothing measured, unknown names, an estimator that can not be loaded, or one that needs the truth. A sampling
+        interval of too many steps.
     """
     names = model.expand_parameters(fit) if fit else tuple(p.name for p in model.parameters if p.role == "estimated")
     if not names:
@@ -80,6 +82,8 @@ def estimate_record(
     unmeasured = [o for o in driving if o not in blocks.fit.measured(model)]
     if unmeasured or not driving:
         raise DataError(f"{blocks.name}: output {(unmeasured or ['any'])[0]!r} is not measured in the record; add it")
+    with located(blocks.name):
+        check_interval(model, blocks.fit.dt)
     setup = Setup(model, blocks.fit.dt, names, driving)
     factory = load("pem", BATCH_ESTIMATORS, "batch estimator")
     batch: BatchFit = construct(factory, "pem", "batch estimator", setup, initial_state="estimated").fit(blocks.fit)

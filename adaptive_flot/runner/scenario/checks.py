@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from adaptive_flot.errors import ScenarioError, located, near_match
+from adaptive_flot.greybox.data.tables import MOST_ROWS
+from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.runner.scenario.discovery_options import FEWEST
 from adaptive_flot.runner.scenario.faults import ControllerFault, SlowAnalyser, Stuck
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 
-MOST_INTERVALS = 1e7
-"""Longest run: its table still fits into memory."""
+MOST_INTERVALS = MOST_ROWS
+"""Longest run: what it writes can be read again."""
 
 
 def check_scenario(scenario: Scenario) -> None:
@@ -168,6 +170,8 @@ def _check_times(scenario: Scenario) -> None:
         raise ScenarioError(
             f"duration_s = {file.duration_s:g} must be a whole number (2 to {MOST_INTERVALS:g}) of sampling_s intervals"
         )
+    with located("sampling_s"):
+        check_interval(scenario.model, file.sampling_s)
     if not 2 <= scenario.initial_rows < round(intervals):
         raise ScenarioError(
             f"initial_estimate.until_s = {file.initial_estimate.until_s:g} s must hold 2 intervals or more and lie "
