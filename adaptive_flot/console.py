@@ -9,9 +9,9 @@ from typing import Literal
 
 from rich.box import HORIZONTALS
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.report.compare import tables as compare_tables
@@ -27,11 +27,16 @@ PIPE_WIDTH = 140
 """Letters a line where standard output is no terminal."""
 
 
+def _console() -> Console:
+    """Standard output; a name such as `[bold]` or `data[1]` is text as any other, not a style."""
+    return Console(width=None if Console().is_terminal else PIPE_WIDTH, markup=False)
+
+
 @contextmanager
 def progress_bar(label: str, total: int) -> Iterator[Callable[[], None]]:
     """Yield a function that advances the bar by one; nothing is drawn where standard error is no terminal."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True, markup=False)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(label, total=total)
         yield lambda: progress.advance(task)
@@ -40,8 +45,13 @@ def progress_bar(label: str, total: int) -> Iterator[Callable[[], None]]:
 @contextmanager
 def stage_bar(label: str) -> Iterator[Callable[[str], None]]:
     """Yield a function that shows the stage it is given and counts how often it was called; nobody knows the end."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}"), TimeElapsedColumn())
+    console = Console(stderr=True, markup=False)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed:.0f}"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(label, total=None)
         yield lambda stage: progress.update(task, advance=1, description=f"{label}: {stage}")
@@ -49,11 +59,11 @@ def stage_bar(label: str) -> Iterator[Callable[[str], None]]:
 
 def print_discovery(found: Discovery) -> None:
     """Print the verdict in words and the error of each output before and after."""
-    console = Console(width=None if Console().is_terminal else 140)
+    console = _console()
     verdict = found.verdict
-    console.print(f"[bold]{verdict.word}[/bold]: {escape(verdict.reason)}", highlight=False)
+    console.print(Text.assemble((verdict.word, "bold"), f": {verdict.reason}"), highlight=False)
     for note in verdict.notes:
-        console.print(f"- {note}", highlight=False, markup=False)
+        console.print(f"- {note}", highlight=False)
     if verdict.error:
         title = f"Free-run root mean square error, {verdict.split} split of the record"
         table = Table(title=title, title_justify="left")
@@ -64,7 +74,7 @@ def print_discovery(found: Discovery) -> None:
             table.add_row(c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
         console.print(table)
     if verdict.experiment is not None:
-        console.print(f"{verdict.experiment}", highlight=False, markup=False)
+        console.print(f"{verdict.experiment}", highlight=False)
     console.file.flush()
 
 
@@ -84,7 +94,7 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
             cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
             shown = f"{name} ({controller})" if several else name
             table.add_row(scenario.name, shown, str(len(own)), *cells)
-    console = Console(width=None if Console().is_terminal else PIPE_WIDTH)
+    console = _console()
     console.print(table)
     console.file.flush()  # a reader on a pipe sees the result before the report is drawn
 
@@ -107,7 +117,7 @@ def print_estimate(result: RecordEstimate) -> None:
         for e in replay.errors:
             p = f"{e.ljung_box_p:.2g}"
             table.add_row(replay.estimator, e.block, e.output, f"{e.one_step:.4g}", f"{e.free_run:.4g}", e.unit, p)
-    console = Console(width=None if Console().is_terminal else PIPE_WIDTH)
+    console = _console()
     console.print(table)
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
@@ -126,16 +136,16 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
 
 def print_comparison(tables: Sequence[report.Table], sentences: Sequence[str]) -> None:
     """Print the tables of a comparison and what follows from them."""
-    console = Console(width=None if Console().is_terminal else PIPE_WIDTH)
+    console = _console()
     for content in tables:
-        table = Table(caption=escape(content.caption), caption_justify="left", show_lines=True, box=HORIZONTALS)
+        table = Table(caption=content.caption, caption_justify="left", show_lines=True, box=HORIZONTALS)
         for j, heading in enumerate(content.header):
             words = " ".join([heading, *(row[j] for row in content.rows)]).split()
             side: Literal["left", "right"] = "left" if j < content.words else "right"
-            table.add_column(escape(heading), justify=side, min_width=max(map(len, words)))  # never cut a number
+            table.add_column(heading, justify=side, min_width=max(map(len, words)))  # never cut a number
         for row in content.rows:
-            table.add_row(*(escape(cell) for cell in row))
+            table.add_row(*row)
         console.print(table)
     for sentence in sentences:
-        console.print(f"- {sentence}", highlight=False, markup=False)
+        console.print(f"- {sentence}", highlight=False)
     console.file.flush()

@@ -46,14 +46,14 @@ class Counts:
 @contextmanager
 def live(label: str) -> Iterator[Callable[[int, Rows], Callable[[Rows], None]]]:
     """Yield the `progress` of a sweep: a bar on standard error, or a line now and then where that is no terminal."""
-    console, counts = Console(stderr=True), Counts()
+    console, counts = Console(stderr=True, markup=False), Counts()
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[counts]}"),
+        TextColumn("{task.fields[counts]}", markup=False),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
 
@@ -88,11 +88,11 @@ def print_study(table: pd.DataFrame) -> None:
     for names, rows in table.groupby(["scenario", "controller", "estimator"], sort=False):
         failed = int((rows["outcome"] == "failed").sum())
         shown.add_row(*map(str, names), str(len(rows)), str(failed), *(_distribution(rows[c]) for c in fits))
-    console = Console(width=None if Console().is_terminal else 140)
+    console = Console(width=None if Console().is_terminal else 140, markup=False)
     console.print(shown)
     messages = table.loc[table["outcome"] == "failed", "message"].value_counts()
     for message, count in messages.head(3).items():
-        console.print(f"{count} failed: {message}", highlight=False, markup=False)
+        console.print(f"{count} failed: {message}", highlight=False)
     if len(messages):
         console.print("Run failed ones again with --retry-failed.", highlight=False)
     console.file.flush()

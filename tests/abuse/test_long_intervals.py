@@ -18,6 +18,7 @@ from adaptive_flot.plugins import ESTIMATORS, construct, load
 from adaptive_flot.runner.commands.estimate import estimate_record
 from adaptive_flot.runner.commands.record_blocks import Blocks
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
+from adaptive_flot.runner.scenario.realisation import Realisation
 
 MESSAGE = "a sampling interval of 3600 s takes 3600 steps of model 'flotation', whose longest is 1 s"
 
@@ -25,7 +26,7 @@ MESSAGE = "a sampling interval of 3600 s takes 3600 steps of model 'flotation', 
 @pytest.fixture(scope="module")
 def inputs(model: Model) -> FloatArray:
     """Two hours of steady inputs: those of the shipped scenario at its start, the second hour a little different."""
-    first = load_scenario("paper_scenario_1").schedule(1)[0]
+    first = Realisation(load_scenario("paper_scenario_1"), 1).schedule[0]
     return np.vstack([first, first * (1 + 0.01 * np.arange(len(first)))])
 
 
@@ -52,7 +53,7 @@ def test_estimator_refuses_an_interval_of_too_many_steps(model: Model, name: str
 def test_record_is_refused_before_it_is_fitted(model: Model, inputs: FloatArray) -> None:
     n = 40
     level = np.full((n, len(model.outputs)), 0.5)
-    record = Dataset("hourly", 3600.0 * np.arange(n), 3600.0, np.repeat(inputs, n // 2, axis=0), level)
+    record = Dataset("hourly", 3600.0 * np.arange(n, dtype=float), 3600.0, np.repeat(inputs, n // 2, axis=0), level)
     called: list[None] = []
     blocks = Blocks("hourly", record, record, continues=False)
     with pytest.raises(ModelError, match="hourly: a sampling interval of 3600 s"):
