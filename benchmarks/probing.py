@@ -20,7 +20,7 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.runner.commands.comparison import Spread
+from adaptive_flot.runner.commands.comparison import SeedSpread
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.keys import CaseEntry
@@ -101,7 +101,7 @@ def rows(found: pd.DataFrame) -> Iterator[tuple[str, str, str]]:
 
 
 def _shown(values: pd.Series[float], digits: int) -> str:
-    s = Spread.of(np.asarray(values, dtype=float))
+    s = SeedSpread.of(np.asarray(values, dtype=float))
     return f"{s.median:.{digits}f} [{s.low:.{digits}f}, {s.high:.{digits}f}]"
 
 

@@ -1,7 +1,7 @@
 """Two cascaded water tanks with square-root outflow: the base model of a public identification benchmark.
 
 M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noel, *Cascaded tanks benchmark combining soft and hard nonlinearities*,
-4TU.ResearchData, DOI 10.4121/12960104: water is pumped into the upper tank, runs through a hole into the lower one
+4TU.ResearchData, DOI 10.4121/12960104. Water is pumped into the upper tank, runs through a hole into the lower one
 and back to the reservoir. Levels are in volts of an uncalibrated sensor; only the lower one is measured.
 """
 
@@ -124,8 +124,8 @@ class PumpingEconomics:
 def read_benchmark(path: Source) -> tuple[Dataset, Dataset]:
     """Read the published file: estimation record (uEst, yEst) and validation record (uVal, yVal).
 
-    The file samples input and output at the same instant and holds the input *after* it; a `Dataset` wants the input
-    held *before* each row, so the inputs move down by one row (the first row's is never used).
+    The file samples input and output at the same instant and holds the input *after* it. A `Dataset` wants the input
+    held *before* each row. So the inputs move down by one row; the first row's is never used.
 
     Raises
     ------

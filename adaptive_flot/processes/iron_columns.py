@@ -167,8 +167,8 @@ def read_record(path: Source) -> Dataset:
         return numeric_column(table, name, file)
 
     def mean(name: str, columns: Sequence[int]) -> FloatArray:
-        found: FloatArray = np.mean([column(f"{name}_{k:02d}") for k in columns], axis=0)
-        return found
+        mean: FloatArray = np.mean([column(f"{name}_{k:02d}") for k in columns], axis=0)
+        return mean
 
     plain = ("starch_flow", "amine_flow", "pulp_flow", "pulp_ph", "pulp_density")
     inputs = [column("silica_feed_pct") / 100, column("iron_feed_pct") / 100, *map(column, plain)]

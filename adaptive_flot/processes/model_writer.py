@@ -85,14 +85,14 @@ def _process(base: str, cell: str | None, folder: Path | None) -> tuple[str, str
 
 
 def _relative_cell(cell: str | None, folder: Path | None, to: Path) -> str:
-    found = find_cell(cell, folder)
-    return found.stem if found.parent == cell_file().parent else _relative(found, to)
+    path = find_cell(cell, folder)
+    return path.stem if path.parent == cell_file().parent else _relative(path, to)
 
 
 def _relative_module(base: str, folder: Path | None, to: Path) -> str:
     name, colon, attribute = base.rpartition(":")
-    found = module_file(name, folder) if colon else None
-    return base if found is None else f"{_relative(found.with_suffix(''), to)}:{attribute}"
+    file = module_file(name, folder) if colon else None
+    return base if file is None else f"{_relative(file.with_suffix(''), to)}:{attribute}"
 
 
 def _relative(path: Path, to: Path) -> str:

@@ -1,7 +1,7 @@
 """Level of an industrial zinc flotation cell under feedback: the model for a public record of a real loop.
 
 Data: K. Dunn, OpenMV.net "flotation-cell": feed rate, upstream pH, copper sulphate, pulp level and air flow of one cell
-every 30 s over a day; units are not given, so level and flows count as scaled. The set point and the tailings valve of
+every 30 s over a day. Units are not given, so level and flows count as scaled. The set point and the tailings valve of
 the level loop are not recorded.
 """
 

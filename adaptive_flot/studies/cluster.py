@@ -57,8 +57,8 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Client]:
 def _embedded(workers: int) -> LocalCluster:
     """Processes on this machine, one thread each.
 
-    Ctrl-C goes to all of them: it is held back while the cluster starts, in this thread, and for good in the threads
-    and processes that it starts (they inherit the mask), so that this process alone decides how a sweep ends.
+    Ctrl-C goes to all of them. It is held back in this thread while the cluster starts. In the threads and processes
+    that it starts it is held back for good, since they inherit the mask: this process alone decides how a sweep ends.
     """
     resource_tracker.ensure_running()  # to start it later would lift the mask
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

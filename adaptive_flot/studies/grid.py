@@ -22,7 +22,7 @@ NOT_CONTENT = {"description", "seeds", "estimators", "controllers", "cases", "pu
 
 
 @dataclass(frozen=True)
-class Case:
+class Combination:
     """One combination of a study, to be run for every seed.
 
     Attributes
@@ -52,7 +52,7 @@ class Case:
 class Grid:
     """All runs of a study: every case with every seed. `options` are those of the whole study."""
 
-    cases: tuple[Case, ...]
+    cases: tuple[Combination, ...]
     seeds: tuple[int, ...]
     options: Mapping[str, Any]
 
@@ -67,11 +67,11 @@ def grid_of(study: Study, *, compiled: bool = False) -> Grid:
     return Grid(tuple(c for arm in study.arms for c in cases_of(arm, options)), study.seeds, options)
 
 
-def cases_of(arm: Arm, options: Mapping[str, Any]) -> list[Case]:
+def cases_of(arm: Arm, options: Mapping[str, Any]) -> list[Combination]:
     """Cases of one scenario of a study."""
     folder, common = arm.scenario.path.parent, {"scenario": scenario_hash(arm.scenario), "options": digest(options)}
     return [
-        Case(
+        Combination(
             arm.scenario.name,
             controller,
             estimator,

@@ -9,7 +9,7 @@ from typing import Any
 
 from adaptive_flot.errors import StudyError
 from adaptive_flot.files import write_text
-from adaptive_flot.studies.grid import Case, Grid
+from adaptive_flot.studies.grid import Combination, Grid
 
 MANIFEST = "study.json"
 WAYS_OUT = "restore the study, or give another --out"
@@ -45,7 +45,9 @@ def _plain(grid: Grid) -> dict[str, Any]:
 def _read(file: Path) -> Grid:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        cases = tuple(Case(c["scenario"], c["controller"], c["estimator"], c["hashes"]) for c in content["cases"])
+        cases = tuple(
+            Combination(c["scenario"], c["controller"], c["estimator"], c["hashes"]) for c in content["cases"]
+        )
         return Grid(cases, tuple(content["seeds"]), content["options"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StudyError(f"{file}: not the memory of a study ({error!r}); give another --out") from error
@@ -71,7 +73,7 @@ def _check(folder: Path, old: Grid, new: Grid) -> None:
         raise StudyError(f"{folder}: holds seeds that are no longer in the study ({_few(sorted(gone))}); {WAYS_OUT}")
 
 
-def _described(case: Case, changed: Sequence[str]) -> str:
+def _described(case: Combination, changed: Sequence[str]) -> str:
     names = {"scenario": case.scenario, "controller": case.controller, "estimator": case.estimator}
     what = " and ".join(f"{kind} {names[kind]!r}" for kind in changed if kind in names)
     return f"{what} (content, options or code) has changed"

@@ -154,9 +154,9 @@ def _arm(file: StudyFile, scenario: Scenario, folder: Path) -> Arm:
 
 def _found(plugins: Mapping[str, Plugin], *folders: Path) -> dict[str, Plugin]:
     """Plug-ins with a user's own file by its full path: a worker may run in another folder."""
-    found = {}
+    resolved = {}
     for name, plugin in plugins.items():
         module, colon, attribute = plugin.use.rpartition(":")
         file = module_file(module, *folders) if colon else None
-        found[name] = plugin if file is None else plugin.model_copy(update={"use": f"{file}:{attribute}"})
-    return found
+        resolved[name] = plugin if file is None else plugin.model_copy(update={"use": f"{file}:{attribute}"})
+    return resolved

@@ -21,7 +21,7 @@ from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.studies import worker
 from adaptive_flot.studies.cluster import connected
 from adaptive_flot.studies.folder import locked
-from adaptive_flot.studies.grid import Case, Grid, content_hash, grid_of
+from adaptive_flot.studies.grid import Combination, Grid, content_hash, grid_of
 from adaptive_flot.studies.manifest import remember
 from adaptive_flot.studies.study_file import Arm, Study
 
@@ -42,7 +42,7 @@ class _Group:
     order: worker.Order
     controller: str
     seed: int
-    cases: tuple[Case, ...]
+    cases: tuple[Combination, ...]
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def _rows(table: pd.DataFrame) -> Rows:
 def _missing(study: Study, grid: Grid, done: set[str]) -> Iterator[_Group]:
     orders = {arm.scenario.name: _order(arm) for arm in study.arms}
     for seed in grid.seeds:
-        groups: dict[tuple[str, str], list[Case]] = {}
+        groups: dict[tuple[str, str], list[Combination]] = {}
         for case in grid.cases:
             if case.run(seed) not in done:
                 groups.setdefault((case.scenario, case.controller), []).append(case)

@@ -90,11 +90,12 @@ def make_model(cell: Cell | None = None) -> Model:
 
 
 TRACE = 1e-12
-"""Mass [kg] that keeps the grade of an empty pulp finite, and share of the feed's minerals that the grade counts as
-present: without any mineral it is then that of the first to arrive, not 0/0; else it changes in the twelfth digit."""
+"""Mass [kg] that keeps the grade of an empty pulp finite, and fraction of the feed's minerals that counts as present.
+The grade of an empty pulp is then that of the first mineral to arrive, not 0/0. Any other changes in the twelfth
+digit."""
 FELT = 1 / 3
-"""Share of the froth's residence time after which the grade is felt where it acts back: that of its top, where bubbles
-burst. An effect that follows at once would close an algebraic loop through the whole froth."""
+"""Fraction of the froth's residence time after which the grade acts back: that of its top, where bubbles burst.
+An effect that follows at once would close an algebraic loop through the whole froth."""
 SHALLOWEST = 1e-3
 """Froth depth [m] below which the residence time of the froth is that of this depth."""
 FASTEST_DECAY = 2.0

@@ -164,7 +164,7 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
         raise CellError(
             f"{file}: {section}.{key}: give scale and prior_std once, or one for each of {len(labels)} values"
         )
-    found = []
+    entries = []
     for label, value, scale, prior in zip(labels, entry.values, scales, priors, strict=True):
         where = f"{file}: {section}.{key}"
         if not (np.isfinite(value) and lower <= value <= upper):
@@ -174,7 +174,7 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
             )
         if (scale is not None and not scale > 0) or (prior is not None and not prior > 0):
             raise CellError(f"{where}: scale and prior_std must be positive, got {scale} and {prior}; correct them")
-        found.append(
+        entries.append(
             Parameter(
                 name=f"{spec.name}.{label}" if spec.group else spec.name,
                 value=value,
@@ -189,7 +189,7 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
                 disturbance=spec.disturbance,
             )
         )
-    return found
+    return entries
 
 
 def _each(value: float | list[float] | None, labels: list[str]) -> list[float | None]:

@@ -6,7 +6,7 @@ bursting rate; `vg` is v_g*, the interfacial gas velocity.
 
 The closures are printed in two branches, alpha* < 0.5 and alpha* >= 0.5. R_f and Q_conc are continuous there, the
 printed R_ent is not (a factor sqrt 2 in its exponent). An optimiser needs a smooth model, so the branches are blended
-by a logistic of steepness 50 in alpha*, as in Part I: in the paper's range (alpha* 0.08 to 0.21) the first branch is
+by a logistic of steepness 50 in alpha*, as in Part I. In the paper's range (alpha* 0.08 to 0.21) the first branch is
 met to 1e-6.
 """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.report.kit.page import number
-from adaptive_flot.runner.commands.comparison import FIXED, ORACLE, Comparison, Contender, Spread
+from adaptive_flot.runner.commands.comparison import FIXED, ORACLE, Comparison, Contender, SeedSpread
 
 OFTEN = 0.01
 """Share of time below the grade limit from which a contender is named."""
@@ -22,7 +22,7 @@ def _gains(comparison: Comparison) -> list[str]:
         fixed, gains = comparison.rival(oracle, FIXED), comparison.gain(oracle, "value_cu_h")
         if fixed is None or not gains.size:
             continue
-        gain = Spread.of(gains)
+        gain = SeedSpread.of(gains)
         text = (
             f"{oracle.controller}: with the true parameters (oracle) it earns {number(gain.median, '+.3f')} cu/h "
             f"{_range(gain, gains.size, '+.3f')}against fixed ones"
@@ -36,7 +36,7 @@ def _gains(comparison: Comparison) -> list[str]:
         ]
         shares = [(c, comparison.share(c, "value_cu_h")) for c in rivals]
         told = [
-            f"{c.estimator} recaptures {_percent(Spread.of(share), share.size)} of it"
+            f"{c.estimator} recaptures {_percent(SeedSpread.of(share), share.size)} of it"
             for c, share in shares
             if np.isfinite(share).any()
         ]
@@ -75,10 +75,10 @@ def _below(contender: Contender) -> str:
     return f"{number(100 * contender.spread('below_limit').median, '.1f')} %"
 
 
-def _percent(share: Spread, count: int) -> str:
-    scaled = Spread(100 * share.median, 100 * share.low, 100 * share.high, share.not_finite)
+def _percent(share: SeedSpread, count: int) -> str:
+    scaled = SeedSpread(100 * share.median, 100 * share.low, 100 * share.high, share.not_finite)
     return f"{number(scaled.median, '.1f')} % {_range(scaled, count, '.1f')}".rstrip()
 
 
-def _range(spread: Spread, count: int, form: str) -> str:
+def _range(spread: SeedSpread, count: int, form: str) -> str:
     return f"[{number(spread.low, form)}, {number(spread.high, form)}] " if count > 1 else ""

@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.kit.page import Table, number
-from adaptive_flot.runner.commands.comparison import Comparison, Contender, Spread
+from adaptive_flot.runner.commands.comparison import Comparison, Contender, SeedSpread
 
 MANY_SEEDS = 20
 """Seeds from which a distribution is more than its median and range."""
@@ -204,7 +204,7 @@ def cell(column: Column, contender: Contender) -> str:
     >>> cell(Column("x", lambda c: np.array([0.1, 0.2, 0.4]), ".1f"), SimpleNamespace(seeds=[1, 2, 3]))
     '0.2\n0.1 – 0.4'
     """
-    spread = Spread.of(column.values(contender) * column.factor)
+    spread = SeedSpread.of(column.values(contender) * column.factor)
     text, low, high = (number(v, column.form) for v in (spread.median, spread.low, spread.high))
     if low != high:
         text += f"\n{low} – {high}"

@@ -1,4 +1,4 @@
-"""Hand a running loop over to an extended model, without a bump.
+"""Bumpless transfer of a running loop to an extended model.
 
 The estimator for the extended model starts where the one before stood at the start of the record, with the parameters
 that were fitted. Its state there is the one fitted with them: the states of a model that lacked an effect are off by
@@ -27,7 +27,7 @@ Rebuild = Callable[[Model], tuple[AnyEstimator, AnyController]]
 
 
 @dataclass(frozen=True)
-class Handover:
+class BumplessTransfer:
     """A loop on the extended model, and the estimates of the samples that were taken again, before and after."""
 
     running: Running
@@ -35,9 +35,9 @@ class Handover:
     after: tuple[Estimate, ...]
 
 
-def hand_over(
+def transfer(
     running: Running, steps: Sequence[Step], extension: Extension, rebuild: Rebuild, since: float
-) -> Handover:
+) -> BumplessTransfer:
     """Extend the model of the estimator and the controller of a running loop.
 
     Parameters
@@ -71,7 +71,7 @@ def hand_over(
     now = replace(now, estimator_state=estimator.init(start))
     again = []
     for step in steps[first:]:
-        state, estimate = estimator.update(now.estimator_state, now.told(step.plant.sample))
+        state, estimate = estimator.update(now.estimator_state, now.with_all_parameters(step.plant.sample))
         now = replace(now, estimator_state=state, estimate=estimate)
         again.append(estimate)
     now = replace(now, prior=_prior_of(again[-1], running.prior))
@@ -79,7 +79,7 @@ def hand_over(
     if isinstance(controller, TakesOver):
         taken = controller.take_over(running.controller, running.controller_state, known, tuple(again))
         now = replace(now, controller_state=taken)
-    return Handover(now, known, tuple(again))
+    return BumplessTransfer(now, known, tuple(again))
 
 
 def _where(started: Prior, steps: Sequence[Step], since: float) -> tuple[int, Prior]:
@@ -147,5 +147,5 @@ def states_at_rest(model: Model, known: FloatArray, inputs: FloatArray, p: Float
     def own(s: FloatArray) -> FloatArray:
         return rates(time, np.concatenate([known, s]), inputs, p)[0][-k:]
 
-    found = root(own, np.ones(k), tol=1e-12)
-    return np.asarray(found.x, dtype=float) if np.isfinite(found.x).all() else np.ones(k)
+    solution = root(own, np.ones(k), tol=1e-12)
+    return np.asarray(solution.x, dtype=float) if np.isfinite(solution.x).all() else np.ones(k)

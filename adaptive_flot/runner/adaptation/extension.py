@@ -13,7 +13,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 
 TAKEN_UP = ("named", "class")
-"""Verdicts that extend a model; discovery gives neither without confirmation on rows that chose nothing."""
+"""Verdicts that extend a model; discovery gives neither without confirmation on rows that did not enter the search."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,11 @@ def search_record(setup: Setup, record: Dataset, processes: int) -> Finding:
     AdaptiveFlotError
         The model or the record can not be searched.
     """
-    found = discover(setup.model, record, adapted=setup.parameters, processes=processes)
-    if found.verdict.word not in TAKEN_UP:
-        return Finding(found.verdict, Extension())
-    added = found.model.fitted_effects()[len(setup.model.effects) :]
-    columns = found.model.indices("parameters", setup.parameters)
-    values = found.model.parameter_values[columns].tolist()
-    start = None if found.after is None else found.after.initial_state
-    return Finding(found.verdict, Extension(added, dict(zip(setup.parameters, values, strict=True)), start))
+    discovery = discover(setup.model, record, adapted=setup.parameters, processes=processes)
+    if discovery.verdict.word not in TAKEN_UP:
+        return Finding(discovery.verdict, Extension())
+    added = discovery.model.fitted_effects()[len(setup.model.effects) :]
+    columns = discovery.model.indices("parameters", setup.parameters)
+    values = discovery.model.parameter_values[columns].tolist()
+    start = None if discovery.after is None else discovery.after.initial_state
+    return Finding(discovery.verdict, Extension(added, dict(zip(setup.parameters, values, strict=True)), start))

@@ -30,8 +30,8 @@ class Inquiry:
     why
         Why not, or what failed, in words; empty where it was extended.
     errors
-        Root mean square one-step error of each watched output over the rows between search and result, which chose
-        nothing: (before, after the extension), in the output's unit. Empty where there is no extension to compare.
+        Root mean square one-step error of each watched output over the rows between search and result, which
+        did not enter the search: (before, after the extension), in the output's unit. Empty without an extension.
     """
 
     alarm_s: float

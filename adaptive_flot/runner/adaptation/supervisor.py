@@ -13,7 +13,7 @@ from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.adaptation.background import Background
-from adaptive_flot.runner.adaptation.bumpless_transfer import Handover, Rebuild, hand_over
+from adaptive_flot.runner.adaptation.bumpless_transfer import BumplessTransfer, Rebuild, transfer
 from adaptive_flot.runner.adaptation.extension import Finding, search_record
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.adaptation.whiteness_watch import Alarm, watch
@@ -39,8 +39,10 @@ class Supervisor:
 
     Innovations are tested window by window. After an alarm, and once the record is long enough, a search starts in a
     process of its own on what was measured until then. Its result is taken up a stated time later: nothing in a
-    simulated run depends on how fast the machine is. A model is extended where the verdict says by what, and where the
-    extended model predicts the rows since the start of the search, which chose nothing, no worse than before.
+    simulated run depends on how fast the machine is.
+
+    A model is extended on two conditions. The verdict names an effect, and the extended model predicts the rows since
+    the start of the search no worse; those rows did not enter the search.
 
     Parameters
     ----------
@@ -121,37 +123,38 @@ class Supervisor:
         assert self._started is not None
         begun, self._started = self._started, None
         self._window = len(steps)
-        found = Inquiry(begun.alarm_s, begun.alarm.p_values, begun.record, now)
+        inquiry = Inquiry(begun.alarm_s, begun.alarm.p_values, begun.record, now)
         goes_on = running
         try:
             finding = begun.search.result()
-            found = replace(found, verdict=finding.verdict, why=f"the verdict is '{finding.verdict.word}'")
+            inquiry = replace(inquiry, verdict=finding.verdict, why=f"the verdict is '{finding.verdict.word}'")
             if finding.extension.effects:
-                done = hand_over(running, steps, finding.extension, self._rebuild, begun.record[0])
-                found = self._compared(found, done, running.estimator.setup)
-                goes_on = done.running if found.extended else running
+                transferred = transfer(running, steps, finding.extension, self._rebuild, begun.record[0])
+                inquiry = self._compared(inquiry, transferred, running.estimator.setup)
+                goes_on = transferred.running if inquiry.extended else running
         except Exception as error:  # the loop goes on without a search that failed, whatever it was
             words = str(error) if isinstance(error, AdaptiveFlotError) else f"{type(error).__name__}: {error}"
-            found = replace(found, why=words)
-        self._quiet_until = now if found.extended else now + self.options.pause_s
-        self.inquiries.append(found)
+            inquiry = replace(inquiry, why=words)
+        self._quiet_until = now if inquiry.extended else now + self.options.pause_s
+        self.inquiries.append(inquiry)
         return goes_on
 
-    def _compared(self, found: Inquiry, done: Handover, setup: Setup) -> Inquiry:
+    def _compared(self, inquiry: Inquiry, transferred: BumplessTransfer, setup: Setup) -> Inquiry:
         """Whether the extended model is taken up: it follows the record, and predicts the rows since no worse."""
-        if not all(np.isfinite(e.state).all() for e in done.after):
-            return replace(found, why="the extended model does not follow the record")
+        if not all(np.isfinite(e.state).all() for e in transferred.after):
+            return replace(inquiry, why="the extended model does not follow the record")
         columns = {name: setup.model.index("outputs", name) for name in self._outputs(setup)}
+        since = inquiry.record_s[1]
         errors = {
-            name: (one_step_error(done.before, j, found.record_s[1]), one_step_error(done.after, j, found.record_s[1]))
+            name: (one_step_error(transferred.before, j, since), one_step_error(transferred.after, j, since))
             for name, j in columns.items()
         }
         seen = {name: pair for name, pair in errors.items() if np.isfinite(pair).all()}
         if not seen:
-            return replace(found, errors=errors, why="nothing was measured since the search")
+            return replace(inquiry, errors=errors, why="nothing was measured since the search")
         worse = [name for name, (old, new) in seen.items() if new > (1 + WORSE) * old]
-        why = f"the one-step error of {', '.join(worse)} grows on rows that chose nothing" if worse else ""
-        return replace(found, errors=errors, extended=not worse, why=why)
+        why = f"the one-step error of {', '.join(worse)} grows on rows that did not enter the search" if worse else ""
+        return replace(inquiry, errors=errors, extended=not worse, why=why)
 
 
 def measured_record(steps: Sequence[Step], setup: Setup) -> Dataset:

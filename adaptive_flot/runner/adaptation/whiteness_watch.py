@@ -30,10 +30,10 @@ def watch(innovations: Mapping[str, FloatArray], false_alarm: float) -> Alarm | 
     """Test a window of innovations for whiteness and zero mean.
 
     Each output takes two tests: Ljung and Box's for correlation over the first 10 lags (Biometrika 65 (1978)), and
-    Student's for the mean. Both take the size of the noise from the window itself. Holm's correction makes them one
-    test: white innovations of mean zero, of whatever size, alarm in a share `false_alarm` of the windows at most (both
-    laws hold for large windows; windows that do not overlap are independent, so the rate in time is
-    `false_alarm / window`).
+    Student's for the mean. Both take the size of the noise from the window itself. Holm's correction (Scandinavian
+    Journal of Statistics 6 (1979)) makes them one test of level `false_alarm`. White innovations of mean zero raise an
+    alarm in at most that fraction of the windows. Both laws hold for large windows. Windows that do not overlap are
+    independent, so the rate in time is `false_alarm / window`.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ def watch(innovations: Mapping[str, FloatArray], false_alarm: float) -> Alarm | 
     Alarm or None
         None where nothing speaks against white innovations.
     """
-    found: dict[str, float] = {}
+    p_values: dict[str, float] = {}
     for output, values in innovations.items():
         seen = values[np.isfinite(values)]
         if len(seen) >= FEWEST and np.ptp(seen) > 0:
-            found[f"{output} correlation"] = float(acorr_ljungbox(seen, lags=[LAGS])["lb_pvalue"].iloc[0])
-            found[f"{output} mean"] = float(ttest_1samp(seen, 0.0).pvalue)
-    if not found:
+            p_values[f"{output} correlation"] = float(acorr_ljungbox(seen, lags=[LAGS])["lb_pvalue"].iloc[0])
+            p_values[f"{output} mean"] = float(ttest_1samp(seen, 0.0).pvalue)
+    if not p_values:
         return None
-    rejected = multipletests(list(found.values()), alpha=false_alarm, method="holm")[0]
-    shown = {name: p for (name, p), bad in zip(found.items(), rejected, strict=True) if bad}
+    rejected = multipletests(list(p_values.values()), alpha=false_alarm, method="holm")[0]
+    shown = {name: p for (name, p), bad in zip(p_values.items(), rejected, strict=True) if bad}
     return Alarm(shown) if shown else None

@@ -27,7 +27,7 @@ GAINS = ("value_cu_h", "recovery")
 
 
 @dataclass(frozen=True)
-class Spread:
+class SeedSpread:
     """Median and range of the finite values over the seeds, and how many are not finite."""
 
     median: float
@@ -36,8 +36,8 @@ class Spread:
     not_finite: int = 0
 
     @classmethod
-    def of(cls, values: FloatArray) -> Spread:
-        """Spread of values (S,); NaN throughout if none is finite."""
+    def of(cls, values: FloatArray) -> SeedSpread:
+        """SeedSpread of values (S,); NaN throughout if none is finite."""
         finite = values[np.isfinite(values)]
         if not finite.size:
             return cls(np.nan, np.nan, np.nan, values.size)
@@ -87,9 +87,9 @@ class Contender(Described):
             return np.full(len(self.runs), np.nan)
         return np.asarray(self.runs[column].to_numpy(dtype=float, na_value=np.nan))
 
-    def spread(self, column: str) -> Spread:
+    def spread(self, column: str) -> SeedSpread:
         """Median and range over the seeds."""
-        return Spread.of(self.values(column))
+        return SeedSpread.of(self.values(column))
 
     @property
     def metrics(self) -> list[str]:
@@ -100,12 +100,12 @@ class Contender(Described):
 
     def counts(self, prefix: str) -> dict[str, int]:
         """Sum over the runs of the counts `<prefix>_<name>`, largest first."""
-        found = {
+        totals = {
             str(c).removeprefix(f"{prefix}_"): int(np.nansum(self.values(str(c))))
             for c in self.runs.columns
             if str(c).startswith(f"{prefix}_")
         }
-        return {name: n for name, n in sorted(found.items(), key=lambda item: -item[1]) if n}
+        return {name: n for name, n in sorted(totals.items(), key=lambda item: -item[1]) if n}
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,9 +137,11 @@ class Comparison(Described):
 
     def rival(self, contender: Contender, estimator: str) -> Contender | None:
         """The contender with the same controller and another estimator, of the same result if several have one."""
-        found = [c for c in self.contenders if (c.controller, c.estimator) == (contender.controller, estimator)]
-        same = [c for c in found if c.result == contender.result]
-        return same[0] if same else found[0] if len(found) == 1 else None
+        same_controller = [
+            c for c in self.contenders if (c.controller, c.estimator) == (contender.controller, estimator)
+        ]
+        same_result = [c for c in same_controller if c.result == contender.result]
+        return same_result[0] if same_result else same_controller[0] if len(same_controller) == 1 else None
 
     def gain(self, contender: Contender, column: str) -> FloatArray:
         """What the oracle gains over fixed parameters in each seed that both ran (S,); empty if either is missing."""
@@ -183,7 +185,7 @@ class Comparison(Described):
             "result": c.result,
             "seeds": c.seeds,
             "metrics": {name: vars(c.spread(name)) for name in c.metrics},
-            "share_of_oracle_gain": {k: vars(Spread.of(v)) for k, v in shares.items() if v.size},
+            "share_of_oracle_gain": {k: vars(SeedSpread.of(v)) for k, v in shares.items() if v.size},
             "status_counts": c.counts("status"),
             "control_status_counts": c.counts("control"),
             "decided_by": c.counts("decided"),
@@ -207,18 +209,18 @@ def compare(table: pd.DataFrame) -> list[Comparison]:
     asked = table["scenario"]
     if "conditions" in table:
         asked = table["conditions"].fillna(table["scenario"])
-    found = []
+    comparisons = []
     for _, rows in table.groupby(asked, sort=False):
         limit = float(rows["grade_limit"].iloc[0]) if "grade_limit" in rows else float("nan")
         names = " / ".join(dict.fromkeys(map(str, rows["scenario"])))
-        found.append(Comparison(names, limit, tuple(_contenders(rows))))
-    return found
+        comparisons.append(Comparison(names, limit, tuple(_contenders(rows))))
+    return comparisons
 
 
 def compare_runs(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Put runs of one scenario side by side, as `compare` does with what is read from files."""
-    (found,) = compare(pd.DataFrame(run_rows(run_summary(scenario, runs))).assign(result=""))
-    return found
+    (comparison,) = compare(pd.DataFrame(run_rows(run_summary(scenario, runs))).assign(result=""))
+    return comparison
 
 
 def _contenders(rows: pd.DataFrame) -> Iterator[Contender]:

@@ -60,19 +60,19 @@ def read_limits(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     ModelError
         Not of that form, or an input given twice.
     """
-    found = {}
+    ranges = {}
     for text in given:
         name, _, ends = text.partition("=")
-        if name in found:
+        if name in ranges:
             raise ModelError(f"--limit: {name!r} is given twice; give one range an input")
         low, _, high = ends.partition(":")
         try:
-            found[name] = (float(low), float(high))
+            ranges[name] = (float(low), float(high))
         except ValueError:
             raise ModelError(
                 f"--limit: {text!r}; write input=low:high in SI units, as air_flow=0.0009:0.0022"
             ) from None
-    return found
+    return ranges
 
 
 def check_model_path(path: Path | None) -> None:
@@ -88,14 +88,14 @@ def check_model_path(path: Path | None) -> None:
 
 
 def save_discovered(
-    found: Discovery, data: Path, path: Path, *, base: str, cell: str | None, folder: Path | None
+    discovery: Discovery, data: Path, path: Path, *, base: str, cell: str | None, folder: Path | None
 ) -> bool:
     """Write the extended (else the fitted) model as a model file; False where nothing was fitted.
 
     `base`, `cell` and `folder` are what the model was made from, see `save_model`.
     """
-    if found.before is None:
+    if discovery.before is None:
         return False
-    note = f"discovered in {data.name}: {found.verdict.word}"
-    save_model(found.model, path, base=base, cell=cell, folder=folder, note=note)
+    note = f"discovered in {data.name}: {discovery.verdict.word}"
+    save_model(discovery.model, path, base=base, cell=cell, folder=folder, note=note)
     return True

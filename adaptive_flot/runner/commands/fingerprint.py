@@ -28,9 +28,9 @@ has is taken from its model."""
 def conditions(scenario: Scenario) -> str:
     """Twelve hexadecimal digits over plant, cell, inputs, drift, measurements, limits, prices and accounted time.
 
-    Estimators, controllers, their options and their model do not enter, so a copy of a scenario with another option
-    compares with the original; nor do keys at their default, so a later version that adds a key does not part old
-    results from new.
+    Estimators, controllers, their options and their model do not enter: a copy of a scenario with another option
+    compares with the original. Nor do keys at their default: a later version may add a key, and old results still
+    compare with new ones.
     """
     asked = scenario.file.model_dump(mode="json", exclude=METHOD, exclude_defaults=True)
     asked["starts_after"], asked["accounted_after"] = scenario.initial_rows, scenario.fits_after

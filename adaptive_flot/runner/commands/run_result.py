@@ -87,10 +87,10 @@ class Run(Described):
         earned: dict[str, float] = {}
         control: dict[str, Any] = {}
         if scenario.prices is not None and scenario.limits is not None:
-            late = table[table["time_s"] > scenario.fits_after + 1e-9]
+            accounted = table[table["time_s"] > scenario.fits_after + 1e-9]
             least = scenario.limits.outputs["concentrate_grade"][0]
-            earned = account(late, scenario.plant_model, scenario.dt, scenario.prices, least)
-            control = control_account(late)
+            earned = account(accounted, scenario.plant_model, scenario.dt, scenario.prices, least)
+            control = control_account(accounted)
         statuses = (s.estimate.status if s.estimate else Status.INITIALISING for s in steps)
         return cls(
             estimator,

@@ -82,11 +82,11 @@ def read_runs(results: Sequence[Path]) -> pd.DataFrame:
     seen: dict[Path, Path] = {}
     tables = []
     for path in results:
-        found = _file_or_folder(path)
-        if found in seen:
-            raise ResultError(f"{path}: the same result as {seen[found]}; give each once")
-        seen[found] = path
-        tables.append(_read(found, path).assign(result=str(path)))
+        place = _file_or_folder(path)
+        if place in seen:
+            raise ResultError(f"{path}: the same result as {seen[place]}; give each once")
+        seen[place] = path
+        tables.append(_read(place, path).assign(result=str(path)))
     table = pd.concat(tables, ignore_index=True)
     if table.empty:
         raise ResultError(f"{', '.join(map(str, results))}: no run has finished; run it first")
@@ -107,14 +107,14 @@ def _file_or_folder(path: Path) -> Path:
     return (path / SUMMARY if path.is_dir() and (path / SUMMARY).is_file() else path).resolve()
 
 
-def _read(found: Path, path: Path) -> pd.DataFrame:
-    if found.is_dir():
-        return _read_parts(found, path)
-    if found.suffix == ".parquet":
-        if not _is_table_of_runs(found):
+def _read(place: Path, path: Path) -> pd.DataFrame:
+    if place.is_dir():
+        return _read_parts(place, path)
+    if place.suffix == ".parquet":
+        if not _is_table_of_runs(place):
             raise ResultError(f"{path}: not a table of runs (no columns {', '.join(KEYS)}); give the folder it lies in")
-        return pd.read_parquet(found)
-    return _read_summary(found, path)
+        return pd.read_parquet(place)
+    return _read_summary(place, path)
 
 
 def _read_summary(file: Path, path: Path) -> pd.DataFrame:

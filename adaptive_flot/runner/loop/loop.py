@@ -57,7 +57,7 @@ class Running:
     prior: Prior | None = None
     further: FloatArray = field(default_factory=lambda: np.empty(0))
 
-    def told(self, sample: Sample) -> Sample:
+    def with_all_parameters(self, sample: Sample) -> Sample:
         """The sample with known parameters, where there are any, as the model in use has them."""
         if sample.parameters is None or not self.further.size:
             return sample
@@ -69,7 +69,7 @@ class Running:
         if now.prior is None:
             prior = make_prior()
             now = replace(now, prior=prior, estimator_state=now.estimator.init(prior))
-        returned = now.estimator.update(now.estimator_state, now.told(sample))
+        returned = now.estimator.update(now.estimator_state, now.with_all_parameters(sample))
         state, estimate = checked_estimate(now.estimator, returned)
         return replace(now, estimator_state=state, estimate=estimate)
 
@@ -119,8 +119,8 @@ def run_loop(
     steps: list[Step] = []
     sample: Sample | None = None
     for k in range(intervals):
-        told = None if sample is None else now.told(sample)
-        returned = now.controller.decide(now.controller_state, told, now.estimate)
+        shown = None if sample is None else now.with_all_parameters(sample)
+        returned = now.controller.decide(now.controller_state, shown, now.estimate)
         controller_state, decision = checked_decision(now.controller, returned, inputs)
         plant_state, record = plant.apply(plant_state, decision.inputs)
         sample, now = record.sample, replace(now, controller_state=controller_state)

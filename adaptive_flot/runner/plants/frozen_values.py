@@ -1,7 +1,7 @@
 """A plant whose frozen instruments are noticed: a value that repeats itself to the bit for too long counts as missing.
 
-A measurement with noise does not repeat itself. An analyser that hangs shows its last value, and a controller that
-believes it drives the process away from there for as long as it hangs: with a grade above the limit, ever more air.
+A measurement with noise does not repeat itself. An analyser that hangs shows its last value. A controller that takes
+this value for the present one drives the process away: with a grade above the limit, it adds air without end.
 """
 
 from __future__ import annotations

@@ -101,18 +101,18 @@ class TrueRun:
 
     def fits(self, covariance: FloatArray) -> FloatArray:
         """Fits in percent (q,), as estimators are given them, of errors with this covariance (N, q, q)."""
-        late = self.scenario.starts + self.scenario.dt > self.scenario.fits_after + 1e-9
-        variance = np.diagonal(covariance, axis1=1, axis2=2)[late].sum(axis=0)
-        fits: FloatArray = 100.0 * (1.0 - np.sqrt(variance) / np.linalg.norm(self.adapted[late], axis=0))
+        accounted = self.scenario.starts + self.scenario.dt > self.scenario.fits_after + 1e-9
+        variance = np.diagonal(covariance, axis1=1, axis2=2)[accounted].sum(axis=0)
+        fits: FloatArray = 100.0 * (1.0 - np.sqrt(variance) / np.linalg.norm(self.adapted[accounted], axis=0))
         return fits
 
     def _noise(self, more: Mapping[str, float]) -> FloatArray:
         s, model = self.scenario, self.scenario.plant_model
         driving = np.isin(np.arange(len(model.outputs)), model.indices("outputs", s.setup.outputs))
         noise = np.where(measured_at(s) & driving, noise_std(s), np.nan)
-        for name, share in more.items():
+        for name, relative_std in more.items():
             j = model.index("outputs", name)
-            noise[:, j] = share * np.abs(self.outputs[:, j]).mean()
+            noise[:, j] = relative_std * np.abs(self.outputs[:, j]).mean()
         return noise
 
     def _first_covariance(self) -> FloatArray:

@@ -17,8 +17,8 @@ def one_step_errors(table: pd.DataFrame, column: str) -> FloatArray:
 def one_move_errors(table: pd.DataFrame, plans: pd.DataFrame) -> pd.DataFrame:
     """Grade at the end of the first move of each plan minus the true one then.
 
-    The first move is the one that was applied, so what remains is the controller's model, its correction of it, and
-    what it could not know (a disturbance within the move).
+    The first move is the one that was applied. So the error comes from the controller's model, from its correction of
+    the model, and from disturbances within the move.
 
     Parameters
     ----------

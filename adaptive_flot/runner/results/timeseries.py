@@ -18,14 +18,20 @@ from adaptive_flot.runner.scenario.scenario import Scenario
 
 
 def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.DataFrame:
-    """Table of a run whose estimator was built for `setup`: `time_s`, inputs, and with suffixes.
+    """Table of a run whose estimator was built for `setup`: `time_s`, inputs, and columns with suffixes.
 
-    For inputs `_true` where what acted is not what was known; for outputs `_true`, `_measured`, `_predicted`,
-    `_innovation`, `_innovation_std`; for adapted parameters `_true`, `_estimate`, `_std` and for each pair of them
-    `_correlation` (as `n_C_correlation`), as the estimator claims them; for others that move or are measured `_true`,
-    `_known` (NaN where the plant, or the estimator's model, has no such parameter); then `status` of the estimator,
-    `control_status`, `decided_by`, the `faults` of a scenario that has any, `control_message` where an optimisation
-    failed (the constraints that were in the way), and, where a controller optimised, `solve_seconds`.
+    Suffixes, by kind of quantity:
+
+    - inputs: `_true` where what acted is not what was known;
+    - outputs: `_true`, `_measured`, `_predicted`, `_innovation`, `_innovation_std`;
+    - adapted parameters: `_true`, `_estimate`, `_std`, and for each pair of them `_correlation` (as
+      `n_C_correlation`), as the estimator claims them;
+    - other parameters that move or are measured: `_true`, `_known`; NaN where the plant, or the estimator's model, has
+      no such parameter.
+
+    Then follow `status` of the estimator, `control_status` and `decided_by`. `faults` are there where a scenario has
+    any. `control_message` says which constraints were in the way where an optimisation failed, and `solve_seconds` how
+    long it took.
     """
     columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
     columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps, setup)
@@ -144,11 +150,13 @@ def _others(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str
 
 def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
     """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
-    late = table[table["time_s"] > scenario.fits_after + 1e-9]
+    accounted = table[table["time_s"] > scenario.fits_after + 1e-9]
     model, setup = scenario.model, scenario.setup
     labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
-    found = {x: metrics.fit(late[f"{x}_true"].to_numpy(), late[f"{x}_estimate"].to_numpy()) for x in labels}
+    quality = {x: metrics.fit(accounted[f"{x}_true"].to_numpy(), accounted[f"{x}_estimate"].to_numpy()) for x in labels}
     for i in model.indices("outputs", setup.outputs):
         q = model.outputs[i]
-        found[q.name] = metrics.fit(late[f"{q.column}_true"].to_numpy(), late[f"{q.column}_predicted"].to_numpy())
-    return found
+        quality[q.name] = metrics.fit(
+            accounted[f"{q.column}_true"].to_numpy(), accounted[f"{q.column}_predicted"].to_numpy()
+        )
+    return quality

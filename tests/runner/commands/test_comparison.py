@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.errors import ResultError
-from adaptive_flot.runner.commands.comparison import Comparison, Contender, Spread, compare
+from adaptive_flot.runner.commands.comparison import Comparison, Contender, SeedSpread, compare
 
 
 def row(estimator: str, seed: int, value: float, controller: str = "mpc", **more: Any) -> dict[str, Any]:
@@ -111,13 +111,13 @@ def test_runs_without_economics_compare_by_name() -> None:
         columns=["conditions", "grade_limit", "value_cu_h"]
     )
     (found,) = compare(table.assign(fit_n=[97.0, 99.0]))
-    assert found.contenders[0].spread("fit_n") == Spread(98.0, 97.0, 99.0)
+    assert found.contenders[0].spread("fit_n") == SeedSpread(98.0, 97.0, 99.0)
     assert np.isnan(found.grade_limit) and found.share(found.contenders[0], "value_cu_h").size == 0
 
 
 def test_values_that_are_not_finite_are_counted_not_hidden() -> None:
     found = only([row("rpem", 1, 1.0), row("rpem", 2, float("nan")), row("rpem", 3, 3.0)])
-    assert found.contenders[0].spread("value_cu_h") == Spread(2.0, 1.0, 3.0, not_finite=1)
+    assert found.contenders[0].spread("value_cu_h") == SeedSpread(2.0, 1.0, 3.0, not_finite=1)
 
 
 def test_counts_are_summed_over_the_runs_largest_first() -> None:
