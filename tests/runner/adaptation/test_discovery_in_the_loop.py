@@ -280,7 +280,7 @@ def test_the_key_is_method_and_does_not_part_results(write_scenario: WriteScenar
         ({"discovery.record_s": 40}, "least_record_s = 50 s is longer than record_s = 40 s"),
         ({"discovery.delay_s": 80}, "least_record_s . delay_s = 130 s, longer than the run, 120 s"),
         ({"estimators": {"oracle": {"use": "oracle"}}}, "no estimator to watch"),
-        ({"estimators.o": {"use": "oracle"}, "discovery.estimators": ["o"]}, "'o' is an oracle"),
+        ({"estimators.o": {"use": "oracle"}, "discovery.estimators": ["o"]}, "'o' is shown the truth"),
     ],
 )
 def test_a_wrong_key_is_one_line(write_scenario: WriteScenario, changes: dict[str, Any], says: str) -> None:
