@@ -34,6 +34,8 @@ MOST_PARTS = 200
 """Parts of a kind before they are merged into one."""
 COUNTS = ("status_", "control_", "decided_", "fault_")
 """Columns that count; a run without such a status has none of it."""
+NEEDED = ("run", "scenario", "controller", "estimator", "seed", "outcome", "message")
+"""Columns that every table of runs has."""
 TEXTS = ("run", "scenario", "controller", "estimator", "outcome", "message", "conditions")
 """Columns of text; all others but the seed are numbers."""
 
@@ -80,7 +82,9 @@ class StudyFolder:
     def complete(self, order: Sequence[str]) -> None:
         """Write `runs.parquet` and `timings.parquet` in the order of the grid, and remove the parts."""
         for kind in (TIMINGS, RUNS):
-            table = self.table(kind).set_index("run").loc[list(order)].reset_index()
+            rows, wanted = self.table(kind).set_index("run"), list(order)
+            # times may be gone with a damaged part that was removed, and no result depends on them
+            table = (rows.loc[wanted] if kind == RUNS else rows.reindex(wanted)).reset_index()
             parts = sorted(self.parts.glob(f"*-{kind}.parquet"))
             self._replace(parts, self.path / f"{kind}.parquet", table)
         with suppress(OSError):
@@ -119,21 +123,38 @@ def locked(path: Path) -> Iterator[StudyFolder]:
     OutputError
         The folder can not be made.
     """
+    lock = path / ".lock"
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
-        handle = os.open(path / ".lock", os.O_CREAT | os.O_RDWR, 0o644)
+        handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
     except OSError as error:
         raise OutputError(f"{path}: can not be written ({error.strerror or error}); give another folder") from error
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # goes with the process, however that ends
-        except OSError as error:
-            raise StudyError(f"{path}: another sweep writes to it now; wait for it, or give another --out") from error
+        _take(handle, lock)
         for unfinished in (*path.glob(".adaptive-flot-*"), *path.glob("parts/.adaptive-flot-*")):
             unfinished.unlink()
-        yield StudyFolder(path)
+        try:
+            yield StudyFolder(path)
+        finally:
+            lock.unlink(missing_ok=True)
+            with suppress(OSError):  # a study that was refused leaves no empty folder behind
+                for empty in made:
+                    empty.rmdir()
     finally:
         os.close(handle)
+
+
+def _take(handle: int, lock: Path) -> None:
+    """Lock an open file; the lock goes with the process, however that ends."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if not os.path.samestat(os.fstat(handle), lock.stat()):
+            raise OSError("removed by the sweep that held it")
+    except OSError as error:
+        raise StudyError(
+            f"{lock.parent}: another sweep writes to it now; wait for it, or give another --out"
+        ) from error
 
 
 def tidy(table: pd.DataFrame) -> pd.DataFrame:
@@ -150,8 +171,34 @@ def tidy(table: pd.DataFrame) -> pd.DataFrame:
 def _read(files: Sequence[Path], kind: str) -> pd.DataFrame:
     if not files:
         return pd.DataFrame({column: pd.Series(dtype="str") for column in ("run", "outcome")})
-    table = pd.concat([pd.read_parquet(f) for f in files], ignore_index=True).drop_duplicates("run", ignore_index=True)
+    tables = [_checked(file, kind) for file in files]
+    table = pd.concat(tables, ignore_index=True).drop_duplicates("run", ignore_index=True)
     return tidy(table) if kind == RUNS else table
+
+
+def _checked(file: Path, kind: str) -> pd.DataFrame:
+    """Content of a part.
+
+    Raises
+    ------
+    StudyError
+        It is damaged, or another table.
+    """
+    way_out = "remove it, and the runs in it are made again"
+    try:
+        table = pd.read_parquet(file)
+    except (OSError, ValueError, pyarrow.ArrowException) as error:
+        reason = " ".join(str(error).split())
+        raise StudyError(f"{file}: damaged, no Parquet file can be read ({reason}); {way_out}") from error
+    missing = [c for c in (NEEDED if kind == RUNS else ("run",)) if c not in table]
+    if missing:
+        raise StudyError(f"{file}: not a table of {kind} (no column {missing[0]!r}); {way_out}")
+    try:
+        if kind == RUNS:
+            tidy(table)
+    except (ValueError, TypeError) as error:
+        raise StudyError(f"{file}: damaged, a column has the wrong type ({error}); {way_out}") from error
+    return table
 
 
 def _number(part: Path) -> int:

@@ -16,7 +16,13 @@ WAYS_OUT = "restore the study, or give another --out"
 
 
 def remember(folder: Path, grid: Grid) -> None:
-    """Write the grid of a study into its folder, after checking that every run of the last grid is still in it.
+    """Write the grid of a study into its folder, after `check_grid`."""
+    check_grid(folder, grid)
+    write_text(folder / MANIFEST, json.dumps(_plain(grid), indent=1) + "\n")
+
+
+def check_grid(folder: Path, grid: Grid) -> None:
+    """Check that every run of the grid that a folder remembers is still in the grid of the study.
 
     Raises
     ------
@@ -28,7 +34,6 @@ def remember(folder: Path, grid: Grid) -> None:
         _check(folder, _read(file), grid)
     elif (folder / "runs.parquet").is_file() or list((folder / "parts").glob("*.parquet")):
         raise StudyError(f"{folder}: results without {MANIFEST}, so nobody knows of what study; give another --out")
-    write_text(file, json.dumps(_plain(grid), indent=1) + "\n")
 
 
 def _plain(grid: Grid) -> dict[str, Any]:

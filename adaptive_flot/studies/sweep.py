@@ -22,7 +22,7 @@ from adaptive_flot.studies import worker
 from adaptive_flot.studies.cluster import connected
 from adaptive_flot.studies.folder import locked
 from adaptive_flot.studies.grid import Combination, Grid, content_hash, grid_of
-from adaptive_flot.studies.manifest import remember
+from adaptive_flot.studies.manifest import check_grid, remember
 from adaptive_flot.studies.study_file import Arm, Study
 
 LOST = (asyncio.CancelledError, concurrent.futures.CancelledError, OSError, TimeoutError)
@@ -92,7 +92,7 @@ def sweep(
     if compiled:
         study = replace(study, arms=tuple(replace(a, scenario=a.scenario.compiled()) for a in study.arms))
     with locked(path) as folder:
-        remember(path, grid)
+        check_grid(path, grid)
         if retry_failed:
             folder.forget("failed")
         before = folder.table()
@@ -101,10 +101,13 @@ def sweep(
         if groups:
             _check_plugins(groups, study)
             with _said_in_words(scheduler), connected(workers, scheduler) as client:
+                remember(path, grid)  # not before there is somewhere to run
                 for results in _results(client, groups):
                     rows = [r.row for r in results]
                     folder.add(rows, [r.timing for r in results])
                     advance(rows)
+        else:
+            remember(path, grid)
         folder.complete(grid.runs())
         return Outcome(folder.table(), folder.table("timings"), len(before))
 

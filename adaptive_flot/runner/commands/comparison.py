@@ -211,7 +211,7 @@ def compare(table: pd.DataFrame) -> list[Comparison]:
         asked = table["conditions"].fillna(table["scenario"])
     comparisons = []
     for _, rows in table.groupby(asked, sort=False):
-        limit = float(rows["grade_limit"].iloc[0]) if "grade_limit" in rows else float("nan")
+        limit = float(rows["grade_limit"].astype(float).iloc[0]) if "grade_limit" in rows else float("nan")
         names = " / ".join(dict.fromkeys(map(str, rows["scenario"])))
         comparisons.append(Comparison(names, limit, tuple(_contenders(rows))))
     return comparisons

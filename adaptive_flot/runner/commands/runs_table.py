@@ -16,6 +16,8 @@ from adaptive_flot.errors import ResultError
 KEYS = ("scenario", "controller", "estimator", "seed")
 """Columns that name a run; every table of runs has them."""
 SUMMARY = "summary.json"
+WORDS = ("run", "outcome", "message", "conditions")
+"""Further columns of words; all others are numbers."""
 TIMINGS = "timings"
 """End of the names of the files in which a study keeps times."""
 
@@ -86,7 +88,9 @@ def read_runs(results: Sequence[Path]) -> pd.DataFrame:
         if place in seen:
             raise ResultError(f"{path}: the same result as {seen[place]}; give each once")
         seen[place] = path
-        tables.append(_read(place, path).assign(result=str(path)))
+        table = _read(place, path)
+        _check_columns(table, path)
+        tables.append(table.assign(result=str(path)))
     table = pd.concat(tables, ignore_index=True)
     if table.empty:
         raise ResultError(f"{', '.join(map(str, results))}: no run has finished; run it first")
@@ -113,7 +117,7 @@ def _read(place: Path, path: Path) -> pd.DataFrame:
     if place.suffix == ".parquet":
         if not _is_table_of_runs(place):
             raise ResultError(f"{path}: not a table of runs (no columns {', '.join(KEYS)}); give the folder it lies in")
-        return pd.read_parquet(place)
+        return _read_parquet(place)
     return _read_summary(place, path)
 
 
@@ -139,7 +143,7 @@ def _read_parts(folder: Path, path: Path) -> pd.DataFrame:
         inside = sorted(f.parent.name for f in folder.glob(f"*/{SUMMARY}"))
         hint = f"its folders {', '.join(inside)} have: give those" if inside else "give what `adaptive-flot run` wrote"
         raise ResultError(f"{path}: no results in this folder (no {SUMMARY}, no Parquet table of runs); {hint}")
-    table = pd.concat([pd.read_parquet(part) for part in parts], ignore_index=True)
+    table = pd.concat([_read_parquet(part) for part in parts], ignore_index=True)
     # a study that was killed while it merged its parts holds some runs twice, the same to the bit
     return _with_times(table.drop_duplicates("run", ignore_index=True), folder) if "run" in table else table
 
@@ -149,9 +153,39 @@ def _with_times(table: pd.DataFrame, folder: Path) -> pd.DataFrame:
     files = [f for f in sorted(folder.rglob(f"*{TIMINGS}.parquet")) if not f.name.startswith(".")]
     if not files:
         return table
-    times = pd.concat([pd.read_parquet(f) for f in files], ignore_index=True).drop_duplicates("run")
+    times = pd.concat([_read_parquet(f, ("run",)) for f in files], ignore_index=True).drop_duplicates("run")
     new = [c for c in times.select_dtypes("number").columns if c not in table]
     return table.merge(times[["run", *new]], on="run", how="left", validate="one_to_one")
+
+
+def _read_parquet(file: Path, needed: Sequence[str] = KEYS) -> pd.DataFrame:
+    try:
+        table = pd.read_parquet(file)
+    except (OSError, ValueError, pyarrow.ArrowException) as error:
+        raise ResultError(f"{file}: damaged, not a Parquet file ({' '.join(str(error).split())}); remove it") from error
+    missing = [column for column in needed if column not in table]
+    if missing:
+        raise ResultError(f"{file}: damaged, no column {missing[0]!r}; remove it")
+    return table
+
+
+def _check_columns(table: pd.DataFrame, path: Path) -> None:
+    """Names must be words, seeds whole numbers and all else numbers, or what compares runs would fail later."""
+    again = "run it again"
+    for name in KEYS[:-1]:
+        if name in table and not table[name].map(lambda value: isinstance(value, str) and value != "").all():
+            raise ResultError(f"{path}: damaged, a run without a word for its {name}; {again}")
+    if "seed" in table and not pd.api.types.is_integer_dtype(table["seed"]):
+        raise ResultError(f"{path}: damaged, a seed that is no whole number; {again}")
+    for column in (c for c in table.columns if c not in (*KEYS, *WORDS)):
+        if not (pd.api.types.is_numeric_dtype(table[column]) or table[column].map(_is_number).all()):
+            raise ResultError(f"{path}: damaged, {column!r} of a run is no number; {again}")
+    if "conditions" in table and not table["conditions"].map(lambda v: isinstance(v, str) or _is_number(v)).all():
+        raise ResultError(f"{path}: damaged, the conditions of a run are no word; {again}")
+
+
+def _is_number(value: object) -> bool:
+    return value is None or isinstance(value, float | int)
 
 
 def _is_table_of_runs(file: Path) -> bool:
