@@ -145,19 +145,25 @@ def construct(factory: Any, address: str, what: str, *arguments: Any, **options:
     return made
 
 
-def plugin_failure(error: BaseException) -> PluginError | None:
-    """The error in one line, where it comes from the code of a plug-in that a user named; else None."""
-    place = _place(error, _user_files)
+def plugin_failure(error: BaseException, *, full_path: bool = True) -> PluginError | None:
+    """The error in one line, where it comes from the code of a plug-in that a user named; else None.
+
+    Without the full path the line is the same on every machine, as the table of a study must be.
+    """
+    place = _place(error, _user_files, full_path)
     if place is None:
         return None
     said = "ends the program" if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
     return PluginError(f"{place}: {said}; correct the plug-in")
 
 
-def _place(error: BaseException, files: Collection[str]) -> str | None:
+def _place(error: BaseException, files: Collection[str], full_path: bool = True) -> str | None:
     """File and line of the innermost frame in one of these files."""
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
-    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else None
+    if not frames:
+        return None
+    file = frames[-1].filename
+    return f"{file if full_path else Path(file).name}, line {frames[-1].lineno}"
 
 
 def method_place(plugin: object, method: str) -> str:

@@ -159,5 +159,9 @@ def _timing(head: Mapping[str, Any], begin: tuple[float, float]) -> dict[str, An
 
 
 def _message(error: BaseException) -> str:
-    said = f"{type(error).__name__}: {error}" if (failure := plugin_failure(error)) is None else str(failure)
+    said = (
+        f"{type(error).__name__}: {error}"
+        if (failure := plugin_failure(error, full_path=False)) is None
+        else str(failure)
+    )
     return " ".join(said.split())

@@ -110,7 +110,7 @@ def test_a_damaged_part_ends_a_sweep_in_words(write_study: WriteStudy, tmp_path:
     pd.testing.assert_frame_equal(sweep(study, tmp_path / "out").table, whole)
 
 
-WRONG = {
+WRONG: dict[str, list[Any]] = {
     "runs.0.status_counts.ok": [[1, 2], {"a": 1}, "text"],
     "runs.0.fit.n": ["text", [1.0]],
     "runs.0.fit": [3, "text", [1]],

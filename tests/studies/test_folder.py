@@ -67,7 +67,7 @@ def test_finished_table_has_the_same_bytes_however_the_rows_came_in(
         folder.complete(ORDER)
         assert folder.done() == set(ORDER)
     assert (path / "runs.parquet").read_bytes() == expected
-    assert sorted(f.name for f in path.iterdir()) == [".lock", "runs.parquet", "timings.parquet"]
+    assert sorted(f.name for f in path.iterdir()) == ["runs.parquet", "timings.parquet"]
     assert pd.read_parquet(path / "timings.parquet")["run"].tolist() == ORDER
 
 

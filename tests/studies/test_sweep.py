@@ -81,6 +81,9 @@ def test_progress_hears_of_every_run_once(write_study: WriteStudy) -> None:
     assert sorted(seen) == sorted(found.table["run"]) and totals == [(6, 0)]
 
 
+MESSAGE = "picky.py, line 8: ValueError: not today; correct the plug-in"
+
+
 def test_a_run_that_fails_is_a_row_and_can_be_tried_again(write_study: WriteStudy, tmp_path: Path) -> None:
     """A user's estimator that breaks in some of the runs does not stop the others, nor is it run again unasked."""
     (tmp_path / "picky.py").write_text(PICKY)
@@ -88,8 +91,7 @@ def test_a_run_that_fails_is_a_row_and_can_be_tried_again(write_study: WriteStud
     study = write_study({"estimators": {"fixed": None, "mine": {"use": "picky:Picky"}}})
     first = run(study)
     failed = first.table[first.table["outcome"] == "failed"]
-    assert failed["estimator"].tolist() == ["mine"] * 3
-    assert failed["message"].str.contains(r"picky\.py, line \d+: ValueError: not today").all()
+    assert failed["estimator"].tolist() == ["mine"] * 3 and set(failed["message"]) == {MESSAGE}
     assert failed.filter(like="fit_").isna().all(axis=None)
     (tmp_path / "broken").unlink()
     assert (run(study).table["outcome"] == "failed").sum() == 3
