@@ -19,11 +19,12 @@ def simulate(
     accurate: Annotated[bool, typer.Option("--accurate", help="IDAS on the DAE instead of the fast step.")] = False,
 ) -> None:
     """Simulate a table of inputs: every state and output column comes out."""
-    from adaptive_flot.greybox.data.tables import write_table
+    from adaptive_flot.greybox.data.tables import check_table_path, write_table
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.runner.commands.simulate import simulate_file
 
     check_targets([inputs, *model_inputs(model, cell, inputs.parent)], [("--out", out)])
+    check_table_path(out)
     table = simulate_file(inputs, make_model(model, cell=cell, folder=inputs.parent), accurate=accurate)
     write_table(table, out)
     typer.echo(f"{len(table)} rows: {out}")

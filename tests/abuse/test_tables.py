@@ -17,6 +17,7 @@ from adaptive_flot.errors import OutputError
 from adaptive_flot.greybox.data.dataset import read_dataset
 from adaptive_flot.greybox.data.tables import MOST_ROWS, read_table, write_table
 from tests.abuse.records import GOOD, TANK, N, refusal
+from tests.cli.conftest import Call
 
 CLOCK = pd.Timestamp("2024-03-01 12:00") + pd.to_timedelta(GOOD["time_s"], unit="s")
 LONG_TEXT = pd.concat([GOOD] * 200).to_csv(index=False).encode()
@@ -196,6 +197,15 @@ def test_table_is_not_written_under_a_name_that_says_otherwise(tmp_path: Path, n
     with pytest.raises(OutputError, match=r"a table is written as \.csv or \.parquet"):
         write_table(GOOD, tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+def test_simulate_refuses_such_a_name_before_any_work(call: Call, tmp_path: Path) -> None:
+    """The table of inputs, which is not one, is not even read."""
+    (tmp_path / "inputs.csv").write_text("no table")
+    result = call("simulate", "inputs.csv", "--out", "t.xlsx")
+    assert (result.code, result.out) == (2, "")
+    assert "t.xlsx: a table is written as .csv or .parquet" in result.err
+    assert [f.name for f in tmp_path.iterdir()] == ["inputs.csv"]
 
 
 @pytest.mark.parametrize(("name", "magic"), [("t.PARQUET", b"PAR1"), ("t.CSV", b"time_s,")])
