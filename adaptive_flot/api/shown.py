@@ -35,4 +35,4 @@ def check_kind(kind: str, known: Iterable[str]) -> None:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}"
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
