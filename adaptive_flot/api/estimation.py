@@ -188,7 +188,8 @@ def estimate(
     data
         CSV or Parquet file, a DataFrame, or what `read_dataset` returned.
     estimators
-        Names ("pem" is the batch fit held fixed), classes, or (name or class, options).
+        Names ("pem" is the batch fit held fixed), classes, or (name or class, options). "fixed" starts with the nominal
+        parameters, all others with those of the batch fit.
     parameters
         Names of the parameters to estimate; default those with the role "estimated".
     outputs

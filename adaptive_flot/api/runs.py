@@ -51,10 +51,14 @@ class Runs:
     def table(self) -> pd.DataFrame:
         """A row a run: controller, estimator, seed, and the fit [%] of each adapted parameter and driving output.
 
-        Where the scenario has economics, the account follows: recovery, grade and value over the same times.
+        Where the scenario has economics, the account follows: recovery, grade and value over the same times. A fit
+        whose name is that of an entry of the account is then called `fit_<name>`: the fit of the output `recovery`.
         """
-        heads = [{"controller": r.controller, "estimator": r.estimator, "seed": r.seed} for r in self.runs]
-        return pd.DataFrame([{**head, **r.fit, **r.account} for head, r in zip(heads, self.runs, strict=True)])
+        rows = []
+        for r in self.runs:
+            fits = {f"fit_{key}" if key in r.account else key: value for key, value in r.fit.items()}
+            rows.append({"controller": r.controller, "estimator": r.estimator, "seed": r.seed, **fits, **r.account})
+        return pd.DataFrame(rows)
 
     @cached_property
     def summary(self) -> pd.DataFrame:
@@ -136,7 +140,8 @@ class Runs:
     def _title(self) -> str:
         seeds = seed_list(dict.fromkeys(r.seed for r in self.runs))
         count = f"{len(self.runs)} {'run' if len(self.runs) == 1 else 'runs'}"
-        return f"{self.scenario.name}: {count}, {seeds}; fits in percent, medians over the seeds"
+        fits = ", ".join(dict.fromkeys(key for r in self.runs for key in r.fit))
+        return f"{self.scenario.name}: {count}, {seeds}; medians over the seeds, fits of {fits} in percent"
 
 
 def run(

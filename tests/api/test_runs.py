@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,12 @@ def test_the_summary_is_the_median_over_the_seeds(runs: Runs) -> None:
     own = runs.table[runs.table["estimator"] == "Rpem"]
     row = runs.summary.set_index("estimator").loc["Rpem"]
     assert (row["seeds"], row["n"]) == (5, own["n"].median())
+
+
+def test_a_fit_and_an_account_of_one_name_are_both_kept(runs: Runs) -> None:
+    """With economics, `recovery` may be a driving output and is an entry of the account: two different numbers."""
+    one = replace(runs.runs[0], fit={"n": 90.0, "recovery": 80.0}, account={"recovery": 0.7})
+    assert Runs(runs.scenario, (one,)).table[["n", "fit_recovery", "recovery"]].to_numpy().tolist() == [[90, 80, 0.7]]
 
 
 def test_text_and_html_are_short_and_hold_what_counts(runs: Runs) -> None:
