@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
+from adaptive_flot.discovery.assessment.verification import changes
 from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -21,8 +22,14 @@ from adaptive_flot.discovery.search.joint_search import search_jointly, wants_jo
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import leading, plan_experiment
 from adaptive_flot.discovery.test_design.signals import input_range
-from adaptive_flot.discovery.verdict.conclude import conclude, insufficient
+from adaptive_flot.discovery.verdict.conclude import conclude, insufficient, report_errors
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN, held_up, judge, undecided_rivals
+from adaptive_flot.discovery.verdict.report_veto import (
+    contradiction,
+    contradiction_at_the_end,
+    last_report_rows,
+    noise_from_row_to_row,
+)
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -174,6 +181,23 @@ def fit_without_report(state: State) -> State:
     return replace(state, before=before, after=before if best is None else final(best.fit))
 
 
+def heed_report(state: State) -> State:
+    """Take a name back where the rows that chose nothing contradict it."""
+    problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
+    error = report_errors(problem, before, after, state.report_record)
+    record = problem.record if state.report_record is None else state.report_record
+    noise = noise_from_row_to_row(record.outputs, before.model, error)
+    against = contradiction(judgement, error, noise)
+    if not against and state.report_record is None:
+        at_the_end = changes(last_report_rows(problem), before, after, "report")
+        against = contradiction_at_the_end(
+            judgement, at_the_end, noise_from_row_to_row(record.outputs, before.model, at_the_end)
+        )
+    if against:
+        judgement = replace(judgement, word="abstain", members=())
+    return replace(state, error=error, judgement=judgement, contradiction=against)
+
+
 def plan_test(state: State) -> State:
     """Choose the input moves that would tell the leading alternatives apart, where there are several."""
     judgement, (problem, result) = state.judged, state.searched
@@ -201,6 +225,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     compare_with_common_nuisance,
     judge_alternatives,
     fit_without_report,
+    heed_report,
     plan_test,
     conclude,
 )

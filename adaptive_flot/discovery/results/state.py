@@ -9,7 +9,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult
-from adaptive_flot.discovery.results.evidence import Detection
+from adaptive_flot.discovery.results.evidence import Detection, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
 from adaptive_flot.discovery.results.verdict import Discovery, Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -44,6 +44,10 @@ class State:
         The ranked alternatives, and what they amount to.
     before, after
         Fits of the plain and of the extended model to the estimation and confirm splits.
+    error
+        Error of each output on the report rows, before and after.
+    contradiction
+        What these rows say against a name, in words; empty where they do not.
     experiment
         Input moves that would tell the leading alternatives apart.
     """
@@ -62,6 +66,8 @@ class State:
     judgement: Judgement | None = None
     before: Fit | None = None
     after: Fit | None = None
+    error: tuple[OutputChange, ...] = ()
+    contradiction: str = ""
     experiment: Experiment | None = None
 
     @property

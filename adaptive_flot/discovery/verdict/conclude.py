@@ -40,10 +40,10 @@ def conclude(state: State) -> Verdict:
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
     return Verdict(
         word=judgement.word,
-        reason=reason_words(judgement, result, effects, drift),
+        reason=reason_words(judgement, result, effects, drift, state.contradiction),
         effects=effects,
         members=judgement.members,
-        error=_errors(problem, before, final, state.report_record),
+        error=state.error,
         report_times=problem.spans("report") if state.report_record is None else (),
         tests=_tests(problem, before, final),
         parameters=dict(zip(labels, map(float, values), strict=True)),
@@ -67,7 +67,7 @@ def _tests(problem: Problem, before: Fit, after: Fit) -> dict[str, float]:
     return tests | {f"ljung_box_{k}": tests.get(f"ljung_box_{k}_{first}", float("nan")) for k in ("before", "after")}
 
 
-def _errors(problem: Problem, before: Fit, after: Fit, report: Dataset | None) -> tuple[OutputChange, ...]:
+def report_errors(problem: Problem, before: Fit, after: Fit, report: Dataset | None) -> tuple[OutputChange, ...]:
     """Free-run errors on the report split, or on a record of its own that reports."""
     if report is None:
         return changes(problem, before, after, "report")

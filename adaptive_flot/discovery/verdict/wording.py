@@ -29,9 +29,19 @@ def _largest_move(values: list[float]) -> float:
 
 
 def reason_words(
-    judgement: Judgement, found: SearchResult, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]
+    judgement: Judgement,
+    found: SearchResult,
+    effects: tuple[NamedEffect, ...],
+    drift: tuple[str, ...],
+    contradiction: str = "",
 ) -> str:
-    """The verdict in one paragraph."""
+    """The verdict in one paragraph; what contradicts a name comes first."""
+    if contradiction and judgement.best is not None:
+        fitted = " with ".join(f"{site} by {driver}" for site, driver in judgement.best.names)
+        return (
+            f"Something is missing, but it is not told: {fitted} fits the record best, and {contradiction}. "
+            "Look for what else has happened there."
+        )
     if judgement.word == "none" and drift:
         return (
             "The model lacks no effect that this record shows: a drift of its adapted parameters explains the residual "

@@ -1,0 +1,93 @@
+"""The report split has a veto: what rows that chose nothing contradict is not told as a name.
+
+A name is contradicted where an output gets worse on these rows, or where no output surely gets better. What depends on
+time must also hold on the last of these rows, which lie beyond all that it was fitted to: a curve in time can mimic any
+residual between rows that it has seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.record.noise import noise_by_differences
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.greybox.model import FloatArray, Model
+
+WORSE = 0.02
+"""Share by which an error may grow without being worse, where chance could explain it."""
+MUCH_WORSE = 0.1
+"""Share by which an error is worse whatever its interval: a wide interval does not excuse it."""
+AT_NOISE = 1.25
+"""An error of so many times the noise is the noise: what it does there contradicts nothing."""
+
+
+def contradiction(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """What the report rows say against a name; empty where they do not, and where no name is given.
+
+    An output is worse where its error after, a, is above ``AT_NOISE s`` and either ``a > (1 + MUCH_WORSE) b`` or
+    ``a > (1 + WORSE) b`` with a 95 % interval of the reduction below zero; b is its error before and s its noise.
+
+    Parameters
+    ----------
+    judgement
+        The word before the veto.
+    changes
+        Error of each output on the report rows, before and after.
+    noise
+        Noise of each of these outputs from row to row, which no model has fitted (m,).
+    """
+    if judgement.word not in ("named", "class"):
+        return ""
+    worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
+    if worse:
+        said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
+        return f"on rows that chose nothing it makes the error larger ({said})"
+    if not any(c.reduction95[0] > 0 for c in changes):
+        said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
+        return f"on rows that chose nothing no output surely gets better ({said})"
+    return ""
+
+
+def _is_worse(change: OutputChange, noise: float) -> bool:
+    if change.after <= AT_NOISE * noise:
+        return False
+    surely = change.after > (1 + WORSE) * change.before and change.reduction95[1] < 0
+    return surely or change.after > (1 + MUCH_WORSE) * change.before
+
+
+def contradiction_at_the_end(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """What the last report rows say against a name that depends on time; empty where nothing.
+
+    Arguments are as in `contradiction`, for the rows of `last_report_rows` alone.
+    """
+    best = judgement.best
+    if judgement.word not in ("named", "class") or best is None or all(driver != "time" for _, driver in best.names):
+        return ""
+    worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
+    if not worse:
+        return ""
+    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
+    return f"beyond the rows that it was fitted to it makes the error larger ({said})"
+
+
+def last_report_rows(problem: Problem) -> Problem:
+    """The same problem with the last contiguous part of its report split alone."""
+    rows = np.flatnonzero(problem.rows("report"))
+    if not rows.size:
+        return problem
+    breaks = np.flatnonzero(np.diff(rows) > 1)
+    last = rows[breaks[-1] + 1 :] if breaks.size else rows
+    splits = problem.splits.copy()
+    splits[np.setdiff1d(rows, last)] = ""
+    return replace(problem, splits=splits)
+
+
+def noise_from_row_to_row(outputs: FloatArray, model: Model, changes: Sequence[OutputChange]) -> FloatArray:
+    """Noise of each changed output (m,) from its differences from row to row, which needs no model."""
+    columns = [model.index("outputs", c.output) for c in changes]
+    noise: FloatArray = np.nan_to_num(noise_by_differences(outputs[:, columns]))
+    return noise

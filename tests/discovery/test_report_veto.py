@@ -1,0 +1,90 @@
+"""Protects: what rows that chose nothing contradict is never told as a name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.discover import heed_report
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange, State
+from adaptive_flot.discovery.verdict.report_veto import (
+    contradiction,
+    contradiction_at_the_end,
+    last_report_rows,
+)
+
+NOISE = np.array([0.1])
+
+
+def _change(before: float, after: float, low: float, high: float) -> OutputChange:
+    return OutputChange("temperature", "K", before, after, 0.1, (low, high))
+
+
+def _judged(draught: Discovery, word: str = "named", driver: str = "fan_speed") -> Judgement:
+    assert draught.search is not None
+    own = draught.search.alternatives[0]
+    best = Alternative((("heat_loss", driver),), (True,), own.fit, 0.0, -100.0)
+    return Judgement(word, best, (), (), 10.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_change(2.43, 8.96, -5.94, 0.62), "larger"),  # the opened box: a wide interval does not excuse it
+        (_change(2.0, 2.1, -0.08, -0.02), "larger"),  # a little worse, but surely
+        (_change(2.0, 2.1, -0.08, 0.02), "no output surely"),
+        (_change(2.0, 1.0, 0.3, 0.6), ""),
+        (_change(2.0, 1.9, -0.1, 0.2), "no output surely"),
+    ],
+)
+def test_a_name_is_contradicted(draught: Discovery, change: OutputChange, said: str) -> None:
+    """The first case is the one that was measured: named, while the error on the report split grew fourfold."""
+    against = contradiction(_judged(draught), [change], NOISE)
+    assert said in against and bool(said) == bool(against)
+    if said:
+        assert f"{change.before:.3g} -> {change.after:.3g} K" in against
+
+
+def test_an_output_at_its_noise_contradicts_nothing(draught: Discovery) -> None:
+    """Two outputs: one gets much better, the other wanders by a fifth within its noise."""
+    other = OutputChange("flow", "m3/s", 0.10, 0.12, 0.1, (-0.3, -0.1))
+    better = _change(2.0, 1.0, 0.3, 0.6)
+    assert contradiction(_judged(draught), [better, other], np.array([0.1, 0.1])) == ""
+    assert "flow" in contradiction(_judged(draught), [better, other], np.array([0.1, 0.01]))
+
+
+@pytest.mark.parametrize("word", ["none", "abstain", "unnamed", "insufficient"])
+def test_only_names_are_taken_back(draught: Discovery, word: str) -> None:
+    """A verdict that gives no name has nothing to take back."""
+    assert contradiction(_judged(draught, word), [_change(2.0, 9.0, -4.0, -3.0)], NOISE) == ""
+
+
+@pytest.mark.parametrize(("driver", "taken"), [("time", True), ("fan_speed", False)])
+def test_a_course_in_time_must_hold_beyond_what_it_was_fitted_to(draught: Discovery, driver: str, taken: bool) -> None:
+    """Only what depends on time is asked to."""
+    against = contradiction_at_the_end(_judged(draught, driver=driver), [_change(2.0, 4.0, -2.0, 0.5)], NOISE)
+    assert bool(against) == taken
+
+
+def test_the_last_report_rows_are_the_last_contiguous_ones(draught: Discovery) -> None:
+    """They end where the split ends, and nothing of the other splits is touched."""
+    assert draught.problem is not None
+    last = last_report_rows(draught.problem)
+    rows, all_rows = (np.flatnonzero(p.rows("report")) for p in (last, draught.problem))
+    assert rows[-1] == all_rows[-1] and (np.diff(rows) == 1).all() and len(rows) < len(all_rows)
+    assert (last.rows("estimate") == draught.problem.rows("estimate")).all()
+
+
+def test_the_stage_turns_a_contradicted_name_into_an_abstention(draught: Discovery) -> None:
+    """With before and after exchanged, the same record contradicts the same name; as they are it does not."""
+    assert draught.problem is not None and draught.before is not None and draught.after is not None
+    state = State(
+        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
+        problem=draught.problem, base=draught.before, search=draught.search, judgement=_judged(draught),
+        before=draught.before, after=draught.after,
+    )  # fmt: skip
+    assert heed_report(state).judged.word == "named"
+    exchanged = heed_report(replace(state, before=draught.after, after=draught.before))
+    assert exchanged.judged.word == "abstain" and "larger" in exchanged.contradiction
