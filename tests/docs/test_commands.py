@@ -7,6 +7,7 @@ import shlex
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -15,7 +16,7 @@ from adaptive_flot.cli import app
 from adaptive_flot.plugins import ESTIMATORS
 from tests.docs.pages import PAGES, ROOT, fences, name_of
 
-CLI = typer.main.get_command(app)
+CLI: Any = typer.main.get_command(app)  # a group of commands, as typer makes it
 ASIDE = frozenset({"pem", "my_method"})
 """The batch method, and the name that a reader's own estimator gets."""
 IN_LINE = r"`((?:adaptive-flot|python -m|make) [^`]+)`"
