@@ -4,7 +4,7 @@ Runs in two processes (`--processes`) and writes one Parquet part for each scena
 (default `results/closed_loop`). Parts that are there already are not run again, so that a run that was stopped goes on;
 remove the folder after a change. Prints what was asked of the closed loop and what was reached; `adaptive-flot compare
 results/closed_loop` shows the same runs in full, `python -m benchmarks.readme_table results/closed_loop` puts them into
-the README.
+`docs/results/closed_loop.md`.
 """
 
 from __future__ import annotations

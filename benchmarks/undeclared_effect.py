@@ -1,5 +1,6 @@
-"""What RPEM absorbs of an effect that no model has, and what discovery in the loop finds: the README's table.
+"""What RPEM absorbs of an effect that no model has, and what discovery in the loop finds.
 
+The table is in `docs/results/closed_loop.md`.
 `python -m benchmarks.undeclared_effect` runs the scenario of that name over three seeds, two minutes.
 """
 
