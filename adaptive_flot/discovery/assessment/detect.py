@@ -7,6 +7,8 @@ inputs (positive lags only, so feedback is no reason), that its size is that of 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, norm
@@ -29,34 +31,50 @@ WINDOWS = 12
 FEWEST = 200
 """Rows that a test asks for."""
 
+Test = tuple[str, str, str]
+"""Output, what is tested, and of which input, if any."""
+
 
 def detect(problem: Problem, base: Fit) -> Detection:
     """Test the residual of the model as it is, output by output."""
     names = [q.name for q in base.model.inputs]
     residual = without_spikes(base.residual(problem) / problem.weights)
     residual[~problem.rows()] = np.nan
-    found: list[tuple[str, float, float, dict[str, float], tuple[float, float | None]]] = []
-    for j, c in enumerate(problem.columns):
-        r = residual[:, j]
-        white = base.noise.whiten(residual)[:, j]
-        independent = {n: independence(white, problem.record.inputs[:, i]) for i, n in enumerate(names)}
-        found.append((base.model.outputs[c].name, _size(r), _white(r), independent, _change(r, problem.record.time)))
-    ps = [p for _, _, white, inputs, (change, _) in found for p in (white, *inputs.values(), change)]
-    rejected = iter(_holm(ps))
+    innovations = base.noise.whiten(residual)
+    outputs = [base.model.outputs[c].name for c in problem.columns]
+    white = {output: _white(residual[:, j]) for j, output in enumerate(outputs)}
+    change = {output: _change(residual[:, j], problem.record.time) for j, output in enumerate(outputs)}
+    past = {
+        output: {n: independence(innovations[:, j], problem.record.inputs[:, i]) for i, n in enumerate(names)}
+        for j, output in enumerate(outputs)
+    }
+    p_values: dict[Test, float] = {}
+    for output in outputs:
+        p_values[output, "whiteness", ""] = white[output]
+        p_values |= {(output, "past of", n): p for n, p in past[output].items()}
+        p_values[output, "change", ""] = change[output][0]
+    rejected = _holm(p_values)
     symptoms = []
-    for name, size, white_p, inputs, (_, onset) in found:
-        whole = next(rejected)
-        follows = tuple(n for n, rejects in [(n, next(rejected)) for n in inputs] if rejects)
-        changed = next(rejected)
-        shows = whole or bool(follows) or changed
-        symptoms.append(Symptom(name, size, white_p, inputs, follows, onset if changed else None, shows))
+    for j, output in enumerate(outputs):
+        follows = tuple(n for n in names if rejected[output, "past of", n])
+        changed = rejected[output, "change", ""]
+        shows = rejected[output, "whiteness", ""] or bool(follows) or changed
+        onset = change[output][1] if changed else None
+        symptoms.append(Symptom(output, _size(residual[:, j]), white[output], past[output], follows, onset, shows))
     return Detection(tuple(symptoms))
 
 
-def _holm(ps: list[float]) -> list[bool]:
-    """Which of the tests reject at LEVEL together; one that could not be made does not."""
-    usable = [p if np.isfinite(p) else 1.0 for p in ps]
-    return [bool(r) for r in multipletests(usable, alpha=LEVEL, method="holm")[0]] if usable else []
+def _holm(p_values: Mapping[Test, float]) -> dict[Test, bool]:
+    """Which of m tests reject at LEVEL together; one that could not be made (NaN) does not.
+
+    The i-th smallest p value rejects when p_(i) <= LEVEL / (m + 1 - i), and all smaller ones do: Holm, *Scand. J.
+    Statist.* 6 (1979) 65.
+    """
+    if not p_values:
+        return {}
+    usable = [p if np.isfinite(p) else 1.0 for p in p_values.values()]
+    rejects = multipletests(usable, alpha=LEVEL, method="holm")[0]
+    return dict(zip(p_values, map(bool, rejects), strict=True))
 
 
 def _size(r: FloatArray) -> float:
@@ -66,12 +84,24 @@ def _size(r: FloatArray) -> float:
 
 
 def _white(r: FloatArray) -> float:
+    """P value of whiteness, with the autocorrelations rho of n values and h = LAGS; missing values are closed up.
+
+    ::
+
+        Q = n (n + 2) sum_(k=1..h) rho_k^2 / (n - k),   chi-squared with h degrees of freedom
+
+    Ljung & Box, *Biometrika* 65 (1978) 297.
+    """
     e = r[np.isfinite(r)]
     return float(acorr_ljungbox(e, lags=[LAGS])["lb_pvalue"].iloc[0]) if len(e) >= FEWEST else float("nan")
 
 
 def independence(e: FloatArray, u: FloatArray) -> float:
-    """Lagrange multiplier test of a regression on the past of an input: rows x R^2 is chi-squared."""
+    """P value of no regression of innovations e (N,) on the past of an input u (N,), at INPUT_LAGS.
+
+    Lagrange multiplier test: n R^2 is chi-squared with as many degrees of freedom as there are independent lags.
+    Engle, *Handbook of Econometrics* II (1984) 775, eq. (13). NaN with too few rows, or an input that does not move.
+    """
     most = max(INPUT_LAGS)
     past = np.column_stack([u[most - lag : len(u) - lag] for lag in INPUT_LAGS])
     now = e[most:]
@@ -90,8 +120,13 @@ def independence(e: FloatArray, u: FloatArray) -> float:
 def _change(r: FloatArray, time: FloatArray) -> tuple[float, float | None]:
     """P value of no jump, and the time at which the mean after differs most from the mean before (moving sums).
 
-    Windows of a twelfth of the record: a fit bends its parameters until a jump is a saw tooth, whose cumulative sum
-    goes nowhere. The spread is the long-run one of what is faster than a window; Bonferroni over the windows.
+    With the means m_k of the w rows from k on, the standard deviation s of what is faster than a window, and its
+    autocorrelation time t::
+
+        z = max_k |m_(k+w) - m_k| / (s sqrt(2 t / w)),   p = min(1, 2 WINDOWS (1 - Phi(z)))
+
+    Bauer & Hackl, *Technometrics* 20 (1978) 431, with Bonferroni's bound over the windows. Windows of a twelfth of the
+    record: a fit bends its parameters until a jump is a saw tooth, whose cumulative sum goes nowhere.
     """
     present = np.flatnonzero(np.isfinite(r))
     if len(present) < FEWEST:

@@ -49,6 +49,11 @@ def nothing_explained(problem: Problem, fit: Fit) -> str | None:
 def regression_shares(record: Dataset, columns: tuple[int, ...]) -> FloatArray:
     """Share of the variance (m,) that filtered inputs explain, by cross-validation over contiguous blocks.
 
+    1 - mean squared error / variance, each of FOLDS blocks predicted by a ridge regression (Hoerl & Kennard,
+    *Technometrics* 12 (1970) 55) on the others::
+
+        b = (X'X + RIDGE n I)^-1 X'(y - mean of y)
+
     The larger of two: of the output itself, and of its faster part, in which a slow process that wanders far shows what
     moves it.
     """

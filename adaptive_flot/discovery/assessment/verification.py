@@ -28,7 +28,11 @@ LAGS = 20
 
 
 def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
-    """Compare two fits of the estimation split on the confirm split, in units of the noise of the better one."""
+    """Compare two fits of the estimation split on the confirm split, in units of the noise of the better one.
+
+    Confirmed where the 95 % interval of the reduction (see `_reduction`) lies above zero and no output is worse: its
+    error grew by more than WORSE, and the interval of its own reduction lies below zero.
+    """
     rows = problem.rows("confirm")
     size = problem.weights * after.noise.stationary_std()
     old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
@@ -44,8 +48,14 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
 def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
     """Standard deviation of the difference between each fit's minus two log-likelihood and that of the best.
 
-    By resampling blocks of rows with the fits as they are: Kishino & Hasegawa, J. Mol. Evol. 29 (1989) 170. A fit that
-    is worse by less than `SURE` of these would be the better one in some records like this.
+    With the difference D_b over block b of B (see `row_losses`)::
+
+        sd = sqrt(B) * standard deviation of D_b
+
+    The likelihood ratio test of models that are not nested: Vuong, *Econometrica* 57 (1989) 307, eq. (4.2), with blocks
+    of rows instead of rows, as these depend on one another; the fits stay as they are (Kishino & Hasegawa, *J. Mol.
+    Evol.* 29 (1989) 170). A fit that is worse by less than `SURE` of these would be the better one in some records like
+    this. Zero of a record with fewer than MANY_BLOCKS blocks.
     """
     rows = problem.rows("estimate")
     length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, COMPARISON_BLOCK_ROWS))
@@ -53,15 +63,20 @@ def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) ->
     if count < MANY_BLOCKS:
         return tuple(0.0 for _ in others)
     own = row_losses(problem, best, rows)
-    found = []
+    deviations = []
     for fit in others:
         blocks = (row_losses(problem, fit, rows) - own)[: count * length].reshape(count, length).sum(axis=1)
-        found.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
-    return tuple(found)
+        deviations.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
+    return tuple(deviations)
 
 
 def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> float:
     """Rows for each effective sample of a fit's innovations, averaged by what it gained in each output on another fit.
+
+    With the autocorrelation time t_j of the innovations of output j (see `correlation_times`) and the drop g_j of its
+    mean squared error::
+
+        t = sum_j g_j t_j / sum_j g_j
 
     A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
     """
@@ -78,6 +93,9 @@ def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> floa
 def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether what a freer form gains pays for its further coefficients, evidence counted once an effective sample.
 
+    By the Bayesian information criterion of N / t samples, with t of `rows_per_effective_sample` and q coefficients
+    more: (drop of minus two log-likelihood) / t > q log(N / t). Schwarz, *Ann. Statist.* 6 (1978) 461.
+
     Where something else is still missing, neighbouring rows err alike, and a criterion that counts them all would
     take any freedom it can get.
     """
@@ -93,15 +111,15 @@ def changes(problem: Problem, before: Fit, after: Fit, split: str) -> tuple[Outp
     ones = np.ones_like(problem.weights)
     old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
     noise = after.noise.stationary_std()
-    found = []
+    errors = []
     for j, c in enumerate(problem.columns):
         q = after.model.outputs[c]
         if not np.isfinite(old[:, j]).any():
             continue
         a, b = (float(np.sqrt(np.nanmean(s[:, j]))) for s in (old, new))
         sigma = float(noise[j] * np.sqrt(np.mean(problem.weights[rows, j] ** 2)))
-        found.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j])[1]))
-    return tuple(found)
+        errors.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j])[1]))
+    return tuple(errors)
 
 
 def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> FloatArray:
@@ -110,7 +128,17 @@ def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> F
 
 
 def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, float]]:
-    """1 - RMS(new) / RMS(old) with a paired block-bootstrap interval (scipy, percentile)."""
+    """Reduction of the root mean square error with a 95 % interval; squared errors old and new (N,), NaN where missing.
+
+    With the sums O_b and N_b over blocks of neighbouring rows::
+
+        reduction = 1 - sqrt(sum_b N_b / sum_b O_b)
+
+    Pairs (O_b, N_b) are drawn with replacement, and the interval is between quantiles 2.5 and 97.5 % of DRAWS draws:
+    the percentile bootstrap (Efron, *Ann. Statist.* 7 (1979) 1) of blocks that do not overlap (Carlstein, *Ann.
+    Statist.* 14 (1986) 1171; those of Kunsch, *Ann. Statist.* 17 (1989) 1217, do). Zero with an infinite interval where
+    there are fewer than four blocks.
+    """
     ok = np.isfinite(old) & np.isfinite(new)
     length = int(np.clip(ok.sum() // MANY_BLOCKS, SHORTEST_BLOCK, BLOCK_ROWS))
     count = int(ok.sum()) // length
@@ -122,19 +150,23 @@ def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, fl
         value: FloatArray = 1 - np.sqrt(np.sum(y, axis=axis) / np.maximum(np.sum(x, axis=axis), 1e-300))
         return value
 
-    found = bootstrap(
+    interval = bootstrap(
         (a, b), statistic, paired=True, vectorized=True, n_resamples=DRAWS, method="percentile", rng=0
     ).confidence_interval
-    return float(statistic(a, b)), (float(found.low), float(found.high))
+    return float(statistic(a, b)), (float(interval.low), float(interval.high))
 
 
 def whiteness(problem: Problem, fit: Fit, *, raw: bool) -> dict[str, float]:
-    """Ljung-Box p value of each measured output: of the weighted residual (`raw`) or of the whitened innovations."""
+    """Ljung-Box p value of each measured output: of the weighted residual (`raw`) or of the whitened innovations.
+
+    Q = n (n + 2) sum_(k=1..LAGS) rho_k^2 / (n - k), chi-squared with LAGS degrees of freedom: Ljung & Box, *Biometrika*
+    65 (1978) 297.
+    """
     series = fit.residual(problem) / problem.weights if raw else fit.innovations
-    found = {}
+    p_values = {}
     for j, c in enumerate(problem.columns):
         e = series[problem.rows(), j]
         e = e[np.isfinite(e)]
         if len(e) > 3 * LAGS:
-            found[fit.model.outputs[c].name] = float(acorr_ljungbox(e, lags=[LAGS])["lb_pvalue"].iloc[0])
-    return found
+            p_values[fit.model.outputs[c].name] = float(acorr_ljungbox(e, lags=[LAGS])["lb_pvalue"].iloc[0])
+    return p_values

@@ -1,7 +1,12 @@
 """Knots of a fitted curve that it does not need: the true cause draws the simplest profile, others must mimic its run.
 
 Backward elimination on the grid of knots that was fitted, by what the loss of each adds to minus two log-likelihood to
-second order (Wald's test): Smith 1982, NASA CR-166034, knots of a regression spline as a choice of variables.
+second order. With the fitted values v at all knots, their covariance C, and the spline B through the knots kept::
+
+    added = min over b of (v - B b)' C^-1 (v - B b)
+
+This is Wald's statistic of the hypothesis that v = B b: *Trans. Am. Math. Soc.* 54 (1943) 426. Knots of a regression
+spline as a choice of variables: Smith (1982), NASA CR-166034.
 """
 
 from __future__ import annotations

@@ -1,14 +1,24 @@
 """Efficient scores: how much of the residual each candidate would explain, to first order, for one linearisation.
 
-The adapted parameters and the initial state are projected out first: what they can absorb is no evidence. The noise
-model is that of the residual after *everything in the catalogue at once* (a ridge fit), so that it is neither blind to
-coloured noise nor soaked up by the very effect that is looked for.
+The efficient score test. With the whitened residual e of a fit (N,), the whitened responses Z (N, q) to what is free
+already, and those X (N, r) to one variant of a candidate::
+
+    M = I - Z (Z'Z)^-1 Z'      S = e'M X (X'M X)^-1 X'M e      b = (X'M X)^-1 X'M e
+
+S is the drop of minus two log-likelihood that a fit of the variant would bring, to first order, and chi-squared with r
+degrees of freedom where the variant is no part of the plant; b is where a fit of it starts. Rao, *Proc. Cambridge
+Philos. Soc.* 44 (1948) 50; with nuisance parameters (M) Neyman's C(alpha), *Probability and Statistics* (1959) 213.
+
+M takes out what adapted parameters and initial state can absorb: that is no evidence. The noise model is that of the
+residual after *everything in the catalogue at once* (a ridge fit), so that it is neither blind to coloured noise nor
+soaked up by the very effect that is looked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -44,9 +54,9 @@ class Score:
     candidate, variant
         What was scored.
     gain
-        Drop of the whitened sum of squares (minus two log-likelihood) on the estimation rows.
+        The score statistic S: drop of minus two log-likelihood on the estimation rows, to first order.
     penalised
-        The same less log(number of measurements) for each coefficient.
+        S - k log(number of measurements), with k coefficients: Schwarz, *Ann. Statist.* 6 (1978) 461.
     start
         Values of the coefficients to start a fit from.
     """
@@ -66,14 +76,14 @@ class Scorer:
         self.drivers, self._responses = responses.drivers, responses
         self.rows = problem.rows("estimate")
         self._count = int(np.isfinite(problem.measured[self.rows]).sum())
-        variants = [v for c in candidates for v in c.variants]
-        profiles = [profile for v in variants for profile in v.profiles]
+        self._variants = {c.name: tuple(places) for c, places in _places(candidates)}
+        profiles = [profile for c in candidates for v in c.variants for profile in v.profiles]
         self._reached = with_rows_before(self.rows)
         weighted = self._weighted_responses(profiles)
         nuisance = (responses.nuisance / problem.weights[:, :, None])[self._reached]
         residual = without_spikes(fit.residual(problem) / problem.weights)
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in profiles])
-        self.noise = self._clean_noise(residual, weighted, nuisance, variants)
+        self.noise = self._clean_noise(residual, weighted, nuisance)
         e = self.noise.whiten(residual)
         present = np.isfinite(e) & self.rows[:, None]
         self._present = present[self._reached]
@@ -91,32 +101,31 @@ class Scorer:
         self.residual = self._project(np.clip(e[present], -1e3, 1e3))
         self._columns = columns
         self._along = columns.T @ self.residual
-        self._slices: list[slice] = []
-        at = 0
-        for v in variants:
-            self._slices.append(slice(at, at + len(v.profiles)))
-            at += len(v.profiles)
-        self._grams = {s.start: columns[:, s].T @ columns[:, s] for s in self._slices}
+        self._grams = {s.start: columns[:, s].T @ columns[:, s] for _, s in self._all_variants()}
+
+    def _all_variants(self) -> Iterator[tuple[Variant, slice]]:
+        """Every variant of every candidate, with its columns."""
+        return chain.from_iterable(self._variants.values())
 
     def in_mode(self, site: str, mode: str | None, wanted: str | None) -> float:
         """Factor that turns a small change at a site, given in one mode (None: the site's own), into another mode."""
         own = next(s.mode for s in self.fit.model.sites if s.name == site)
         usual = self._responses.usual(site)
-        given, found = (mode or own) == "offset", (wanted or own) == "offset"
-        return 1.0 if given == found else usual if found else 1 / max(usual, 1e-300)
+        is_offset, as_offset = (mode or own) == "offset", (wanted or own) == "offset"
+        return 1.0 if is_offset == as_offset else usual if as_offset else 1 / max(usual, 1e-300)
 
     def _weighted_responses(self, profiles: list[TimeProfile]) -> FloatArray:
         """Weighted responses to r profiles on the rows of `_reached` (rows, m, r)."""
-        found = self._responses.of(profiles, self._reached)
-        found /= self.problem.weights[self._reached][:, :, None]
-        return found
+        weighted = self._responses.of(profiles, self._reached)
+        weighted /= self.problem.weights[self._reached][:, :, None]
+        return weighted
 
     def _whitened(self, weighted: FloatArray) -> FloatArray:
         """Whitened responses (values present, r) of weighted ones (rows, m, r), a few at a time to save memory."""
-        found = np.empty((int(self._present.sum()), weighted.shape[2]))
+        white = np.empty((int(self._present.sum()), weighted.shape[2]))
         for part in _parts(weighted.shape[2]):
-            found[:, part] = self.noise.whiten(weighted[:, :, part])[self._present]
-        return found
+            white[:, part] = self.noise.whiten(weighted[:, :, part])[self._present]
+        return white
 
     @staticmethod
     def _prior(offset: bool, responses: Responses, site: str) -> float:
@@ -126,16 +135,20 @@ class Scorer:
         projected: FloatArray = e - self._base @ (self._base.T @ e)
         return projected
 
-    def _clean_noise(
-        self, residual: FloatArray, weighted: FloatArray, nuisance: FloatArray, variants: list[Variant]
-    ) -> Noise:
-        """Noise left by a ridge fit of the constant, the slow and the power-law profiles of all sites together."""
-        wanted, at = [], 0
-        for v in variants:
-            family = v.effect.family
-            if family.is_linear and (v.effect.driver == "time" or not family.is_curve):
-                wanted += list(range(at, at + len(v.profiles)))
-            at += len(v.profiles)
+    def _clean_noise(self, residual: FloatArray, weighted: FloatArray, nuisance: FloatArray) -> Noise:
+        """Noise left by a ridge fit of the constant, the slow and the power-law profiles of all sites together.
+
+        With responses X in standard deviations of their prior, and the residual y, both without what Z explains::
+
+            b = (X'X + I)^-1 X'y,   left = y - X b
+
+        Hoerl & Kennard, *Technometrics* 12 (1970) 55. Values of y that stand out (CLIP) do not count.
+        """
+        wanted: list[int] = []
+        for variant, columns in self._all_variants():
+            family = variant.effect.family
+            if family.is_linear and (variant.effect.driver == "time" or not family.is_curve):
+                wanted += range(columns.start, columns.stop)
         std = np.maximum(np.nan_to_num(noise_by_differences(residual)), self.problem.floor)
         r = residual[self.rows] / std
         present = np.isfinite(r)
@@ -148,11 +161,9 @@ class Scorer:
         base, _ = np.linalg.qr(Z)
         X -= base @ (base.T @ X)
         y = y - base @ (base.T @ y)
-        for _ in range(2):  # the second time without what stands out
-            limit = CLIP * 1.4826 * np.median(np.abs(y)) if _ else np.inf
-            keep = np.abs(y) <= max(limit, CLIP)
-            beta = np.linalg.solve(X[keep].T @ X[keep] + np.eye(X.shape[1]), X[keep].T @ y[keep])
-            left = y - X @ beta
+        keep = np.abs(y) <= max(CLIP * 1.4826 * np.median(np.abs(y)), CLIP)
+        beta = np.linalg.solve(X[keep].T @ X[keep] + np.eye(X.shape[1]), X[keep].T @ y[keep])
+        left = y - X @ beta
         full = np.full(residual.shape, np.nan)
         table = np.full(r.shape, np.nan)
         table[present] = left
@@ -161,23 +172,11 @@ class Scorer:
 
     def scores(self) -> list[Score]:
         """Scores of all candidates, best first."""
-        found, at = [], 0
-        for candidate in self.candidates:
-            best: Score | None = None
-            for variant in candidate.variants:
-                score = self._score(candidate, variant, self._slices[at])
-                at += 1
-                if best is None or score.penalised > best.penalised:
-                    best = score
-            assert best is not None  # a candidate has variants
-            found.append(best)
-        return sorted(found, key=lambda s: -s.penalised)
+        return _ranked([self.variant_scores(candidate)[0] for candidate in self.candidates])
 
     def variant_scores(self, candidate: Candidate) -> list[Score]:
         """Scores of all variants of one candidate, best first."""
-        at = sum(len(c.variants) for c in self.candidates[: self.candidates.index(candidate)])
-        found = [self._score(candidate, v, self._slices[at + i]) for i, v in enumerate(candidate.variants)]
-        return sorted(found, key=lambda s: -s.penalised)
+        return _ranked([self._score(candidate, v, columns) for v, columns in self._variants[candidate.name]])
 
     def _score(self, candidate: Candidate, variant: Variant, columns: slice) -> Score:
         A, b = self._grams[columns.start], self._along[columns]
@@ -191,7 +190,10 @@ class Scorer:
         return Score(candidate, variant, gain, gain - penalty, {**start, **dict(variant.start)})
 
     def refined(self, score: Score) -> Score:
-        """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima."""
+        """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima.
+
+        Of one response x each, the score statistic is (x'M e)^2 / x'M x, and the amplitude x'M e / x'M x.
+        """
         effect, start = score.variant.effect, dict(score.variant.start)
         if not effect.family.is_event:
             return score
@@ -214,30 +216,45 @@ class Scorer:
         if gains[best] <= score.gain:
             return score
         amplitude = float(columns[:, best] @ self.residual / np.sum(columns[:, best] ** 2))
-        found = variants[best]
         penalised = score.penalised + float(gains[best]) - score.gain
-        values = {"amplitude": amplitude, **dict(found.start)}
-        return replace(score, variant=found, gain=float(gains[best]), penalised=penalised, start=values)
+        values = {"amplitude": amplitude, **dict(variants[best].start)}
+        return replace(score, variant=variants[best], gain=float(gains[best]), penalised=penalised, start=values)
 
     def null_gains(self, draws: int, seed: int) -> FloatArray:
         """Largest penalised score (draws,) of the catalogue on white noise: the null law of the search.
 
-        Parametric bootstrap: the whitened residual is drawn as white Gaussian noise and projected like the real one.
+        Parametric bootstrap of the maximum over all variants v, with e ~ N(0, I) in place of the whitened residual::
+
+            max over v of e'M X_v (X_v'M X_v)^-1 X_v'M e - k_v log(number of measurements)
+
+        Davison & Hinkley, *Bootstrap Methods and their Application* (1997), 4.2; the maximum because the best of many
+        is reported (Westfall & Young, *Resampling-Based Multiple Testing*, 1993).
         """
         rng = np.random.default_rng(seed)
         along = self._columns.T @ rng.standard_normal((len(self._columns), draws))
         best = np.full(draws, -np.inf)
-        at = 0
-        for candidate in self.candidates:
-            for variant in candidate.variants:
-                columns = self._slices[at]
-                at += 1
-                strength, turned = np.linalg.eigh(self._grams[columns.start])
-                good = strength > max(DEPENDENT * strength[-1], 1e-60)
-                gain = np.sum((turned[:, good].T @ along[columns]) ** 2 / strength[good, None], axis=0)
-                penalty = (len(variant.profiles) + len(variant.start)) * np.log(self._count)
-                best = np.maximum(best, gain - penalty)
+        for variant, columns in self._all_variants():
+            strength, turned = np.linalg.eigh(self._grams[columns.start])
+            good = strength > max(DEPENDENT * strength[-1], 1e-60)
+            gain = np.sum((turned[:, good].T @ along[columns]) ** 2 / strength[good, None], axis=0)
+            penalty = (len(variant.profiles) + len(variant.start)) * np.log(self._count)
+            best = np.maximum(best, gain - penalty)
         return best
+
+
+def _places(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, list[tuple[Variant, slice]]]]:
+    """Each candidate with its variants, and the columns of each in the table of all responses."""
+    first = 0
+    for candidate in candidates:
+        places = []
+        for variant in candidate.variants:
+            places.append((variant, slice(first, first + len(variant.profiles))))
+            first += len(variant.profiles)
+        yield candidate, places
+
+
+def _ranked(scores: list[Score]) -> list[Score]:
+    return sorted(scores, key=lambda s: -s.penalised)
 
 
 def _parts(count: int) -> Iterator[slice]:

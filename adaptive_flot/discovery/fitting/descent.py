@@ -1,6 +1,11 @@
 """The search for one fit: each alternative has its own noise model, fitted in turn with its unknowns.
 
-Gauss-Newton with Marquardt damping on sensitivities of the whole record, for the criterion of `fit`.
+Gauss-Newton with Marquardt damping on sensitivities of the whole record, for the criterion of `fit`. With whitened
+innovations e, derivatives J of the predictions by the unknowns z, and a weak prior N(z0, P)::
+
+    A = J'J + P^-1      b = J'e - P^-1 (z - z0)      (A + damping diag A) step = b
+
+Marquardt, *SIAM J. Appl. Math.* 11 (1963) 431.
 """
 
 from __future__ import annotations

@@ -1,7 +1,16 @@
 """A fitted alternative, and the criterion it was fitted by.
 
-Output error (free run) with whitened, clipped innovations: Ljung, *System Identification*, 2nd ed., (7.12) with Huber's
-norm (15.9).
+Output error (free run) with whitened innovations e, in standard deviations s of each output's noise, of which none
+counts beyond c = CLIP::
+
+    loss = sum over rows and outputs of min(e^2, c^2) + 2 log s
+
+This is minus two log-likelihood of Gaussian noise up to a constant (Ljung, *System Identification*, 2nd ed., 7.4) with
+truncated squares for outliers (Hinich & Talwar, *J. Am. Statist. Assoc.* 70 (1975) 113)::
+
+    BIC = loss + q log(number of measurements)
+
+with q free parameters: Schwarz, *Ann. Statist.* 6 (1978) 461.
 """
 
 from __future__ import annotations
@@ -28,7 +37,8 @@ class Fit:
     names
         Free parameters (q,), the adapted ones first.
     values, covariance
-        Their values (q,) and covariance (q, q), each in its unit.
+        Their values (q,) and covariance (q, q), each in its unit: the part of (J'J + P^-1)^-1 that is theirs, with the
+        whitened derivatives J of the predictions and the prior covariance P of all unknowns.
     initial_state
         State at the first row (nx,).
     predicted
@@ -79,7 +89,7 @@ class Fit:
 def loss_of(
     problem: Problem, predicted: FloatArray, rows: BoolArray, noise: Noise | None = None
 ) -> tuple[float, Noise]:
-    """Minus two log-likelihood on some rows; with the noise model given, or fitted to these rows."""
+    """Minus two log-likelihood on some rows (see above); with the noise model given, or fitted to these rows."""
     weighted = (problem.measured - predicted) / problem.weights
     noise = noise or problem.noise(weighted, rows)
     e = noise.whiten(weighted)[rows]

@@ -64,21 +64,28 @@ class Noise:
         return white
 
     def stationary_std(self) -> FloatArray:
-        """Standard deviation of the noise itself (m,), from its spectrum."""
+        """Standard deviation of the noise itself (m,), from its spectrum.
+
+        With A(w) = 1 - sum_i a_i exp(-j w i)::
+
+            variance = s^2 / (2 pi) integral over [-pi, pi] of |A(w)|^-2 dw
+
+        Box & Jenkins, *Time Series Analysis* (1976), 3.2.
+        """
         omega = np.linspace(0, np.pi, 2048)
-        found = []
+        deviations = []
         for std, lags in zip(self.std, self.lags, strict=True):
             response = 1 - sum(a * np.exp(-1j * omega * (i + 1)) for i, a in enumerate(lags))
-            found.append(std * np.sqrt(np.mean(1 / np.abs(response) ** 2)))
-        return np.array(found)
+            deviations.append(std * np.sqrt(np.mean(1 / np.abs(response) ** 2)))
+        return np.array(deviations)
 
 
 def with_rows_before(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The rows (N,) that are true and those before them that whitening looks back to."""
-    found = rows.copy()
+    reached = rows.copy()
     for lag in range(1, MOST_LAGS + 1):
-        found[:-lag] |= rows[lag:]
-    return found
+        reached[:-lag] |= rows[lag:]
+    return reached
 
 
 def is_dense(series: FloatArray) -> bool:
@@ -94,25 +101,38 @@ def is_dense(series: FloatArray) -> bool:
 def noise_by_differences(series: FloatArray) -> FloatArray:
     """Standard deviation of the noise of each column (m,) of a series (N, m) that is else smooth: it needs no model.
 
-    From one row to the next, or, of an output that is measured more rarely, from one value to the next. Robust, unless
-    most differences are zero: a coarse resolution shows in the others only. NaN of fewer than two values.
+    ::
+
+        s = 1.4826 median |r_k - r_(k-1)| / sqrt(2)
+
+    From one row to the next, or, of an output that is measured more rarely, from one value to the next. Where most
+    differences are zero (a coarse resolution), their root mean square takes the place of the median. NaN of fewer than
+    two values. von Neumann, *Ann. Math. Statist.* 12 (1941) 367, with the median absolute deviation of Hampel,
+    *J. Am. Statist. Assoc.* 69 (1974) 383.
     """
-    found = []
+    deviations = []
     for r in series.T:
         d = np.diff(r)
         d = d[np.isfinite(d)]
         if len(d) < FEWEST_PAIRS:
             d = np.diff(r[np.isfinite(r)])
         if not d.size:
-            found.append(np.nan)
+            deviations.append(np.nan)
             continue
         robust = 1.4826 * float(np.median(np.abs(d)))
-        found.append((robust or float(np.sqrt(np.mean(d**2)))) / np.sqrt(2))
-    return np.array(found)
+        deviations.append((robust or float(np.sqrt(np.mean(d**2)))) / np.sqrt(2))
+    return np.array(deviations)
 
 
 def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
-    """Return the standard deviation of the finite entries, each counted up to CLIP of it (Huber's proposal 2)."""
+    """Return the standard deviation of the finite entries, each counted up to CLIP of it.
+
+    Solved by iteration for s, where z is standard normal::
+
+        mean of min((e / s)^2, CLIP^2) = E[min(z^2, CLIP^2)]
+
+    Huber's proposal 2: *Ann. Math. Statist.* 35 (1964) 73, section 8. Not `robust`: the root mean square.
+    """
     z = e[np.isfinite(e)]
     if z.size == 0:
         return float("nan")
@@ -138,8 +158,12 @@ def white_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray
 def fit_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray) -> Noise:
     """Noise model of a weighted residual (N, m), fitted on the rows (N,) that are true; NaN where missing.
 
-    The order of the autoregression (up to MOST_LAGS) is chosen per output by the Bayesian information criterion.
-    `floor` (m,) is the smallest standard deviation believed.
+    r_k = sum_i a_i r_(k-i) + e_k with e ~ N(0, s^2), by conditional least squares. The order p (up to MOST_LAGS) is
+    chosen per output by the Bayesian information criterion::
+
+        2 n log s_p + p log n
+
+    Schwarz, *Ann. Statist.* 6 (1978) 461. `floor` (m,) is the smallest standard deviation believed.
     """
     m = residual.shape[1]
     lags, std = np.zeros((m, MOST_LAGS)), np.zeros(m)
@@ -190,7 +214,10 @@ def _pulled(a: FloatArray, factor: float) -> FloatArray:
 
 
 def _memory(a: FloatArray) -> float:
-    """Standard deviation of an autoregression over that of its innovations; infinite when it is not stable."""
+    """Standard deviation of an autoregression over that of its innovations; infinite when it is not stable.
+
+    sqrt(sum_k h_k^2) with its impulse response h: Box & Jenkins (1976), 3.1.
+    """
     response = lfilter([1.0], np.concatenate([[1.0], -a]), IMPULSE)
     last = np.max(np.abs(response[-len(a) :]))
     if not last < DIED_AWAY and np.max(np.abs(np.roots(np.concatenate([[1.0], -a])))) >= 1:
@@ -199,26 +226,33 @@ def _memory(a: FloatArray) -> float:
 
 
 def correlation_times(series: FloatArray) -> FloatArray:
-    """Rows for each effective sample in each column (m,) of a series (N, m): 1 + 2 x the sum of autocorrelations.
+    """Rows for each effective sample in each column (m,) of a series (N, m): its integrated autocorrelation time.
 
-    Up to the first that is not positive: Sokal, *Monte Carlo methods in statistical mechanics* (1997), eq. (2.16), cut
-    at the first zero as by Geyer (1992).
+    With the autocorrelations rho, up to the lag K before the first that is not positive::
+
+        t = 1 + 2 sum_(k=1..K) rho_k,   effective sample size = N / t
+
+    Sokal, *Monte Carlo methods in statistical mechanics* (1997), eq. (2.16); the cut as by Geyer, *Statist. Sci.* 7
+    (1992) 473.
     """
-    found = []
+    times = []
     for r in series.T:
         rho = acf(r, nlags=len(r) // 4, fft=True, missing="conservative")[1:]
         below = np.flatnonzero(~(rho > 0))
-        found.append(max(1.0, 1 + 2 * float(np.sum(rho[: below[0] if below.size else len(rho)]))))
-    return np.array(found)
+        times.append(max(1.0, 1 + 2 * float(np.sum(rho[: below[0] if below.size else len(rho)]))))
+    return np.array(times)
 
 
 def without_spikes(residual: FloatArray) -> FloatArray:
-    """A residual (N, m) in which single values far from their neighbours are put in their midst (Hampel's filter).
+    """A residual (N, m) in which single values far from their neighbours are put in their midst.
+
+    v_k becomes the median m_k of SPIKE_WINDOW values around it where |v_k - m_k| > SPIKE 1.4826 median |v - m|:
+    Hampel's filter, Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782.
 
     What a model lacks changes from row to row by less than the noise; a spike in its place would be explained by
     whatever happens to fit it.
     """
-    found = residual.copy()
+    clean = residual.copy()
     for j in range(residual.shape[1]):
         r = residual[:, j]
         present = np.flatnonzero(np.isfinite(r))
@@ -228,14 +262,17 @@ def without_spikes(residual: FloatArray) -> FloatArray:
         middle = median_filter(v, SPIKE_WINDOW, mode="nearest")
         away = np.abs(v - middle)
         limit = SPIKE * 1.4826 * float(np.median(away))
-        found[present, j] = np.where(away > limit, middle, v) if limit > 0 else v
-    return found
+        clean[present, j] = np.where(away > limit, middle, v) if limit > 0 else v
+    return clean
 
 
 def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:
     """Weights (N, m): `|prediction|` over its mean where the noise grows with the value, else 1.
 
-    Judged on differences of the residual, in which slow model errors cancel, by the Gaussian likelihood.
+    Judged on differences d of the residual, in which slow model errors cancel, by minus two log-likelihood: with
+    w = |prediction| / mean, the noise is proportional where::
+
+        2 n log s(d / w) + 2 sum log w < 2 n log s(d) - 10
     """
     weights = np.ones_like(predicted)
     for j in range(predicted.shape[1]):

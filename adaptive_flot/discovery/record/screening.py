@@ -91,7 +91,10 @@ def _clean(y: FloatArray, name: str, edges: bool = False) -> list[str]:
     present = np.flatnonzero(np.isfinite(y))
     values = y[present]
     if len(values) < FEWEST_ROWS or np.ptp(values) == 0:
-        return [f"{name} is constant: left out"] if len(values) and np.ptp(values) == 0 and _blank(y) else []
+        if not len(values) or np.ptp(values) != 0:
+            return []
+        y[:] = np.nan
+        return [f"{name} is constant: left out"]
     frozen = _frozen(values)
     if edges:
         frozen = np.logical_and(frozen, (values < values.max()) & (values > values.min()))
@@ -110,26 +113,26 @@ def _clean(y: FloatArray, name: str, edges: bool = False) -> list[str]:
     values = y[np.isfinite(y)]
     storm = _outliers(values)
     if storm > OUTLIER_SHARE:
-        _blank(y)
+        y[:] = np.nan
         notes.append(f"{name}: an outlier storm ({100 * storm:.0f} % of the samples), left out")
     return notes
 
 
 def _outliers(values: FloatArray) -> float:
-    """Share of samples far from the median of their neighbours (Hampel's filter).
+    """Share of samples far from the median m of their neighbours (Hampel's filter).
+
+    With the quantile 0.25 of |y - m| over that of a standard normal variable as the noise s::
+
+        |y - m| > max(8 s, quantile 0.9 of m - quantile 0.1 of m)
 
     Far is more than eight times the noise and more than what the signal itself does: fits bear smaller ones. The noise
-    is judged by the quietest quarter of the deviations, since in a storm their median is wild.
+    is judged by the quietest quarter of the deviations, since in a storm their median is wild. Davies & Gather, *J. Am.
+    Statist. Assoc.* 88 (1993) 782.
     """
     middle = median_filter(values, NEIGHBOURS, mode="nearest")
     away = np.abs(values - middle)
     noise = float(np.quantile(away, 0.25)) / QUARTER
     return float(np.mean(away > max(8 * noise, float(np.quantile(middle, 0.9) - np.quantile(middle, 0.1)))))
-
-
-def _blank(y: FloatArray) -> bool:
-    y[:] = np.nan
-    return True
 
 
 def _frozen(values: FloatArray) -> BoolArray:

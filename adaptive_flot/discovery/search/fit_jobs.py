@@ -133,7 +133,11 @@ def unbent(constant: FittedJob, ended: list[FittedJob], scorer: Scorer) -> list[
 
 
 def _bend(fit: Fit, effect: Effect) -> float:
-    """How much minus two log-likelihood would rise if the dependence were flat, to second order (Wald's test)."""
+    """How much minus two log-likelihood would rise if the dependence were flat, to second order.
+
+    With the coefficients v that are zero where it is flat (of a curve, the differences of its values) and their
+    covariance C: v' C^-1 v, Wald's statistic, *Trans. Am. Math. Soc.* 54 (1943) 426.
+    """
     names = map(effect.parameter, effect.names(CoefficientRole.KNOT_VALUE, CoefficientRole.SLOPE))
     where = [fit.names.index(n) for n in names if n in fit.names]
     values, covariance = fit.values[where], fit.covariance[np.ix_(where, where)]

@@ -165,7 +165,11 @@ def correlation_time(problem: Problem, fit: Fit) -> float:
 
 
 def discount(problem: Problem, fit: Fit, rows: float) -> Fit:
-    """The same fit with evidence counted once every `rows` rows."""
+    """The same fit with evidence counted once every `rows` rows: its criterion is that of the effective samples.
+
+    BIC = loss / rows + q log(N / rows), with N measurements and q parameters. N / rows is the effective sample size of
+    correlated errors (see `correlation_times`).
+    """
     count = max(problem.count(problem.rows("estimate")) / rows, 2.0)
     return replace(fit, bic=float(fit.loss / rows + len(fit.names) * np.log(count)))
 
@@ -180,7 +184,11 @@ def discounted(problem: Problem, base: Fit, alternatives: list[Alternative], row
 
 
 def cross_validated(problem: Problem, fit: Fit, processes: int) -> Fit:
-    """The same fit, with each block predicted by a fit that did not see it."""
+    """The same fit, with each of FOLDS blocks of neighbouring rows predicted by a fit that did not see it.
+
+    Cross-validation: Stone, *J. R. Statist. Soc. B* 36 (1974) 111; by blocks, as rows depend on one another: Burman,
+    Chow & Nolan, *Biometrika* 81 (1994) 351.
+    """
     rows = np.flatnonzero(problem.rows("estimate"))
     blocks = np.array_split(rows, FOLDS)
 

@@ -125,7 +125,11 @@ def _better(problem: Problem, base: Fit, joint: Fit, found: SearchResult, rows_p
 
 
 def _left(problem: Problem, fit: Fit, rows_per_effective_sample: float) -> float:
-    """First-order gain that one more effect would bring, in terms of what the fit leaves, by effective samples."""
+    """First-order gain that one more effect would bring, in terms of what the fit leaves, by effective samples.
+
+    With the share R^2 of the squared residual that the best candidate explains, N measurements and t rows an effective
+    sample: -(N / t) log(1 - R^2), the likelihood ratio of a regression with its noise estimated.
+    """
     scorer, _ = scorer_of(problem, fit)
     gain, _ = what_is_left(scorer, LEAST_EVIDENCE)
     explained = min(gain / max(float(np.sum(scorer.residual**2)), 1e-300), 0.99)

@@ -128,7 +128,11 @@ def scorer_of(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
 
 
 def threshold_of(scorer: Scorer) -> float:
-    """Penalised score that noise alone passes once in a hundred records."""
+    """Penalised score that noise alone passes once in a hundred records: a quantile of `Scorer.null_gains`.
+
+    At least LEAST_EVIDENCE: a difference of 10 in BIC is "very strong" evidence (Kass & Raftery, *J. Am. Statist.
+    Assoc.* 90 (1995) 773).
+    """
     return max(LEAST_EVIDENCE, float(np.quantile(scorer.null_gains(NULL_DRAWS, seed=0), NULL_QUANTILE)))
 
 
@@ -192,7 +196,11 @@ def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None
 
 
 def better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:
-    """Whether the best alternative of a round brings evidence and, as a further effect, substance."""
+    """Whether the best alternative of a round brings evidence and, as a further effect, substance.
+
+    Evidence: its BIC is lower by the round's threshold. Substance: it removes more than SUBSTANCE of the excess error
+    (see `_excess`) of the model as it is.
+    """
     if not found.alternatives:
         return False
     best, reference = found.alternatives[0], before.fit if before else base
@@ -202,7 +210,14 @@ def better(problem: Problem, base: Fit, before: Alternative | None, found: Round
 
 
 def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
-    """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit."""
+    """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit.
+
+    ::
+
+        mean of (r / s)^2 - mean of (r_better / s)^2
+
+    with residuals r, and the standard deviation s of the better fit's noise.
+    """
     rows = problem.rows("estimate")
     size = problem.weights * better.noise.stationary_std()
     old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2) for f in (fit, better))

@@ -1,5 +1,9 @@
 """Successive halving: refit the best-scored candidates in two rungs, each with its own noise model, and rank them.
 
+All candidates get a small budget (FIRST_STEPS), the best of them the whole one: Jamieson & Talwalkar, *Non-stochastic
+best arm identification and hyperparameter optimization*, AISTATS (2016). Here with two rungs, and with as many in the
+second as come near the best (`_finalists`) instead of a half.
+
 First all of them in their best form with a few steps, then the finalists in several forms to the end; last, what only a
 finished fit can start: events in time, and the constant that a dependence may have come to.
 """

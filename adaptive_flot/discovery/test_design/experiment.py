@@ -31,6 +31,13 @@ def plan_experiment(
 ) -> Experiment | None:
     """Choose among steps, square waves and binary sequences the test that separates the leading alternatives best.
 
+    ::
+
+        max over tests u of min over pairs (a, b) of separation(a, b; u)
+
+    A T-optimal design, with the parameters as they were fitted: Atkinson & Fedorov, *Biometrika* 62 (1975) 57 (two
+    models) and 289 (several). `separation` also counts what uncertain parameters could hide.
+
     Parameters
     ----------
     problem

@@ -116,7 +116,10 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
 
 
 def _spread(gradient: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Standard deviation (K,) of values with the derivatives (K, q)."""
+    """Standard deviation (K,) of values with the derivatives G (K, q) by coefficients of covariance C (q, q).
+
+    sqrt(diag(G C G')): the delta method (Rao, *Linear Statistical Inference*, 2nd ed., 6a.2).
+    """
     found: FloatArray = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0))
     return found
 

@@ -21,9 +21,13 @@ MOST_RIVALS = 5
 def judge(found: SearchResult) -> Judgement:
     """Turn the ranked alternatives into a word.
 
-    The margin of a name is what noise can give (10 times the rows of an effective sample) or, if larger, what the best
-    alternative itself still leaves unexplained: an alternative that is worse by less than the best one's
-    own shortcoming is not told apart from it.
+    The margin of a name, with t rows an effective sample, and what the best alternative leaves unexplained::
+
+        margin = max(LEAST_MARGIN t, left - left_threshold)
+
+    An alternative is near the best where its BIC is worse by less than max(margin, SURE sd), with the standard
+    deviation of the difference of their log-likelihoods (see `loglik_difference_sds`). So an alternative that is worse
+    by less than the best one's own shortcoming is not told apart from it.
     """
     if not found.alternatives:
         return Judgement("none", None, (), (), LEAST_MARGIN)
