@@ -21,7 +21,7 @@ score statistic            candidates/score_test.py   Scorer
 null law of the search     candidates/score_test.py   Scorer.null_gains
 likelihood, BIC            fitting/fit.py             loss_of, Fit.bic
 noise model                record/noise.py            fit_noise
-effective sample size      record/noise.py            correlation_times
+effective sample size      record/effective_samples.py  correlation_times
 Ljung-Box, Holm            assessment/detect.py       detect
 block bootstrap            assessment/verification.py verify
 sd of a loglik difference  assessment/verification.py loglik_difference_sds

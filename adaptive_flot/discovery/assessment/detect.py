@@ -16,8 +16,9 @@ from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.stats.multitest import multipletests
 
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.record.noise import correlation_times, without_spikes
+from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.robust import without_spikes
 from adaptive_flot.discovery.results import Detection, Symptom
 from adaptive_flot.greybox.model import FloatArray
 

@@ -9,7 +9,7 @@ from scipy.stats import bootstrap
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from adaptive_flot.discovery.fitting.fit import Fit, row_losses
-from adaptive_flot.discovery.record.noise import correlation_times
+from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.discovery.results import OutputChange, Verification
 from adaptive_flot.greybox.model import FloatArray

@@ -26,8 +26,9 @@ from adaptive_flot.discovery.candidates.catalogue import ONSETS, Candidate, even
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.record.noise import CLIP, Noise, noise_by_differences, with_rows_before, without_spikes
+from adaptive_flot.discovery.record.noise import Noise, with_rows_before
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.robust import CLIP, noise_by_differences, without_spikes
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
-from adaptive_flot.discovery.record.noise import Noise, noise_by_differences
+from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 

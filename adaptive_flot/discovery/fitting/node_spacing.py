@@ -11,8 +11,8 @@ import numpy as np
 from adaptive_flot.discovery.fitting.descent import is_smooth
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.record.noise import noise_by_differences
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps

@@ -2,7 +2,9 @@
 
 Map
 ---
-screening.py  What in a record can not be used, said before anything is fitted.
-problem.py    Rows in splits, measured outputs, unknowns that are no effect.
-noise.py      What the noise of each output looks like.
+screening.py          What in a record can not be used, said before anything is fitted.
+problem.py            Rows in splits, measured outputs, unknowns that are no effect.
+noise.py              What the noise of each output looks like.
+robust.py             Spread without outliers, noise without a model, spikes.
+effective_samples.py  How many rows of a correlated series count as one sample.
 """

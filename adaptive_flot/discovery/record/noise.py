@@ -10,16 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 from scipy.signal import lfilter
-from statsmodels.tsa.stattools import acf
 
+from adaptive_flot.discovery.record.robust import CLIP, FEWEST_PAIRS, clipped_std
 from adaptive_flot.greybox.model import FloatArray
 
-CLIP = 3.0
-"""Innovations count up to this many standard deviations (Huber): an outlier does not steer a fit."""
-_CLIPPED_VARIANCE = 0.99503
-"""E[min(z^2, CLIP^2)] of a standard normal z."""
 MOST_LAGS = 3
 IMPULSE = np.eye(1, 501)[0]
 DIED_AWAY = 1e-12
@@ -27,10 +22,6 @@ DIED_AWAY = 1e-12
 MEMORY = 2.0
 """Noise is at most this many times as large as its innovations: what is slower and smoother is no measurement noise but
 physics that is missing, and a noise model that may be as slow as it likes would explain it away."""
-SPIKE, SPIKE_WINDOW = 6.0, 5
-"""A spike is further from the median of so many neighbours than so many standard deviations of such distances."""
-FEWEST_PAIRS = 200
-"""Consecutive measured pairs that an autoregressive noise model asks for; a sparse assay has white noise."""
 
 
 @dataclass(frozen=True)
@@ -96,57 +87,6 @@ def is_dense(series: FloatArray) -> bool:
         after &= present[MOST_LAGS - lag : len(present) - lag]
     pairs = int(after.sum())
     return pairs >= FEWEST_PAIRS and pairs > 0.5 * int(present.sum())
-
-
-def noise_by_differences(series: FloatArray) -> FloatArray:
-    """Standard deviation of the noise of each column (m,) of a series (N, m) that is else smooth: it needs no model.
-
-    ::
-
-        s = 1.4826 median |r_k - r_(k-1)| / sqrt(2)
-
-    From one row to the next, or, of an output that is measured more rarely, from one value to the next. Where most
-    differences are zero (a coarse resolution), their root mean square takes the place of the median. NaN of fewer than
-    two values. von Neumann, *Ann. Math. Statist.* 12 (1941) 367, with the median absolute deviation of Hampel,
-    *J. Am. Statist. Assoc.* 69 (1974) 383.
-    """
-    deviations = []
-    for r in series.T:
-        d = np.diff(r)
-        d = d[np.isfinite(d)]
-        if len(d) < FEWEST_PAIRS:
-            d = np.diff(r[np.isfinite(r)])
-        if not d.size:
-            deviations.append(np.nan)
-            continue
-        robust = 1.4826 * float(np.median(np.abs(d)))
-        deviations.append((robust or float(np.sqrt(np.mean(d**2)))) / np.sqrt(2))
-    return np.array(deviations)
-
-
-def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
-    """Return the standard deviation of the finite entries, each counted up to CLIP of it.
-
-    Solved by iteration for s, where z is standard normal::
-
-        mean of min((e / s)^2, CLIP^2) = E[min(z^2, CLIP^2)]
-
-    Huber's proposal 2: *Ann. Math. Statist.* 35 (1964) 73, section 8. Not `robust`: the root mean square.
-    """
-    z = e[np.isfinite(e)]
-    if z.size == 0:
-        return float("nan")
-    if not robust:
-        return float(np.sqrt(np.mean(z**2)))
-    std = 1.4826 * float(np.median(np.abs(z))) or float(np.sqrt(np.mean(z**2)))
-    for _ in range(30):
-        if std <= 0:
-            return 0.0
-        new = std * float(np.sqrt(np.mean(np.minimum((z / std) ** 2, CLIP**2)) / _CLIPPED_VARIANCE))
-        if abs(new - std) < 1e-6 * std:
-            return new
-        std = new
-    return std
 
 
 def white_noise(residual: FloatArray, rows: NDArray[np.bool_], floor: FloatArray) -> Noise:
@@ -223,47 +163,6 @@ def _memory(a: FloatArray) -> float:
     if not last < DIED_AWAY and np.max(np.abs(np.roots(np.concatenate([[1.0], -a])))) >= 1:
         return float("inf")
     return float(np.sqrt(np.sum(response**2)))
-
-
-def correlation_times(series: FloatArray) -> FloatArray:
-    """Rows for each effective sample in each column (m,) of a series (N, m): its integrated autocorrelation time.
-
-    With the autocorrelations rho, up to the lag K before the first that is not positive::
-
-        t = 1 + 2 sum_(k=1..K) rho_k,   effective sample size = N / t
-
-    Sokal, *Monte Carlo methods in statistical mechanics* (1997), eq. (2.16); the cut as by Geyer, *Statist. Sci.* 7
-    (1992) 473.
-    """
-    times = []
-    for r in series.T:
-        rho = acf(r, nlags=len(r) // 4, fft=True, missing="conservative")[1:]
-        below = np.flatnonzero(~(rho > 0))
-        times.append(max(1.0, 1 + 2 * float(np.sum(rho[: below[0] if below.size else len(rho)]))))
-    return np.array(times)
-
-
-def without_spikes(residual: FloatArray) -> FloatArray:
-    """A residual (N, m) in which single values far from their neighbours are put in their midst.
-
-    v_k becomes the median m_k of SPIKE_WINDOW values around it where |v_k - m_k| > SPIKE 1.4826 median |v - m|:
-    Hampel's filter, Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782.
-
-    What a model lacks changes from row to row by less than the noise; a spike in its place would be explained by
-    whatever happens to fit it.
-    """
-    clean = residual.copy()
-    for j in range(residual.shape[1]):
-        r = residual[:, j]
-        present = np.flatnonzero(np.isfinite(r))
-        if len(present) < SPIKE_WINDOW:
-            continue
-        v = r[present]
-        middle = median_filter(v, SPIKE_WINDOW, mode="nearest")
-        away = np.abs(v - middle)
-        limit = SPIKE * 1.4826 * float(np.median(away))
-        clean[present, j] = np.where(away > limit, middle, v) if limit > 0 else v
-    return clean
 
 
 def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:

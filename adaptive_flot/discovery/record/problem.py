@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from adaptive_flot.discovery.record.noise import CLIP, Noise, fit_noise, white_noise
+from adaptive_flot.discovery.record.noise import Noise, fit_noise, white_noise
+from adaptive_flot.discovery.record.robust import CLIP
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.nodes import Nodes

@@ -13,7 +13,7 @@ from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.record.noise import correlation_times
+from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.alternatives import fixed_coefficients, limited, shape_bounds

@@ -14,8 +14,8 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.record.noise import noise_by_differences
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Round, SearchResult
 from adaptive_flot.discovery.search.joint_fits import (
     LAST_STEPS,

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.record.noise import noise_by_differences
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.greybox.model import FloatArray, Model
 

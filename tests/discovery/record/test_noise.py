@@ -8,16 +8,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.record.noise import (
-    MEMORY,
-    Noise,
-    _memory,
-    clipped_std,
-    correlation_times,
-    fit_noise,
-    proportional,
-    without_spikes,
-)
+from adaptive_flot.discovery.record.effective_samples import correlation_times
+from adaptive_flot.discovery.record.noise import MEMORY, Noise, _memory, fit_noise, proportional
+from adaptive_flot.discovery.record.robust import clipped_std, without_spikes
 
 ROWS = np.ones(3000, dtype=bool)
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.record.noise import MOST_LAGS, Noise, is_dense, noise_by_differences
+from adaptive_flot.discovery.record.noise import MOST_LAGS, Noise, is_dense
+from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope

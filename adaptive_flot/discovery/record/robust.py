@@ -1,0 +1,91 @@
+"""Robust statistics of a series: spread without outliers, noise without a model, spikes."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from adaptive_flot.greybox.model import FloatArray
+
+CLIP = 3.0
+"""Innovations count up to this many standard deviations (Huber): an outlier does not steer a fit."""
+_CLIPPED_VARIANCE = 0.99503
+"""E[min(z^2, CLIP^2)] of a standard normal z."""
+SPIKE, SPIKE_WINDOW = 6.0, 5
+"""A spike is further from the median of so many neighbours than so many standard deviations of such distances."""
+FEWEST_PAIRS = 200
+"""Consecutive measured pairs that an autoregressive noise model asks for; a sparse assay has white noise."""
+
+
+def noise_by_differences(series: FloatArray) -> FloatArray:
+    """Standard deviation of the noise of each column (m,) of a series (N, m) that is else smooth: it needs no model.
+
+    ::
+
+        s = 1.4826 median |r_k - r_(k-1)| / sqrt(2)
+
+    From one row to the next, or, of an output that is measured more rarely, from one value to the next. Where most
+    differences are zero (a coarse resolution), their root mean square takes the place of the median. NaN of fewer than
+    two values. von Neumann, *Ann. Math. Statist.* 12 (1941) 367, with the median absolute deviation of Hampel,
+    *J. Am. Statist. Assoc.* 69 (1974) 383.
+    """
+    deviations = []
+    for r in series.T:
+        d = np.diff(r)
+        d = d[np.isfinite(d)]
+        if len(d) < FEWEST_PAIRS:
+            d = np.diff(r[np.isfinite(r)])
+        if not d.size:
+            deviations.append(np.nan)
+            continue
+        robust = 1.4826 * float(np.median(np.abs(d)))
+        deviations.append((robust or float(np.sqrt(np.mean(d**2)))) / np.sqrt(2))
+    return np.array(deviations)
+
+
+def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
+    """Return the standard deviation of the finite entries, each counted up to CLIP of it.
+
+    Solved by iteration for s, where z is standard normal::
+
+        mean of min((e / s)^2, CLIP^2) = E[min(z^2, CLIP^2)]
+
+    Huber's proposal 2: *Ann. Math. Statist.* 35 (1964) 73, section 8. Not `robust`: the root mean square.
+    """
+    z = e[np.isfinite(e)]
+    if z.size == 0:
+        return float("nan")
+    if not robust:
+        return float(np.sqrt(np.mean(z**2)))
+    std = 1.4826 * float(np.median(np.abs(z))) or float(np.sqrt(np.mean(z**2)))
+    for _ in range(30):
+        if std <= 0:
+            return 0.0
+        new = std * float(np.sqrt(np.mean(np.minimum((z / std) ** 2, CLIP**2)) / _CLIPPED_VARIANCE))
+        if abs(new - std) < 1e-6 * std:
+            return new
+        std = new
+    return std
+
+
+def without_spikes(residual: FloatArray) -> FloatArray:
+    """A residual (N, m) in which single values far from their neighbours are put in their midst.
+
+    v_k becomes the median m_k of SPIKE_WINDOW values around it where |v_k - m_k| > SPIKE 1.4826 median |v - m|:
+    Hampel's filter, Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782.
+
+    What a model lacks changes from row to row by less than the noise; a spike in its place would be explained by
+    whatever happens to fit it.
+    """
+    clean = residual.copy()
+    for j in range(residual.shape[1]):
+        r = residual[:, j]
+        present = np.flatnonzero(np.isfinite(r))
+        if len(present) < SPIKE_WINDOW:
+            continue
+        v = r[present]
+        middle = median_filter(v, SPIKE_WINDOW, mode="nearest")
+        away = np.abs(v - middle)
+        limit = SPIKE * 1.4826 * float(np.median(away))
+        clean[present, j] = np.where(away > limit, middle, v) if limit > 0 else v
+    return clean
