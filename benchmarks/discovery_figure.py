@@ -23,10 +23,10 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.report.kit import style
 from adaptive_flot.runner.commands.discover import discover_file
-from benchmarks.hidden_effects.constants import CELL_HEIGHT
-from benchmarks.hidden_effects.curves import STATIC
-from benchmarks.hidden_effects.generate import record_file, write_record
-from benchmarks.hidden_effects.record import make_record
+from benchmarks.hidden_effects.cell.constants import CELL_HEIGHT
+from benchmarks.hidden_effects.effects.curves import STATIC
+from benchmarks.hidden_effects.generate.folder import record_file, write_record
+from benchmarks.hidden_effects.generate.record import make_record
 
 SEED, RECORD = 1, 32
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "discovery.png"

@@ -24,7 +24,7 @@ SHARED = Path(__file__).parents[1].parent / "shared"
 
 
 @dataclass(frozen=True)
-class Case:
+class MeasuredRecord:
     """A record, the model to judge it with, and the right answer where there is one."""
 
     name: str
@@ -42,31 +42,33 @@ class Case:
         return "yes" if right and verdict.word == self.answer else "no"
 
 
-def cases(folder: Path) -> Iterator[Case]:
+def records(folder: Path) -> Iterator[MeasuredRecord]:
     """Everything the folder holds."""
     answers = folder / "examples" / "answers.json"
     for name, answer in json.loads(answers.read_text()).items() if answers.is_file() else ():
         right = {(s, d) for s in answer.get("site", ()) for d in answer.get("driver", ())}
-        yield Case(name, folder / "examples" / f"{name}.csv", "flotation", answer["verdict"], frozenset(right))
+        yield MeasuredRecord(
+            name, folder / "examples" / f"{name}.csv", "flotation", answer["verdict"], frozenset(right)
+        )
     data = folder / "data"
-    yield Case("zinc cell", data / "flotation-cell-zinc" / "flotation-cell.csv", "zinc-level", "insufficient")
-    yield Case("cascaded tanks", data / "cascaded-tanks" / "dataBenchmark.csv", "cascaded-tanks", "")
+    yield MeasuredRecord("zinc cell", data / "flotation-cell-zinc" / "flotation-cell.csv", "zinc-level", "insufficient")
+    yield MeasuredRecord("cascaded tanks", data / "cascaded-tanks" / "dataBenchmark.csv", "cascaded-tanks", "")
 
 
 def main(folder: Path) -> int:
     """Judge and print; 2 where there is nothing to judge."""
-    found = [case for case in cases(folder) if case.path.is_file()]
+    found = [record for record in records(folder) if record.path.is_file()]
     if not found:
         print(f"{folder}: no examples/ and no data/ there; give their folder: python -m benchmarks.measured FOLDER")
         return 2
     table = Table("record", "verdict", "effects", "first output: before -> after (noise)", "ok", "s", show_lines=True)
     console = Console(width=None if Console().is_terminal else 150)
-    for case in found:
-        v = discover_file(case.path, make_model(case.model), processes=available_processes()).verdict
-        console.print(f"{case.name}: {v.reason}", highlight=False, markup=False)
+    for record in found:
+        v = discover_file(record.path, make_model(record.model), processes=available_processes()).verdict
+        console.print(f"{record.name}: {v.reason}", highlight=False, markup=False)
         effects = "; ".join(f"{e.effect.site} by {e.effect.driver}" for e in v.effects)
         error = next((f"{c.before:.4g} -> {c.after:.4g} ({c.noise:.2g}) {c.unit}" for c in v.error), "")
-        table.add_row(case.name, v.word, effects, error, case.judge(v), f"{v.seconds:.0f}")
+        table.add_row(record.name, v.word, effects, error, record.judge(v), f"{v.seconds:.0f}")
     console.print(table)
     return 0
 

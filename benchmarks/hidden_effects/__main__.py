@@ -36,7 +36,7 @@ def generate(
     jobs: Jobs = 2,
 ) -> None:
     """Write records and answers."""
-    from benchmarks.hidden_effects.generate import generate as write
+    from benchmarks.hidden_effects.generate.folder import generate as write
 
     with progress() as bar:
         task = bar.add_task("records", total=count)
@@ -55,9 +55,9 @@ def score(
     json: Annotated[Path | None, typer.Option(help="Write the summary here too.")] = None,
 ) -> None:
     """Run a discover command (default: adaptive-flot discover) on every record and print how often it is right."""
-    from benchmarks.hidden_effects.generate import load_answers
-    from benchmarks.hidden_effects.run import run_command, run_method
-    from benchmarks.hidden_effects.score import discover_command, finish, method_command
+    from benchmarks.hidden_effects.generate.folder import load_answers
+    from benchmarks.hidden_effects.score.commands import run_command, run_method
+    from benchmarks.hidden_effects.score.figures import discover_command, finish, method_command
 
     template = method_command(method) if method else (command or discover_command())
     total = len(load_answers(folder, count))
@@ -97,7 +97,7 @@ def table(
     count: Annotated[int | None, typer.Option(min=1, help="Only the first records.")] = None,
 ) -> None:
     """Print every run on these records side by side."""
-    from benchmarks.hidden_effects.score import side_by_side
+    from benchmarks.hidden_effects.score.figures import side_by_side
 
     side_by_side(folder, count)
 

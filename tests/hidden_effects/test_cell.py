@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects.cell import World
-from benchmarks.hidden_effects.simulate import replay, steady_state
-from benchmarks.hidden_effects.sites import INPUTS, OUTPUTS
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.equations import World
+from benchmarks.hidden_effects.cell.simulate import replay, steady_state
+from benchmarks.hidden_effects.cell.sites import INPUTS, OUTPUTS
 
 PACKAGE = Path(c.__file__).parent
 

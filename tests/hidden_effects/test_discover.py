@@ -14,10 +14,10 @@ import pytest
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.greybox.data.dataset import read_dataset
 from adaptive_flot.processes import flotation
-from benchmarks.hidden_effects.generate import record_file, write_record
-from benchmarks.hidden_effects.outcome import classify
-from benchmarks.hidden_effects.record import make_record
-from benchmarks.hidden_effects.verdict import Verdict
+from benchmarks.hidden_effects.generate.folder import record_file, write_record
+from benchmarks.hidden_effects.generate.record import make_record
+from benchmarks.hidden_effects.score.outcome import classify
+from benchmarks.hidden_effects.score.verdict import SubmittedVerdict
 
 SEED = 11
 
@@ -38,7 +38,7 @@ def test_a_record_is_judged_as_its_answer_says(k: int, category: str, outcomes: 
     model = flotation.make_model()
     found = discover(model, read_dataset(record_file(tmp_path, record.name), model)).verdict
     told = json.loads(json.dumps(found.as_dict()))
-    outcome = classify(record.answer.as_dict(), Verdict.model_validate(told))
+    outcome = classify(record.answer.as_dict(), SubmittedVerdict.model_validate(told))
     assert outcome in outcomes, (found.word, [e.effect.label for e in found.effects], record.answer.effects)
     if found.effects:
         grade = told["error"]["concentrate_grade"]
@@ -56,5 +56,5 @@ def test_a_record_may_start_anywhere_and_lose_a_sensor(tmp_path: Path) -> None:
     model = flotation.make_model()
     found = discover(model, read_dataset(record_file(tmp_path, record.name), model)).verdict
     assert any("air_recovery" in note and "frozen" in note for note in found.notes)
-    told = Verdict.model_validate(json.loads(json.dumps(found.as_dict())))
+    told = SubmittedVerdict.model_validate(json.loads(json.dumps(found.as_dict())))
     assert classify(record.answer.as_dict(), told) in ("right", "right_class", "abstained")

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.hidden_effects.catalogue import CATALOGUE, equivalents
-from benchmarks.hidden_effects.draw import draw_effect, draw_experiment
-from benchmarks.hidden_effects.experiment import Experiment, Run, run
-from benchmarks.hidden_effects.sensors import Fault, SensorEffect
-from benchmarks.hidden_effects.sites import DRIVERS, LISTED_SITES, OUTPUTS
-from benchmarks.hidden_effects.sizing import measure
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell.sites import DRIVERS, LISTED_SITES, OUTPUTS
+from benchmarks.hidden_effects.effects.catalogue import CATALOGUE, equivalents
+from benchmarks.hidden_effects.effects.spec import Spec
+from benchmarks.hidden_effects.generate.draw import draw_effect, draw_experiment
+from benchmarks.hidden_effects.generate.sizing import measure
+from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun, run
+from benchmarks.hidden_effects.plant.sensors import Fault, SensorEffect
 
 
 def _experiment(rows: int, seed: int = 5) -> Experiment:
@@ -27,12 +27,12 @@ def short() -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def pilot(short: Experiment) -> Run:
+def pilot(short: Experiment) -> SimulatedRun:
     return run(short)
 
 
 @pytest.mark.parametrize("site", LISTED_SITES)
-def test_effects_of_size_zero_are_the_nominal_cell(site: str, short: Experiment, pilot: Run) -> None:
+def test_effects_of_size_zero_are_the_nominal_cell(site: str, short: Experiment, pilot: SimulatedRun) -> None:
     """All effects at a site, at amplitude 0, leave every output as it is (to the integrator's tolerance)."""
     rng = np.random.default_rng(1)
     specs = [replace(draw_effect(rng, e, pilot), amplitude=0.0) for e in CATALOGUE if e.site == site]
@@ -65,7 +65,7 @@ def test_a_constant_change_of_C_is_no_effect() -> None:
     assert sized.removable["concentrate_grade"] < 0.1 * sized.raw["concentrate_grade"]
 
 
-def test_level_and_froth_depth_are_one_driver(short: Experiment, pilot: Run) -> None:
+def test_level_and_froth_depth_are_one_driver(short: Experiment, pilot: SimulatedRun) -> None:
     """The mirrored curve over the level gives the same record: naming either is right."""
     low, high = 0.05, 0.15
     depth = Spec("entrainment", "froth_depth", "logistic", 0.4, {"middle": 0.4, "width": 0.1}, low, high, 0.5)

@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.errors import DataError
-from benchmarks.hidden_effects import schedule
-from benchmarks.hidden_effects.answer import VERDICTS
-from benchmarks.hidden_effects.catalogue import CATALOGUE
-from benchmarks.hidden_effects.generate import answer_file, generate, record_file
-from benchmarks.hidden_effects.record import BIN, make_record
-from benchmarks.hidden_effects.sites import INPUTS, OUTPUTS
+from benchmarks.hidden_effects.cell.sites import INPUTS, OUTPUTS
+from benchmarks.hidden_effects.effects.catalogue import CATALOGUE
+from benchmarks.hidden_effects.generate import schedule
+from benchmarks.hidden_effects.generate.folder import answer_file, generate, record_file
+from benchmarks.hidden_effects.generate.ground_truth import VERDICTS
+from benchmarks.hidden_effects.generate.record import BIN, make_record
 
 
 @pytest.fixture(scope="module")

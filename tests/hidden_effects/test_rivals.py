@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.errors import DataError
-from benchmarks.hidden_effects.generate import answer_file, generate, load_answers, record_file
-from benchmarks.hidden_effects.outcome import classify
-from benchmarks.hidden_effects.results import removed_share
+from benchmarks.hidden_effects.generate.folder import answer_file, generate, load_answers, record_file
 from benchmarks.hidden_effects.rivals import RIVALS, bic, correlation, drift, judge, spline
 from benchmarks.hidden_effects.rivals.base import Prepared
-from benchmarks.hidden_effects.run import run_method
-from benchmarks.hidden_effects.verdict import Verdict, read_verdict
+from benchmarks.hidden_effects.score.commands import run_method
+from benchmarks.hidden_effects.score.outcome import classify
+from benchmarks.hidden_effects.score.results import removed_share
+from benchmarks.hidden_effects.score.verdict import SubmittedVerdict, read_verdict
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def test_with_the_term_of_the_answer_all_removable_error_goes(folder: Path, tmp_
     out = tmp_path / "v.json"
     judge("oracle", record_file(folder, "record_0000"), out, answer_file(folder, "record_0000"))
     verdict, answer = read_verdict(out), load_answers(folder)["record_0000"]
-    assert isinstance(verdict, Verdict)
+    assert isinstance(verdict, SubmittedVerdict)
     assert classify(answer, verdict) == "right"
     assert removed_share(answer, verdict) > 0.97
 
@@ -43,7 +43,7 @@ def test_a_rival_judges_a_file(folder: Path, tmp_path: Path) -> None:
     pd.read_csv(record_file(folder, "record_0000")).iloc[:1400].to_csv(record, index=False)
     judge("correlation", record, out)
     verdict = read_verdict(out)
-    assert isinstance(verdict, Verdict)
+    assert isinstance(verdict, SubmittedVerdict)
     level = verdict.error["level_m"]
     std = load_answers(folder)["record_0000"]["noise"]["std"]["level_m"]
     assert level.before == pytest.approx(std, rel=0.3)
@@ -67,7 +67,7 @@ def test_rivals_judge_a_folder_and_no_failure_stops_the_rest(folder: Path, tmp_p
     assert "Error" in (verdicts / "record_0001.log").read_text()
     judge("correlation", record_file(tmp_path, "record_0000"), tmp_path / "alone.json")
     one, other = read_verdict(verdicts / "record_0000.json"), read_verdict(tmp_path / "alone.json")
-    assert isinstance(one, Verdict) and isinstance(other, Verdict)
+    assert isinstance(one, SubmittedVerdict) and isinstance(other, SubmittedVerdict)
     assert one.model_copy(update={"seconds": other.seconds}) == other
     record_file(tmp_path, "record_0000").unlink()
     run_method(tmp_path, "correlation", "mine", "the command", jobs=2)  # nothing is left to do
@@ -84,7 +84,7 @@ def test_an_estimate_that_only_drifts_waits_for_no_responses(folder: Path, tmp_p
     for name, kept in (("drift", ["short.fit.pickle"]), ("bic", ["short.fit.pickle", "short.responses.pickle"])):
         judge(name, record, tmp_path / "v.json")
         assert sorted(file.name for file in (tmp_path / "cache").iterdir()) == kept
-        assert isinstance(read_verdict(tmp_path / "v.json"), Verdict)
+        assert isinstance(read_verdict(tmp_path / "v.json"), SubmittedVerdict)
 
 
 def test_the_oracle_needs_the_answer(tmp_path: Path) -> None:

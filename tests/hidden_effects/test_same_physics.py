@@ -15,10 +15,10 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation import make_model
-from benchmarks.hidden_effects.draw import draw_experiment
-from benchmarks.hidden_effects.experiment import Experiment, Run, run
-from benchmarks.hidden_effects.sites import OUTPUTS
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell.sites import OUTPUTS
+from benchmarks.hidden_effects.effects.spec import Spec
+from benchmarks.hidden_effects.generate.draw import draw_experiment
+from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun, run
 
 COLUMNS = {
     "concentrate_grade": "concentrate_grade", "tails_flow": "tails_flow_m3_s", "level": "level_m",
@@ -41,7 +41,7 @@ def experiment() -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def plain(experiment: Experiment) -> Run:
+def plain(experiment: Experiment) -> SimulatedRun:
     return run(experiment)
 
 
@@ -80,7 +80,7 @@ COARSE = {"liberated part floats first": 0.1}
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_an_effect_changes_the_same_by_as_much(case: str, experiment: Experiment, plain: Run) -> None:
+def test_an_effect_changes_the_same_by_as_much(case: str, experiment: Experiment, plain: SimulatedRun) -> None:
     spec, effect = CASES[case]
     model = make_model().with_effects([effect])
     model = model.with_parameters({"growth_exponent": experiment.n, "coalescence_rate": experiment.C})

@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.errors import DataError
-from benchmarks.hidden_effects.outcome import classify
-from benchmarks.hidden_effects.results import removed_share, result_row, results_table
-from benchmarks.hidden_effects.run import run_command
-from benchmarks.hidden_effects.score import method_command
-from benchmarks.hidden_effects.summary import as_json, confusion, rate
-from benchmarks.hidden_effects.verdict import Verdict, read_verdict
+from benchmarks.hidden_effects.score.commands import run_command
+from benchmarks.hidden_effects.score.figures import method_command
+from benchmarks.hidden_effects.score.outcome import classify
+from benchmarks.hidden_effects.score.results import removed_share, result_row, results_table
+from benchmarks.hidden_effects.score.summary import as_json, confusion, rate
+from benchmarks.hidden_effects.score.verdict import SubmittedVerdict, read_verdict
 
 GRADE = "concentrate_grade"
 BUBBLE = {"site": "bubble_size", "driver": "air_flow"}
@@ -44,8 +44,8 @@ STILL_SEEN = STILL | {"size": {GRADE: 8.0}}
 OTHER = {"site": "settling", "driver": "time"}
 
 
-def _verdict(kind: str, *names: dict[str, str]) -> Verdict:
-    return Verdict.model_validate({"verdict": kind, "class" if kind == "class" else "effects": list(names)})
+def _verdict(kind: str, *names: dict[str, str]) -> SubmittedVerdict:
+    return SubmittedVerdict.model_validate({"verdict": kind, "class" if kind == "class" else "effects": list(names)})
 
 
 @pytest.mark.parametrize(
@@ -84,14 +84,14 @@ def _verdict(kind: str, *names: dict[str, str]) -> Verdict:
         (STILL_SEEN, _verdict("named", OTHER), "wrong_name"),
     ],
 )
-def test_outcomes(answer: dict[str, Any], verdict: Verdict, outcome: str) -> None:
+def test_outcomes(answer: dict[str, Any], verdict: SubmittedVerdict, outcome: str) -> None:
     """Each kind of verdict against each kind of truth."""
     assert classify(answer, verdict) == outcome
 
 
 def test_removed_error_is_measured_against_the_benchmarks_own_base() -> None:
     """Half-way from base to oracle is one half, whatever the verdict says of `before`; silence removes nothing."""
-    half = Verdict.model_validate({"verdict": "named", "error": {GRADE: {"before": 9.0, "after": 0.006}}})
+    half = SubmittedVerdict.model_validate({"verdict": "named", "error": {GRADE: {"before": 9.0, "after": 0.006}}})
     assert removed_share(SINGLE, half) == pytest.approx(0.5)
     assert removed_share(SINGLE, _verdict("named", BUBBLE)) == 0.0
     assert removed_share(SINGLE, None) == 0.0
@@ -106,14 +106,14 @@ def test_removed_error_is_that_of_the_rows_a_verdict_kept() -> None:
     squares = {"rows": [10.0, 10.0, 0.0], "base": [1000.0, 90.0, 0.0], "oracle": [10.0, 10.0, 0.0]}
     answer = SINGLE | {"squares": {GRADE: squares}}
     told = {"verdict": "named", "error": {GRADE: {"after": 2.0}}}
-    kept = Verdict.model_validate({**told, "report_times_s": [[9.0, 20.0]]})
+    kept = SubmittedVerdict.model_validate({**told, "report_times_s": [[9.0, 20.0]]})
     assert removed_share(answer, kept) == pytest.approx(0.5)
-    whole = Verdict.model_validate({**told, "report_times_s": [[1.0, 10.0], [11.0, 30.0]]})
+    whole = SubmittedVerdict.model_validate({**told, "report_times_s": [[1.0, 10.0], [11.0, 30.0]]})
     base = math.sqrt(1090 / 20)
     assert removed_share(answer, whole) == pytest.approx((base - 2) / (base - 1))
-    nothing = Verdict.model_validate({**told, "report_times_s": [[21.0, 30.0]]})
+    nothing = SubmittedVerdict.model_validate({**told, "report_times_s": [[21.0, 30.0]]})
     assert math.isnan(removed_share(answer, nothing))
-    unsaid = Verdict.model_validate({"verdict": "named", "error": {GRADE: {"after": 0.006}}})
+    unsaid = SubmittedVerdict.model_validate({"verdict": "named", "error": {GRADE: {"after": 0.006}}})
     assert removed_share(answer, unsaid) == pytest.approx(0.5)
 
 

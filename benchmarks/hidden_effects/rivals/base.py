@@ -17,11 +17,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from adaptive_flot.files import replace_path
-from benchmarks.hidden_effects.base_fit import REACH, fit_nominal, sensitivity
-from benchmarks.hidden_effects.cell import World
-from benchmarks.hidden_effects.simulate import Array, SimulationError, replay, steady_state
-from benchmarks.hidden_effects.sites import INPUTS, OUTPUTS, PROCESS_SITES, SENSOR_OF
-from benchmarks.hidden_effects.spec import Spec, influence
+from benchmarks.hidden_effects.cell.equations import World
+from benchmarks.hidden_effects.cell.simulate import Array, SimulationError, replay, steady_state
+from benchmarks.hidden_effects.cell.sites import INPUTS, OUTPUTS, PROCESS_SITES, SENSOR_OF
+from benchmarks.hidden_effects.effects.spec import Spec, influence
+from benchmarks.hidden_effects.generate.nominal_fit import REACH, fit_nominal, sensitivity
 
 FIRST, EVERY = 600, 5  # s: transients of an unknown start left out; rows used
 BLOCKS = {"fit": (0.0, 0.6), "confirm": (0.6, 0.8), "report": (0.8, 1.0)}

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden_effects.cell.simulate import Array
 from benchmarks.hidden_effects.rivals.base import Mask, Prepared, least_squares
-from benchmarks.hidden_effects.simulate import Array
 
 MOST_TERMS = 6
 

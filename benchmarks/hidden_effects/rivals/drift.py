@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects.base_fit import REACH
+from benchmarks.hidden_effects.cell.simulate import Array
+from benchmarks.hidden_effects.generate.nominal_fit import REACH
 from benchmarks.hidden_effects.rivals.base import Fitted
-from benchmarks.hidden_effects.simulate import Array
 
 WALK = np.array([2e-3, 8e-3])  # standard deviation of ln n and ln C a row (5 s)
 EXPLAINED = 0.3  # share of the smoothed estimate's variance that a driver must explain

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.hidden_effects.answer import spec_of
-from benchmarks.hidden_effects.base_fit import BURN_IN
-from benchmarks.hidden_effects.cell import World
+from benchmarks.hidden_effects.cell.equations import World
+from benchmarks.hidden_effects.cell.simulate import Array, SimulationError, replay
+from benchmarks.hidden_effects.cell.sites import INPUTS, OUTPUTS
+from benchmarks.hidden_effects.effects.spec import Spec, influence
+from benchmarks.hidden_effects.generate.ground_truth import spec_of
+from benchmarks.hidden_effects.generate.nominal_fit import BURN_IN
+from benchmarks.hidden_effects.plant.sensors import SensorEffect
 from benchmarks.hidden_effects.rivals.base import noise_of
-from benchmarks.hidden_effects.sensors import SensorEffect
-from benchmarks.hidden_effects.simulate import Array, SimulationError, replay
-from benchmarks.hidden_effects.sites import INPUTS, OUTPUTS
-from benchmarks.hidden_effects.spec import Spec, influence
 
 _STEPS = 4
 

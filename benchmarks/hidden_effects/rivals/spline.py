@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline
 
+from benchmarks.hidden_effects.cell.simulate import Array
 from benchmarks.hidden_effects.rivals.base import Mask, Prepared, adapt, least_squares
-from benchmarks.hidden_effects.simulate import Array
 
 BASIS = 6  # cubic functions a curve
 BETTER = 0.95  # error on the confirm block, as a share of the base's, from which a curve is taken

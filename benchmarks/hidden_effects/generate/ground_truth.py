@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from benchmarks.hidden_effects.catalogue import equivalents
-from benchmarks.hidden_effects.curves import onset_of
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.effects.catalogue import equivalents
+from benchmarks.hidden_effects.effects.curves import onset_of
+from benchmarks.hidden_effects.effects.spec import Spec
 
 VERDICTS = ("none", "named", "class", "unnamed", "insufficient", "abstain")
 
@@ -45,7 +45,7 @@ def spec_of(hidden: dict[str, Any]) -> Spec:
 
 
 @dataclass(frozen=True)
-class Answer:
+class GroundTruth:
     """Everything a score needs. `site` and `driver` list every right name, as the hand-made examples do."""
 
     record: str

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.hidden_effects.simulate import Array
-from benchmarks.hidden_effects.sites import OUTPUTS
+from benchmarks.hidden_effects.cell.simulate import Array
+from benchmarks.hidden_effects.cell.sites import OUTPUTS
 
 # Grade: the paper. The others: chosen, of the order of the instruments of a laboratory cell.
 TYPICAL = {
@@ -22,7 +22,7 @@ KINDS = ("white", "coloured", "outliers", "quantised", "proportional", "process"
 
 
 @dataclass(frozen=True)
-class Noise:
+class MeasurementNoise:
     """Noise of one record: values (N,) an output, absolute or a share of the value, and the step it is rounded to."""
 
     kind: str
@@ -33,7 +33,7 @@ class Noise:
     details: dict[str, float] | None = None
 
 
-def draw_noise(rng: np.random.Generator, count: int, kind: str | None = None) -> Noise:
+def draw_noise(rng: np.random.Generator, count: int, kind: str | None = None) -> MeasurementNoise:
     """Draw kind, sizes and values. `process` adds a slow wander of the feed grade of the order of the grade's noise."""
     kind = kind or str(rng.choice(KINDS, p=[0.3, 0.2, 0.15, 0.1, 0.15, 0.1]))
     scale = float(rng.uniform(0.7, 1.4))
@@ -60,4 +60,4 @@ def draw_noise(rng: np.random.Generator, count: int, kind: str | None = None) ->
     details = {"scale": scale, "memory": memory if kind == "coloured" else 0.0,
                "outlier_share": share if kind == "outliers" else 0.0}  # fmt: skip
     wander = float(rng.uniform(0.006, 0.015)) if kind == "process" else 0.0
-    return Noise(kind, values, proportional, step, wander, details)
+    return MeasurementNoise(kind, values, proportional, step, wander, details)

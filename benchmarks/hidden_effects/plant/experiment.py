@@ -7,26 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects import control
-from benchmarks.hidden_effects.cell import N_GAS, POPULATIONS, Population, World, evaluate
-from benchmarks.hidden_effects.noise import Noise
-from benchmarks.hidden_effects.sensors import Instruments
-from benchmarks.hidden_effects.simulate import ROW, Array, Simulation, SimulationError, replay, steady_state
-from benchmarks.hidden_effects.sites import OUTPUTS
-from benchmarks.hidden_effects.spec import Spec, influence
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.equations import N_GAS, Structure, World, evaluate
+from benchmarks.hidden_effects.cell.simulate import ROW, Array, Simulation, SimulationError, replay, steady_state
+from benchmarks.hidden_effects.cell.sites import OUTPUTS
+from benchmarks.hidden_effects.effects.spec import Spec, influence
+from benchmarks.hidden_effects.plant import control
+from benchmarks.hidden_effects.plant.noise import MeasurementNoise
+from benchmarks.hidden_effects.plant.sensors import Instruments
 
 SMALLEST_ALPHA = 0.02  # froth that hardly overflows is outside the model
-
-
-@dataclass(frozen=True)
-class Structure:
-    """What no listed site has: other populations of particles, feed that bypasses, a dead volume."""
-
-    populations: tuple[Population, ...] = POPULATIONS
-    bypass: float = 0.0
-    dead_share: float = 0.0
-    exchange_flow: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -40,12 +30,12 @@ class Experiment:
     loop: str  # "open" or a kind of control
     moves: Array  # (burn + rows, 3): inputs in open loop; grade reference, feed flow, level set-point in closed loop
     controller_seed: int
-    noise: Noise
+    noise: MeasurementNoise
     outputs: tuple[str, ...]  # the measured ones
 
 
 @dataclass(frozen=True)
-class Run:
+class SimulatedRun:
     """What an experiment gave, the rows before the record left out."""
 
     inputs: Array  # (rows, 3)
@@ -68,7 +58,7 @@ def _first_inputs(experiment: Experiment) -> list[float]:
     return [1.5e-3, float(move[1]), float(move[2])] if experiment.loop != "open" else move.tolist()
 
 
-def run(experiment: Experiment, specs: Sequence[Spec] = (), structure: Structure | None = None) -> Run:
+def run(experiment: Experiment, specs: Sequence[Spec] = (), structure: Structure | None = None) -> SimulatedRun:
     """Run the experiment.
 
     Raises
@@ -129,7 +119,9 @@ def _nominal_start(simulation: Simulation, world: World, inputs: Sequence[float]
     return [z.tails_flow - c.LEVEL_GAIN * x[1], *x[1:N_GAS], *(m / (1.0 - world.dead_share) for m in masses)]
 
 
-def _gather(experiment: Experiment, simulation: Simulation, instruments: Instruments, start: list[float]) -> Run:
+def _gather(
+    experiment: Experiment, simulation: Simulation, instruments: Instruments, start: list[float]
+) -> SimulatedRun:
     rows = np.array(simulation.rows)[experiment.burn :]
     truth = dict(zip(ROW, rows.T, strict=True))
     if float(truth["alpha_star"].min()) < SMALLEST_ALPHA:
@@ -137,7 +129,7 @@ def _gather(experiment: Experiment, simulation: Simulation, instruments: Instrum
     clean = dict(zip(OUTPUTS, np.array(instruments.clean)[experiment.burn :].T, strict=True))
     noisy = dict(zip(OUTPUTS, np.array(instruments.noisy)[experiment.burn :].T, strict=True))
     inputs = np.column_stack([truth["air_flow"], truth["feed_flow"], _setpoints(experiment)])
-    return Run(inputs, truth, clean, noisy, start)
+    return SimulatedRun(inputs, truth, clean, noisy, start)
 
 
 def _setpoints(experiment: Experiment) -> Array:
@@ -149,7 +141,7 @@ def _setpoints(experiment: Experiment) -> Array:
     return column[experiment.burn :]
 
 
-def nominal(experiment: Experiment, done: Run) -> dict[str, Array]:
+def nominal(experiment: Experiment, done: SimulatedRun) -> dict[str, Array]:
     """Outputs of the nominal cell (same n and C, no effect) under the inputs of a run, from its start."""
     return replay(World(experiment.n, experiment.C), done.inputs, done.start)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.hidden_effects.beyond import KINDS as BEYOND
-from benchmarks.hidden_effects.catalogue import CATALOGUE, Entry
+from benchmarks.hidden_effects.effects.beyond import KINDS as BEYOND
+from benchmarks.hidden_effects.effects.catalogue import CATALOGUE, Entry
 
 CYCLE = (
     "single", "none", "single", "drift", "single", "pair", "single", "beyond", "single", "unexcited",

@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects import curves
-from benchmarks.hidden_effects.cell import POPULATIONS, Population
-from benchmarks.hidden_effects.experiment import Structure
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.equations import POPULATIONS, Population, Structure
+from benchmarks.hidden_effects.effects import curves
+from benchmarks.hidden_effects.effects.spec import Spec
 
 Rng = np.random.Generator
 

@@ -10,10 +10,10 @@ from typing import Any
 import pandas as pd
 
 from adaptive_flot.files import replace_file
-from benchmarks.hidden_effects.generate import load_answers
-from benchmarks.hidden_effects.outcome import Answer, classify
-from benchmarks.hidden_effects.record import BIN
-from benchmarks.hidden_effects.verdict import Verdict, read_verdict
+from benchmarks.hidden_effects.generate.folder import load_answers
+from benchmarks.hidden_effects.generate.record import BIN
+from benchmarks.hidden_effects.score.outcome import Answer, classify
+from benchmarks.hidden_effects.score.verdict import SubmittedVerdict, read_verdict
 
 UNDECIDED = ("abstain", "insufficient")
 """Verdicts that stand for no model: the error that one writes beside them is that of a model which nobody is given."""
@@ -36,7 +36,7 @@ def main_output(answer: Answer) -> str | None:
     return name if ratio[name] >= REMOVABLE else None
 
 
-def removed_share(answer: Answer, verdict: Verdict | None) -> float:
+def removed_share(answer: Answer, verdict: SubmittedVerdict | None) -> float:
     """Error removed on held-out rows as a share of an oracle's, in the output with most to remove.
 
     The rows are those the verdict says it kept for its report, else the last 20 %. The base and the oracle are the
@@ -58,7 +58,7 @@ def removed_share(answer: Answer, verdict: Verdict | None) -> float:
     return max(-1.0, min(1.0, float((base - block.after) / (base - oracle))))
 
 
-def _held_out(answer: Answer, verdict: Verdict, output: str) -> tuple[float, float]:
+def _held_out(answer: Answer, verdict: SubmittedVerdict, output: str) -> tuple[float, float]:
     """Root mean square error of base and oracle on the rows that a verdict kept for its report."""
     squares = answer.get("squares", {}).get(output)
     if not (verdict.report_times_s and squares):
@@ -73,10 +73,10 @@ def _held_out(answer: Answer, verdict: Verdict, output: str) -> tuple[float, flo
     return (math.sqrt(base / rows), math.sqrt(oracle / rows)) if rows else (math.nan, math.nan)
 
 
-def result_row(answer: Answer, verdict: Verdict | str, meta: dict[str, Any]) -> dict[str, Any]:
+def result_row(answer: Answer, verdict: SubmittedVerdict | str, meta: dict[str, Any]) -> dict[str, Any]:
     """One row; `meta` tells how the command ended (status, seconds)."""
     status = meta.get("status", "ok")
-    found = verdict if isinstance(verdict, Verdict) and status == "ok" else None
+    found = verdict if isinstance(verdict, SubmittedVerdict) and status == "ok" else None
     if found is None:
         outcome = {"timeout": "timeout", "refused": "abstained"}.get(status, "failed")
         if status == "refused" and "insufficient" in answer["right_verdicts"]:

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.hidden_effects.verdict import Verdict
+from benchmarks.hidden_effects.score.verdict import SubmittedVerdict
 
 OUTCOMES = (
     "right",
@@ -52,7 +52,7 @@ def has_effect(answer: Answer) -> bool:
     return category in ("single", "pair", "beyond")
 
 
-def classify(answer: Answer, verdict: Verdict) -> str:
+def classify(answer: Answer, verdict: SubmittedVerdict) -> str:
     """Outcome of a verdict."""
     if verdict.verdict in ("insufficient", "abstain"):
         return "right" if verdict.verdict in answer["right_verdicts"] else "abstained"

@@ -18,7 +18,7 @@ import pandas as pd
 
 from adaptive_flot.errors import DataError
 from adaptive_flot.files import replace_file, write_text
-from benchmarks.hidden_effects.record import Record, make_record
+from benchmarks.hidden_effects.generate.record import Record, make_record
 
 VERSION = 1  # raise it when the same seed gives other records
 

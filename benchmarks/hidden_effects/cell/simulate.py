@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.integrate import odeint
 from scipy.optimize import brentq
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects.cell import Instant, Signals, World, evaluate, froth
-from benchmarks.hidden_effects.sites import SITES
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.equations import Instant, Signals, World, evaluate, froth
+from benchmarks.hidden_effects.cell.sites import SITES
 
 Array = NDArray[np.float64]
 RTOL = 3e-7

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.files import write_text
-from benchmarks.hidden_effects.results import results_table, write_results
 from benchmarks.hidden_effects.rivals import RIVALS
-from benchmarks.hidden_effects.summary import as_json
-from benchmarks.hidden_effects.tables import print_run, print_side_by_side
+from benchmarks.hidden_effects.score.results import results_table, write_results
+from benchmarks.hidden_effects.score.summary import as_json
+from benchmarks.hidden_effects.score.tables import print_run, print_side_by_side
 
 
 def discover_command() -> str:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.hidden_effects.base_fit import BURN_IN, project, sensitivity
-from benchmarks.hidden_effects.experiment import Experiment, Run, Structure, nominal, run
-from benchmarks.hidden_effects.simulate import Array, SimulationError
-from benchmarks.hidden_effects.sites import SENSOR_SITES
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell.equations import Structure
+from benchmarks.hidden_effects.cell.simulate import Array, SimulationError
+from benchmarks.hidden_effects.cell.sites import SENSOR_SITES
+from benchmarks.hidden_effects.effects.spec import Spec
+from benchmarks.hidden_effects.generate.nominal_fit import BURN_IN, project, sensitivity
+from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun, nominal, run
 
 ORDINARY = (5.0, 50.0)  # noise standard deviations, root mean square
 _FLOWS = {"air_flow", "feed_flow", "gas_slip", "burst_rate", "tails_valve"}
@@ -24,7 +25,7 @@ Columns = dict[str, Array]
 class Sized:
     """A run with effects, and what they change in each output [noise std, rms]: all, and what n and C can not hide."""
 
-    done: Run
+    done: SimulatedRun
     raw: dict[str, float]
     removable: dict[str, float]
 
@@ -46,13 +47,13 @@ def measure(experiment: Experiment, specs: Sequence[Spec], structure: Structure 
     return _sized(experiment, done, base, _slopes(experiment, done, base))
 
 
-def _slopes(experiment: Experiment, done: Run, base: Columns) -> list[Columns]:
+def _slopes(experiment: Experiment, done: SimulatedRun, base: Columns) -> list[Columns]:
     """Derivatives of the outputs to ln n and ln C along a run."""
     theta = np.log(np.array([experiment.n, experiment.C]))
     return sensitivity(theta, done.inputs, done.start, base, experiment.outputs)
 
 
-def _sized(experiment: Experiment, done: Run, base: Columns, slopes: list[Columns]) -> Sized:
+def _sized(experiment: Experiment, done: SimulatedRun, base: Columns, slopes: list[Columns]) -> Sized:
     noise = {name: float(np.std(done.noisy[name] - done.clean[name])) for name in experiment.outputs}
     difference = {name: done.clean[name] - base[name] for name in noise}
     rows = slice(BURN_IN, None)
@@ -65,7 +66,7 @@ def _rms(columns: Columns, noise: dict[str, float], rows: slice) -> dict[str, fl
 
 
 def scale_to(
-    experiment: Experiment, spec: Spec, target: float, limits: tuple[float, float], pilot: Run
+    experiment: Experiment, spec: Spec, target: float, limits: tuple[float, float], pilot: SimulatedRun
 ) -> tuple[Spec, Sized] | None:
     """Search the amplitude that gives the target size (within 30 %); the nearest found, or None if nothing runs.
 

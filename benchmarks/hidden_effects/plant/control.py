@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects.excitation import hold
-from benchmarks.hidden_effects.simulate import Array
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.simulate import Array
+from benchmarks.hidden_effects.plant.excitation import hold
 
 Rng = np.random.Generator
 KINDS = ("pi", "adaptive")

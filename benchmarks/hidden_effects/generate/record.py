@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.hidden_effects import base_fit, schedule
-from benchmarks.hidden_effects.answer import Answer
-from benchmarks.hidden_effects.cases import Case, CaseError, draw_case
-from benchmarks.hidden_effects.experiment import Experiment, Run, run, wander_spec
-from benchmarks.hidden_effects.simulate import Array, SimulationError
-from benchmarks.hidden_effects.sites import INPUTS
+from benchmarks.hidden_effects.cell.simulate import Array, SimulationError
+from benchmarks.hidden_effects.cell.sites import INPUTS
+from benchmarks.hidden_effects.generate import nominal_fit, schedule
+from benchmarks.hidden_effects.generate.categories import DrawError, DrawnRecord, draw_record
+from benchmarks.hidden_effects.generate.ground_truth import GroundTruth
+from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun, run, wander_spec
 
 ATTEMPTS = 8
 FIT_SHARE, REPORT_SHARE = 0.6, 0.8  # of the record: fitted before the first, reported on after the second
@@ -26,7 +26,7 @@ class Record:
 
     name: str
     table: pd.DataFrame
-    answer: Answer
+    answer: GroundTruth
 
 
 def make_record(seed: int, k: int) -> Record:
@@ -41,17 +41,17 @@ def make_record(seed: int, k: int) -> Record:
     for attempt in range(ATTEMPTS):
         rng = schedule.child(seed, k, attempt)
         try:
-            case = draw_case(seed, k, rng, last=attempt == ATTEMPTS - 1)
+            case = draw_record(seed, k, rng, last=attempt == ATTEMPTS - 1)
             wander = wander_spec(case.experiment, rng)
             calm = case.done or run(case.experiment, case.specs, case.structure)
             done = run(case.experiment, [*case.specs, wander], case.structure) if wander else calm
             return _finish(seed, k, case, done, calm)
-        except (SimulationError, CaseError) as error:
+        except (SimulationError, DrawError) as error:
             problems.append(str(error))
     raise RuntimeError(f"record {k} of seed {seed}: {'; '.join(problems)}")
 
 
-def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
+def _finish(seed: int, k: int, case: DrawnRecord, done: SimulatedRun, calm: SimulatedRun) -> Record:
     """Table and answer; `calm` is the run without the wander of the feed, which no oracle knows."""
     experiment, name = case.experiment, f"record_{k:04d}"
     measured = {column: done.noisy[column] for column in experiment.outputs}
@@ -61,7 +61,7 @@ def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
     predicted, fitted = _base(experiment, done, measured)
     known = calm.clean if experiment.loop == "open" else done.clean
     base, oracle = _errors(measured, predicted), _errors(measured, known)
-    answer = Answer(
+    answer = GroundTruth(
         record=name, category=case.category, verdict=case.verdict, right_verdicts=list(case.right_verdicts),
         effects=list(case.hidden), tolerated=list(case.tolerated), ordinary=case.ordinary, loop=experiment.loop,
         noise={"kind": experiment.noise.kind, **(experiment.noise.details or {}),
@@ -75,14 +75,14 @@ def _finish(seed: int, k: int, case: Case, done: Run, calm: Run) -> Record:
     return Record(name, pd.DataFrame(columns), answer)
 
 
-def _std(done: Run, measured: dict[str, Array]) -> dict[str, float]:
+def _std(done: SimulatedRun, measured: dict[str, Array]) -> dict[str, float]:
     return {name: float(np.std(done.noisy[name] - done.clean[name])) for name in measured}
 
 
 def _errors(measured: dict[str, Array], predicted: dict[str, Array]) -> dict[str, dict[str, float]]:
     """Root mean square of measured - predicted on the part fitted and the part reported on; missing left out."""
     count = len(next(iter(measured.values())))
-    fit, report = slice(base_fit.BURN_IN, int(FIT_SHARE * count)), slice(int(REPORT_SHARE * count), None)
+    fit, report = slice(nominal_fit.BURN_IN, int(FIT_SHARE * count)), slice(int(REPORT_SHARE * count), None)
     found = {}
     for name, y in measured.items():
         error = y - predicted[name]
@@ -113,11 +113,13 @@ def _squares(
     return found
 
 
-def _base(experiment: Experiment, done: Run, measured: dict[str, Array]) -> tuple[dict[str, Array], dict[str, float]]:
+def _base(
+    experiment: Experiment, done: SimulatedRun, measured: dict[str, Array]
+) -> tuple[dict[str, Array], dict[str, float]]:
     """What the nominal cell fitted to the first 60 % predicts, and how far n and C went to get there."""
     noise = {name: max(s, 1e-12) for name, s in _std(done, measured).items()}
-    rows = slice(base_fit.BURN_IN, int(FIT_SHARE * experiment.rows))
+    rows = slice(nominal_fit.BURN_IN, int(FIT_SHARE * experiment.rows))
     guess = (experiment.n, experiment.C)
-    fit = base_fit.fit_nominal(done.inputs, measured, noise, done.start, rows, guess)
+    fit = nominal_fit.fit_nominal(done.inputs, measured, noise, done.start, rows, guess)
     moved = {"n": fit.n / experiment.n - 1.0, "C": fit.C / experiment.C - 1.0}
     return fit.predicted, moved

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from benchmarks.hidden_effects.cell import World
-from benchmarks.hidden_effects.simulate import Array, SimulationError, replay
-from benchmarks.hidden_effects.sites import OUTPUTS
+from benchmarks.hidden_effects.cell.equations import World
+from benchmarks.hidden_effects.cell.simulate import Array, SimulationError, replay
+from benchmarks.hidden_effects.cell.sites import OUTPUTS
 
 BURN_IN = 300  # s; five time constants of the gas, one of the minerals
 REACH = np.array([0.3, 1.2])  # how far ln n and ln C may be moved: beyond it the froth is another one
@@ -22,7 +22,7 @@ _STEP = np.array([2e-3, 2e-3])  # of ln n and ln C, for the differences
 
 
 @dataclass(frozen=True)
-class Fit:
+class NominalFit:
     """Nominal cell at the fitted n and C, and what it predicts at every row."""
 
     n: float
@@ -67,7 +67,7 @@ def project(
 def fit_nominal(
     inputs: Array, measured: Mapping[str, Array], noise: Mapping[str, float], start: list[float], rows: slice,
     guess: tuple[float, float], iterations: int = 5,
-) -> Fit:  # fmt: skip
+) -> NominalFit:  # fmt: skip
     """Fit ln n and ln C on `rows` of the measured outputs (N,), each over its noise; missing values are left out.
 
     start: state of the nominal cell before the first row. Steps are halved while they do not reduce the sum of squares.
@@ -98,4 +98,4 @@ def fit_nominal(
             step = 0.5 * step
         if not accepted or before - cost(predicted) < 0.01 * before:
             break
-    return Fit(float(np.exp(theta[0])), float(np.exp(theta[1])), predicted)
+    return NominalFit(float(np.exp(theta[0])), float(np.exp(theta[1])), predicted)

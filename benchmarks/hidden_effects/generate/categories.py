@@ -8,28 +8,30 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects import curves, schedule
-from benchmarks.hidden_effects.answer import Hidden
-from benchmarks.hidden_effects.beyond import draw_beyond
-from benchmarks.hidden_effects.catalogue import CATALOGUE, Entry
-from benchmarks.hidden_effects.draw import draw_effect, draw_experiment, limits_of
-from benchmarks.hidden_effects.experiment import Experiment, Run, Structure, run
-from benchmarks.hidden_effects.sensors import OUTPUT_OF, Fault
-from benchmarks.hidden_effects.sites import OUTPUTS
-from benchmarks.hidden_effects.sizing import ORDINARY, Sized, measure, scale_to
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell.equations import Structure
+from benchmarks.hidden_effects.cell.sites import OUTPUTS
+from benchmarks.hidden_effects.effects import curves
+from benchmarks.hidden_effects.effects.beyond import draw_beyond
+from benchmarks.hidden_effects.effects.catalogue import CATALOGUE, Entry
+from benchmarks.hidden_effects.effects.spec import Spec
+from benchmarks.hidden_effects.generate import schedule
+from benchmarks.hidden_effects.generate.draw import draw_effect, draw_experiment, limits_of
+from benchmarks.hidden_effects.generate.ground_truth import Hidden
+from benchmarks.hidden_effects.generate.sizing import ORDINARY, Sized, measure, scale_to
+from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun, run
+from benchmarks.hidden_effects.plant.sensors import OUTPUT_OF, Fault
 
 Rng = np.random.Generator
 QUIET = ("none", "insufficient", "abstain")
 _TARGETS = (np.log(6.0), np.log(40.0))
 
 
-class CaseError(Exception):
+class DrawError(Exception):
     """A draw that is no record of its category (effect too small); draw again."""
 
 
 @dataclass(frozen=True)
-class Case:
+class DrawnRecord:
     """A record before it is measured for the last time."""
 
     category: str
@@ -45,15 +47,15 @@ class Case:
     ordinary: bool = False
     note: str = ""
     size: dict[str, float] = field(default_factory=dict)
-    done: Run | None = None  # where it was run already
+    done: SimulatedRun | None = None  # where it was run already
 
 
-def draw_case(seed: int, k: int, rng: Rng, *, last: bool) -> Case:
+def draw_record(seed: int, k: int, rng: Rng, *, last: bool) -> DrawnRecord:
     """Draw record k; `last` takes an effect that is too small rather than none.
 
     Raises
     ------
-    CaseError, SimulationError
+    DrawError, SimulationError
         The draw does not do; another attempt may.
     """
     return _MAKERS[schedule.category(k)](seed, k, rng, last)
@@ -65,25 +67,25 @@ def _sized_effect(experiment: Experiment, entry: Entry, rng: Rng, last: bool) ->
     target = float(np.exp(rng.uniform(*_TARGETS)))
     found = scale_to(experiment, spec, target, limits_of(entry, spec.shape), pilot)
     if found is None or (found[1].of(entry.site) < ORDINARY[0] and not last):
-        raise CaseError(f"{entry.site}/{entry.driver}: too small")
+        raise DrawError(f"{entry.site}/{entry.driver}: too small")
     return found
 
 
-def _single(seed: int, k: int, rng: Rng, last: bool) -> Case:
+def _single(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     entry = schedule.single_entry(seed, k)
     experiment = draw_experiment(rng, thin_allowed=OUTPUT_OF.get(entry.site, "level_m") in OUTPUTS[:3])
     spec, sized = _sized_effect(experiment, entry, rng, last)
     ordinary = ORDINARY[0] <= sized.of(spec.site) <= ORDINARY[1]
     hidden = Hidden.of(spec, sized.removable)
-    return Case("single", experiment, "named", (), (spec,), (hidden,), ordinary=ordinary, size=sized.removable,
+    return DrawnRecord("single", experiment, "named", (), (spec,), (hidden,), ordinary=ordinary, size=sized.removable,
                 done=sized.done)  # fmt: skip
 
 
-def _none(seed: int, k: int, rng: Rng, last: bool) -> Case:
-    return Case("none", draw_experiment(rng), "none", ("none",))
+def _none(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
+    return DrawnRecord("none", draw_experiment(rng), "none", ("none",))
 
 
-def _drift(seed: int, k: int, rng: Rng, last: bool) -> Case:
+def _drift(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     """n, C or both drift slowly; the model with adapted parameters is right."""
     experiment = draw_experiment(rng)
     which = str(rng.choice(["C", "n", "both"]))
@@ -98,20 +100,20 @@ def _drift(seed: int, k: int, rng: Rng, last: bool) -> Case:
     why = "a drift of C or n is what an effect at coalescence or growth_exponent over time is"
     names = [{"site": s, "driver": "time", "why": why} for s in ("coalescence", "growth_exponent")]
     drift = [{"site": s.site, "shape": s.shape, "amplitude": s.amplitude} for s in specs]
-    return Case("drift", experiment, "none", ("none",), tuple(specs), tolerated=tuple(names), drift=tuple(drift),
+    return DrawnRecord("drift", experiment, "none", ("none",), tuple(specs), tolerated=tuple(names), drift=tuple(drift),
                 size=sized.removable, done=sized.done)  # fmt: skip
 
 
-def _pair(seed: int, k: int, rng: Rng, last: bool) -> Case:
+def _pair(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     experiment = draw_experiment(rng, thin_allowed=False)
     found = [_sized_effect(experiment, entry, rng, last) for entry in schedule.pair_entries(seed, k)]
     specs = tuple(spec for spec, _ in found)
     together = measure(experiment, specs)
     hidden = tuple(Hidden.of(spec, sized.removable) for spec, sized in found)
-    return Case("pair", experiment, "named", (), specs, hidden, size=together.removable, done=together.done)
+    return DrawnRecord("pair", experiment, "named", (), specs, hidden, size=together.removable, done=together.done)
 
 
-def _beyond(seed: int, k: int, rng: Rng, last: bool) -> Case:
+def _beyond(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     kind, details = schedule.beyond_kind(seed, k), int(rng.integers(2**31))
     experiment = draw_experiment(rng)
     strength = float(rng.uniform(0.35, 0.7))
@@ -123,14 +125,15 @@ def _beyond(seed: int, k: int, rng: Rng, last: bool) -> Case:
         strength = min(1.0, 1.5 * strength)
     quiet = ("none",) if max(sized.removable.values()) < 2.0 else ()
     names = tuple({"site": s, "driver": d, "why": "part of what happens"} for s, d in effect.tolerated)
-    return Case("beyond", experiment, "unnamed", ("unnamed", "class", "abstain", "insufficient", *quiet), effect.specs,
+    right = ("unnamed", "class", "abstain", "insufficient", *quiet)
+    return DrawnRecord("beyond", experiment, "unnamed", right, effect.specs,
                 tolerated=names, structure=effect.structure, note=kind, size=sized.removable)  # fmt: skip
 
 
 _STILL = {"air_flow": "air", "feed_flow": "feed", "level": "level"}
 
 
-def _unexcited(seed: int, k: int, rng: Rng, last: bool) -> Case:
+def _unexcited(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     """An effect whose driver stands still, or that starts after the end."""
     kind = schedule.unexcited_kind(seed, k)
     entry = _unexcited_entry(kind, rng)
@@ -140,14 +143,14 @@ def _unexcited(seed: int, k: int, rng: Rng, last: bool) -> Case:
     if kind == "late":
         onset = moving.rows + float(rng.uniform(60.0, 600.0))
         spec = replace(spec, shape="smooth_step", parameters={"onset": onset, "width": 5.0}, centre=0.0)
-        return Case("unexcited", moving, "none", QUIET, (spec,), note=note)
+        return DrawnRecord("unexcited", moving, "none", QUIET, (spec,), note=note)
     source = entry.site if kind == "actuator" else kind
     experiment = draw_experiment(rng, thin_allowed=False, still=frozenset({_STILL[source]}), loop="open")
     sized = measure(experiment, [spec])
     why = "its driver does not move: it is a constant here"
     names = () if kind == "actuator" else ("constant", *(("level", "froth_depth") if kind == "level" else (kind,)))
     same = tuple({"site": spec.site, "driver": driver, "why": why} for driver in names)
-    return Case("unexcited", experiment, "none", QUIET, (spec,), tolerated=same, note=note, size=sized.removable,
+    return DrawnRecord("unexcited", experiment, "none", QUIET, (spec,), tolerated=same, note=note, size=sized.removable,
                 done=sized.done)  # fmt: skip
 
 
@@ -161,7 +164,7 @@ def _unexcited_entry(kind: str, rng: Rng) -> Entry:
     return chosen[int(rng.integers(len(chosen)))]
 
 
-def _fault(seed: int, k: int, rng: Rng, last: bool) -> Case:
+def _fault(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     """No effect, but data that can not be trusted."""
     experiment, kind = draw_experiment(rng, thin_allowed=False, loop="open"), schedule.fault_kind(seed, k)
     rows = experiment.rows
@@ -184,10 +187,10 @@ def _fault(seed: int, k: int, rng: Rng, last: bool) -> Case:
         {"site": sensor, "driver": d, "why": "the sensor is what fails"} for d in ("constant", "time", "lag", "delay")
     )  # fmt: skip
     expected = "none" if kind.startswith("gap") else "insufficient"
-    return Case("fault", experiment, expected, QUIET, tolerated=names, faults=faults, note=kind)
+    return DrawnRecord("fault", experiment, expected, QUIET, tolerated=names, faults=faults, note=kind)
 
 
-_MAKERS: dict[str, Callable[[int, int, Rng, bool], Case]] = {
+_MAKERS: dict[str, Callable[[int, int, Rng, bool], DrawnRecord]] = {
     "single": _single,
     "none": _none,
     "drift": _drift,

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.hidden_effects import curves
-from benchmarks.hidden_effects.simulate import Array
-from benchmarks.hidden_effects.sites import OUTPUTS, SENSOR_OF
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell.simulate import Array
+from benchmarks.hidden_effects.cell.sites import OUTPUTS, SENSOR_OF
+from benchmarks.hidden_effects.effects import curves
+from benchmarks.hidden_effects.effects.spec import Spec
 
 Row = Mapping[str, float]
 OUTPUT_OF = {sensor: output for output, sensor in SENSOR_OF.items()}

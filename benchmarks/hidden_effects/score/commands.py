@@ -22,7 +22,7 @@ from typing import Any
 
 from adaptive_flot.errors import DataError
 from adaptive_flot.files import write_text
-from benchmarks.hidden_effects.generate import answer_file, load_answers, record_file
+from benchmarks.hidden_effects.generate.folder import answer_file, load_answers, record_file
 
 LOG_CHARACTERS = 4000
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from benchmarks.hidden_effects import curves
-from benchmarks.hidden_effects.cell import Influence, Signals
-from benchmarks.hidden_effects.sites import INDEX, SENSOR_SITES, STATE_DRIVERS
+from benchmarks.hidden_effects.cell.equations import Influence, Signals
+from benchmarks.hidden_effects.cell.sites import INDEX, SENSOR_SITES, STATE_DRIVERS
+from benchmarks.hidden_effects.effects import curves
 
 GRADE_FOLLOWS = 5.0  # s; a froth feels the grade that reaches it, and no algebraic loop arises
 SMALLEST_FACTOR = 0.1

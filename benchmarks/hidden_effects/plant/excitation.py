@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects.simulate import Array
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.simulate import Array
 
 Rng = np.random.Generator
 KINDS = ("random_steps", "two_level", "multisine", "staircase", "campaign")

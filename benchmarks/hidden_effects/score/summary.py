@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from benchmarks.hidden_effects.outcome import OUTCOMES
+from benchmarks.hidden_effects.score.outcome import OUTCOMES
 
 FOUND = ("right", "right_class")
 ABSTAINED = ("abstained",)

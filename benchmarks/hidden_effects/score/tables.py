@@ -6,7 +6,7 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.hidden_effects.summary import confusion, mistaken, rates, removal, times
+from benchmarks.hidden_effects.score.summary import confusion, mistaken, rates, removal, times
 
 _REMOVED = "held-out error removed, share of an oracle's"
 _MISTAKES = 15

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects import control, curves, excitation
-from benchmarks.hidden_effects.catalogue import LIMITS, Entry
-from benchmarks.hidden_effects.experiment import Experiment, Run
-from benchmarks.hidden_effects.noise import TYPICAL, draw_noise
-from benchmarks.hidden_effects.sensors import OUTPUT_OF
-from benchmarks.hidden_effects.sites import OUTPUTS
-from benchmarks.hidden_effects.spec import Spec
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.sites import OUTPUTS
+from benchmarks.hidden_effects.effects import curves
+from benchmarks.hidden_effects.effects.catalogue import LIMITS, Entry
+from benchmarks.hidden_effects.effects.spec import Spec
+from benchmarks.hidden_effects.plant import control, excitation
+from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun
+from benchmarks.hidden_effects.plant.noise import TYPICAL, draw_noise
+from benchmarks.hidden_effects.plant.sensors import OUTPUT_OF
 
 Rng = np.random.Generator
 _THIN = tuple(name for name in OUTPUTS if name not in ("air_recovery", "concentrate_flow_m3_s"))
@@ -76,7 +77,7 @@ def limits_of(entry: Entry, shape: str) -> tuple[float, float]:
     return LIMITS[entry.site]
 
 
-def draw_effect(rng: Rng, entry: Entry, pilot: Run) -> Spec:
+def draw_effect(rng: Rng, entry: Entry, pilot: SimulatedRun) -> Spec:
     """Draw shape, parameters, sign and a first amplitude; the driver's range is that of the run without effects."""
     shape = str(rng.choice(entry.shapes))
     spec = Spec(entry.site, entry.driver, shape, story=entry.story)

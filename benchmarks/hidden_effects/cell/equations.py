@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from benchmarks.hidden_effects import constants as c
-from benchmarks.hidden_effects.sites import INDEX, SITES
+from benchmarks.hidden_effects.cell import constants as c
+from benchmarks.hidden_effects.cell.sites import INDEX, SITES
 
 N_GAS = 7  # I, h_p, r_1 .. r_5
 _K_BUBBLES = range(5)
@@ -40,6 +40,16 @@ class Population(NamedTuple):
 POPULATIONS = tuple(
     Population(f, p, i) for i, (f, p) in enumerate(zip(c.FEED_CONCENTRATIONS, c.FLOATABILITY, strict=True))
 )
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What no listed site has: other populations of particles, feed that bypasses, a dead volume."""
+
+    populations: tuple[Population, ...] = POPULATIONS
+    bypass: float = 0.0
+    dead_share: float = 0.0
+    exchange_flow: float = 0.0
 
 
 class Signals(NamedTuple):

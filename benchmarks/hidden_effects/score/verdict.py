@@ -29,7 +29,7 @@ class ErrorBlock(BaseModel):
     after: float | None = None
 
 
-class Verdict(BaseModel):
+class SubmittedVerdict(BaseModel):
     """What was found."""
 
     model_config = ConfigDict(extra="ignore", allow_inf_nan=True)
@@ -41,7 +41,7 @@ class Verdict(BaseModel):
     seconds: float | None = None
 
 
-def read_verdict(file: Path) -> Verdict | str:
+def read_verdict(file: Path) -> SubmittedVerdict | str:
     """The verdict in a file, or one line on why there is none."""
     try:
         content: Any = json.loads(file.read_text())
@@ -50,7 +50,7 @@ def read_verdict(file: Path) -> Verdict | str:
     except ValueError as error:
         return f"not JSON: {error}"
     try:
-        return Verdict.model_validate(content)
+        return SubmittedVerdict.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         return f"not a verdict: {'.'.join(map(str, first['loc']))}: {first['msg']}"
