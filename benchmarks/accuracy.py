@@ -48,15 +48,15 @@ ROWS_APART = 10
 
 def run_part(scenario: Scenario, estimators: Sequence[str], seed: int) -> dict[str, pd.DataFrame]:
     """Fits, and NEES every tenth row over the time of the fits: a table of one row for each estimator."""
-    found: dict[str, dict[str, object]] = {}
+    figures: dict[str, dict[str, object]] = {}
     if BOUND in estimators:
         true = TrueRun(Realisation(scenario, seed), Realisation(scenario, seed).schedule)
         allowed = dict(zip(("n", "C"), true.fits(true.limit()), strict=True))
-        found[BOUND] = {**allowed, "concentrate_grade": np.nan, "nees": [np.nan]}
+        figures[BOUND] = {**allowed, "concentrate_grade": np.nan, "nees": [np.nan]}
     names = [name for name in estimators if name != BOUND]
     for run in run_scenario(scenario, names, seeds=[seed]) if names else []:
-        found[run.estimator] = {**run.fit, "nees": list(nees(scenario, run))}
-    return {name: pd.DataFrame([{"estimator": name, "seed": seed, **row}]) for name, row in found.items()}
+        figures[run.estimator] = {**run.fit, "nees": list(nees(scenario, run))}
+    return {name: pd.DataFrame([{"estimator": name, "seed": seed, **row}]) for name, row in figures.items()}
 
 
 def nees(scenario: Scenario, run: Run) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

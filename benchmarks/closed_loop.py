@@ -67,8 +67,8 @@ def run_missing(folder: Path, scenarios: Sequence[str], seeds: Sequence[int], pr
 
 def figures(comparison: Comparison) -> Iterator[Figure]:
     """What was asked of the economic MPC with RPEM in one scenario, and what it reached: medians over the seeds."""
-    found = {(c.controller, c.estimator): c for c in comparison.contenders}
-    adaptive = found.get((MPC, ADAPTIVE))
+    contenders = {(c.controller, c.estimator): c for c in comparison.contenders}
+    adaptive = contenders.get((MPC, ADAPTIVE))
     if adaptive is None:
         return
     name = comparison.scenario
@@ -78,12 +78,12 @@ def figures(comparison: Comparison) -> Iterator[Figure]:
         met = median >= LEAST_SHARE
         yield Figure(f"{name}: share of the oracle's gain over fixed", f"{median:.1%}", f">= {LEAST_SHARE:.0%}", met)
     below = adaptive.spread("below_limit")
-    fixed = found.get((MPC, "fixed"))
+    fixed = contenders.get((MPC, "fixed"))
     beside = f" (fixed {fixed.spread('below_limit').median:.2%})" if fixed else ""
     shown = f"{below.median:.2%} [{below.low:.2%}, {below.high:.2%}]{beside}"
     yield Figure(f"{name}: time below the limit", shown, f"<= {LONGEST_BELOW:.0%}", below.median <= LONGEST_BELOW)
-    if ("pi", "fixed") in found:
-        gain = _paired(adaptive, found["pi", "fixed"])
+    if ("pi", "fixed") in contenders:
+        gain = _paired(adaptive, contenders["pi", "fixed"])
         yield Figure(
             f"{name}: value over PI, smallest over the seeds", f"{gain.min():+.3f} cu/h", "> 0", gain.min() > 0
         )

@@ -55,22 +55,25 @@ def truth(effect: dict[str, Any], name: str, driver: FloatArray) -> FloatArray:
 
 
 @style.styled
-def draw(found: Discovery, answer: dict[str, Any]) -> Figure:
+def draw(discovery: Discovery, answer: dict[str, Any]) -> Figure:
     """Residual over time, curve of the effect with the truth, error on the report split."""
     figure = Figure(figsize=(style.WIDTH * 1.35, 3.1))
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.7, 1.5, 0.9))
-    _residual(left, found)
-    _cause(middle, found, answer)
-    _errors(right, found)
+    _residual(left, discovery)
+    _cause(middle, discovery, answer)
+    _errors(right, discovery)
     return figure
 
 
-def _residual(ax: Axes, found: Discovery) -> None:
-    assert found.problem is not None and found.before is not None and found.after is not None
-    j = [found.model.outputs[c].name for c in found.problem.columns].index(OUTPUT)
-    time = found.problem.record.time
-    for fit, color, label in ((found.before, style.CONSTANT, "before"), (found.after, style.colour(0), "after")):
-        ax.plot(time, 1e3 * fit.residual(found.problem)[:, j], color=color, lw=0.7, label=label)
+def _residual(ax: Axes, discovery: Discovery) -> None:
+    assert discovery.problem is not None and discovery.before is not None and discovery.after is not None
+    j = [discovery.model.outputs[c].name for c in discovery.problem.columns].index(OUTPUT)
+    time = discovery.problem.record.time
+    for fit, color, label in (
+        (discovery.before, style.CONSTANT, "before"),
+        (discovery.after, style.colour(0), "after"),
+    ):
+        ax.plot(time, 1e3 * fit.residual(discovery.problem)[:, j], color=color, lw=0.7, label=label)
     ax.set_title("Residual: measured − free run")
     ax.set_xlabel("time [s]")
     ax.set_ylabel("concentrate grade [10⁻³]")
@@ -78,9 +81,9 @@ def _residual(ax: Axes, found: Discovery) -> None:
     ax.margins(x=0)
 
 
-def _cause(ax: Axes, found: Discovery, answer: dict[str, Any]) -> None:
-    assert found.problem is not None and found.after is not None
-    (curve,) = effect_curves(found.problem, found.after, len(found.verdict.effects))
+def _cause(ax: Axes, discovery: Discovery, answer: dict[str, Any]) -> None:
+    assert discovery.problem is not None and discovery.after is not None
+    (curve,) = effect_curves(discovery.problem, discovery.after, len(discovery.verdict.effects))
     ax.fill_between(1e3 * curve.driver, curve.low, curve.high, color=style.colour(0), alpha=0.22, lw=0)
     ax.plot(1e3 * curve.driver, curve.change, color=style.colour(0), label="found, 95 % band")
     true = truth(answer["effects"][0], curve.effect.driver, curve.driver)
@@ -93,8 +96,8 @@ def _cause(ax: Axes, found: Discovery, answer: dict[str, Any]) -> None:
     ax.legend(loc="lower left" if curve.change[0] > curve.change[-1] else "lower right")
 
 
-def _errors(ax: Axes, found: Discovery) -> None:
-    change = next(c for c in found.verdict.error if c.output == OUTPUT)
+def _errors(ax: Axes, discovery: Discovery) -> None:
+    change = next(c for c in discovery.verdict.error if c.output == OUTPUT)
     values = 1e3 * np.array([change.before, change.after])
     bars = ax.bar(["before", "after"], values, color=[style.CONSTANT, style.colour(0)], width=0.6)
     ax.bar_label(bars, labels=[f"{v:.2f}" for v in values])
@@ -107,11 +110,11 @@ def _errors(ax: Axes, found: Discovery) -> None:
 
 def main() -> None:
     """Discover, draw, and print the verdict."""
-    found, answer = find()
-    print(found.verdict)
+    discovery, answer = find()
+    print(discovery.verdict)
     print("truth:", [(e["site"], e["driver"], e["shape"]) for e in answer["effects"]])
     stream = io.BytesIO()
-    draw(found, answer).savefig(stream, format="png", dpi=130, bbox_inches="tight")
+    draw(discovery, answer).savefig(stream, format="png", dpi=130, bbox_inches="tight")
     with replace_path(PICTURE) as temporary:
         temporary.write_bytes(stream.getvalue())
     print(f"docs/pictures/{PICTURE.name}")

@@ -170,16 +170,16 @@ def main() -> None:
     for label, rule in rules().items():
         cells, medians = [], []
         for name in SCENARIOS:
-            found = []
+            fits = []
             for prior, shown in records[name]:
                 thetas, predictions = recursion.run(prior, [r.sample for r in shown], rule)
                 truth = np.array([r.parameters[columns] for r in shown])
                 y = np.array([r.outputs[output] for r in shown])
-                found.append([*(metrics.fit(t, e) for t, e in zip(truth.T, thetas.T, strict=True))])
-                found[-1].append(metrics.fit(y, predictions))
-            n, C, grade = np.median(found, axis=0)
+                fits.append([*(metrics.fit(t, e) for t, e in zip(truth.T, thetas.T, strict=True))])
+                fits[-1].append(metrics.fit(y, predictions))
+            n, C, grade = np.median(fits, axis=0)
             medians += [n, C, grade]
-            cells.append(f"{n:.2f}, {C:.2f}, {grade:.2f} ({min(f[1] for f in found):.1f})")
+            cells.append(f"{n:.2f}, {C:.2f}, {grade:.2f} ({min(f[1] for f in fits):.1f})")
         table.add_row(label, *cells, f"{np.mean(medians):.2f}")
     Console(width=None if Console().is_terminal else 130).print(table)
 

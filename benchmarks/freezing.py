@@ -45,15 +45,15 @@ def main() -> None:
     scenario = load_scenario(SCENARIO)
     scenario = replace(scenario, file=scenario.file.model_copy(update={"estimators": VARIANTS, "cases": []}))
     jobs = [(seed, name) for seed in SEEDS for name in VARIANTS]
-    found: dict[str, list[Run]] = {name: [] for name in VARIANTS}
+    runs_of: dict[str, list[Run]] = {name: [] for name in VARIANTS}
     done = Console(stderr=True)
     for seed, name in jobs:
-        found[name] += run_scenario(scenario, [name], [seed], controllers=[CONTROLLER])
-        done.print(f"seed {seed}, {name}: {', '.join(row(found[name][-1:]))}", soft_wrap=True)
+        runs_of[name] += run_scenario(scenario, [name], [seed], controllers=[CONTROLLER])
+        done.print(f"seed {seed}, {name}: {', '.join(row(runs_of[name][-1:]))}", soft_wrap=True)
     table = Table("estimator", title=f"{SCENARIO}, {CONTROLLER}, seeds {SEEDS[0]} to {SEEDS[-1]}: median and range")
-    for column in (*next(iter(found.values()))[0].fit, "low information %", "value cu/h", "below limit %"):
+    for column in (*next(iter(runs_of.values()))[0].fit, "low information %", "value cu/h", "below limit %"):
         table.add_column(column, justify="right")
-    for name, runs in found.items():
+    for name, runs in runs_of.items():
         table.add_row(name, *row(runs))
     Console(width=None if Console().is_terminal else 180).print(table)
 

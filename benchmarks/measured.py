@@ -57,13 +57,13 @@ def records(folder: Path) -> Iterator[MeasuredRecord]:
 
 def main(folder: Path) -> int:
     """Judge and print; 2 where there is nothing to judge."""
-    found = [record for record in records(folder) if record.path.is_file()]
-    if not found:
+    present = [record for record in records(folder) if record.path.is_file()]
+    if not present:
         print(f"{folder}: no examples/ and no data/ there; give their folder: python -m benchmarks.measured FOLDER")
         return 2
     table = Table("record", "verdict", "effects", "first output: before -> after (noise)", "ok", "s", show_lines=True)
     console = Console(width=None if Console().is_terminal else 150)
-    for record in found:
+    for record in present:
         v = discover_file(record.path, make_model(record.model), processes=available_processes()).verdict
         console.print(f"{record.name}: {v.reason}", highlight=False, markup=False)
         effects = "; ".join(f"{e.effect.site} by {e.effect.driver}" for e in v.effects)

@@ -65,10 +65,10 @@ def attribution(model: Model, train: Dataset) -> tuple[Fit, Fit]:
     print("fitted:", ", ".join(f"{n} = {v:.3g} +- {s:.2g}" for n, v, s in fitted))
     print("residual, Ljung-Box p:", {k: f"{p:.1g}" for k, p in whiteness(problem, base, raw=True).items()})
     began = time.perf_counter()
-    found = search(problem, base, model, processes=available_processes())
-    judged = judge(found)
-    print(f"search without the screening, {time.perf_counter() - began:.0f} s: {judged.word}; {found.verification}")
-    ranked = found.alternatives or found.rounds[0].alternatives
+    result = search(problem, base, model, processes=available_processes())
+    judged = judge(result)
+    print(f"search without the screening, {time.perf_counter() - began:.0f} s: {judged.word}; {result.verification}")
+    ranked = result.alternatives or result.rounds[0].alternatives
     for a in ranked[:SHOWN]:
         print(f"  {' with '.join(f'{s} by {d}' for s, d in a.names)}: delta BIC {a.delta_bic:.0f}")
     return _refitted(problem, base, ranked[0].fit if ranked else base)
@@ -120,11 +120,11 @@ def regression(record: Dataset, cut: int, last: FloatArray | None) -> FloatArray
     """Ordinary least squares (N, m) on the inputs and, if given, the last assays."""
     X = record.inputs if last is None else np.hstack([record.inputs, last])
     X = sm.add_constant((X - X[:cut].mean(axis=0)) / X[:cut].std(axis=0))
-    found = []
+    columns_predicted = []
     for target in record.outputs.T:
         ok = np.isfinite(target[:cut])
-        found.append(sm.OLS(target[:cut][ok], X[:cut][ok]).fit().predict(X))
-    return np.column_stack(found)
+        columns_predicted.append(sm.OLS(target[:cut][ok], X[:cut][ok]).fit().predict(X))
+    return np.column_stack(columns_predicted)
 
 
 def _slope(x: FloatArray, y: FloatArray) -> float:
@@ -134,13 +134,13 @@ def _slope(x: FloatArray, y: FloatArray) -> float:
 
 def last_seen(y: FloatArray) -> FloatArray:
     """Last measured value before each row (N, m); the first measured one where there is none yet."""
-    found = np.empty_like(y)
+    held = np.empty_like(y)
     for j, series in enumerate(y.T):
         ok = np.isfinite(series)
         at = np.maximum.accumulate(np.where(ok, np.arange(len(series)), -1))
         previous = np.concatenate([[-1], at[:-1]])
-        found[:, j] = series[np.where(previous >= 0, previous, int(np.argmax(ok)))]
-    return found
+        held[:, j] = series[np.where(previous >= 0, previous, int(np.argmax(ok)))]
+    return held
 
 
 if __name__ == "__main__":

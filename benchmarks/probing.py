@@ -86,7 +86,7 @@ def with_probing(scenario: Scenario) -> Scenario:
     return replace(scenario, file=file)
 
 
-def rows(found: pd.DataFrame) -> Iterator[tuple[str, str, str]]:
+def rows(medians: pd.DataFrame) -> Iterator[tuple[str, str, str]]:
     """Lines of the table: what, and its spread without and with probing."""
     for label, column, scale, digits in (
         ("value, RPEM [cu/h]", "value", 1, 4),
@@ -96,7 +96,7 @@ def rows(found: pd.DataFrame) -> Iterator[tuple[str, str, str]]:
         ("below the grade limit [% of time]", "below", 100, 2),
         ("time on dips [%]", "probing", 100, 1),
     ):
-        without, probing = (_shown(scale * found[name, "rpem", column], digits) for name in (PLAIN, PROBING))
+        without, probing = (_shown(scale * medians[name, "rpem", column], digits) for name in (PLAIN, PROBING))
         yield label, without, probing
 
 
@@ -107,16 +107,16 @@ def _shown(values: pd.Series[float], digits: int) -> str:
 
 def measure(scenario: Scenario, seeds: range) -> pd.DataFrame:
     """Figures of all runs: a row a seed, columns (controller, estimator, figure)."""
-    found: dict[int, dict[tuple[str, str, str], float]] = {}
+    by_seed: dict[int, dict[tuple[str, str, str], float]] = {}
     for seed in seeds:
-        found[seed] = {}
+        by_seed[seed] = {}
         for run in run_scenario(scenario, seeds=[seed]):
             m = Measured.of(run, scenario.fits_after)
             entries = {"value": m.value, "n": m.errors[0], "C": m.errors[1], "grade": m.grade_error}
             entries |= {"below": m.below, "probing": m.probing}
-            found[seed] |= {(run.controller, run.estimator, key): x for key, x in entries.items()}
+            by_seed[seed] |= {(run.controller, run.estimator, key): x for key, x in entries.items()}
         Console(stderr=True).print(f"seed {seed} done")
-    return pd.DataFrame.from_dict(found, orient="index")
+    return pd.DataFrame.from_dict(by_seed, orient="index")
 
 
 def main() -> None:
@@ -126,16 +126,16 @@ def main() -> None:
     parser.add_argument("--scenario", default=SCENARIO)
     parser.add_argument("--out", type=Path, help="also write every run's figures to this CSV file")
     options = parser.parse_args()
-    found = measure(with_probing(load_scenario(options.scenario)), range(1, options.seeds + 1))
+    values = measure(with_probing(load_scenario(options.scenario)), range(1, options.seeds + 1))
     if options.out is not None:
-        found.to_csv(options.out)
-    table = Table("median [range]", "without", "probing", title=f"{options.scenario}, {len(found)} seeds")
-    for row in rows(found):
+        values.to_csv(options.out)
+    table = Table("median [range]", "without", "probing", title=f"{options.scenario}, {len(values)} seeds")
+    for row in rows(values):
         table.add_row(*row)
     console = Console(width=None if Console().is_terminal else 130)
     console.print(table)
-    price = found[PLAIN, "oracle", "value"] - found[ALWAYS, "oracle", "value"]
-    gained = found[PROBING, "rpem", "value"] - found[PLAIN, "rpem", "value"]
+    price = values[PLAIN, "oracle", "value"] - values[ALWAYS, "oracle", "value"]
+    gained = values[PROBING, "rpem", "value"] - values[PLAIN, "rpem", "value"]
     console.print(f"price (true parameters, probing all the same): {_shown(1000 * price, 2)} mcu/h")
     console.print(f"value gained with RPEM, price paid: {_shown(1000 * gained, 2)} mcu/h")
 

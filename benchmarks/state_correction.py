@@ -42,24 +42,24 @@ def figures(setup: Setup, seed: int, feed_step: float, correct: Mapping[str, flo
     nominal = model.parameter_values[model.indices("parameters", setup.parameters)]
     prior = Prior(0.0, start, nominal, np.diag((0.01 * nominal) ** 2), np.array([NOISE["concentrate_grade"]]))
     samples = [Sample(float(t), u, y) for t, u, y in zip(truth.time, known, outputs, strict=True)]
-    found = estimates(setup, prior, samples, correct)
-    error = np.array([e.state for e in found]) - truth.states
+    corrected = estimates(setup, prior, samples, correct)
+    error = np.array([e.state for e in corrected]) - truth.states
     grade = model.index("outputs", "concentrate_grade")
-    ahead = np.array([e.prediction[grade] for e in found]) - truth.outputs[:, grade]
+    ahead = np.array([e.prediction[grade] for e in corrected]) - truth.outputs[:, grade]
     solids = error[:, model.indices("states", ["m_valuable", "m_gangue"])].sum(axis=1)
     rows = [1e3 * error[:, model.index("states", "level")], 1e6 * error[:, model.index("states", "tails_flow")]]
-    rates = np.array([e.parameters[1] for e in found]) / nominal[1] - 1
+    rates = np.array([e.parameters[1] for e in corrected]) / nominal[1] - 1
     return [*(float(np.sqrt(np.mean(e**2))) for e in (*rows, solids, ahead)), 100 * float(np.abs(rates).max())]
 
 
 def estimates(setup: Setup, prior: Prior, samples: list[Sample], correct: Mapping[str, float]) -> list[Estimate]:
     """Estimates of `rpem_full` over a record."""
     estimator = rpem_full(setup, correct_state=dict(correct))
-    state, found = estimator.init(prior), []
+    state, estimates_in_turn = estimator.init(prior), []
     for sample in samples:
         state, estimate = estimator.update(state, sample)
-        found.append(estimate)
-    return found
+        estimates_in_turn.append(estimate)
+    return estimates_in_turn
 
 
 def main() -> None:
@@ -71,8 +71,8 @@ def main() -> None:
     for feed_step in (0.0, 0.2):
         for label, names in CASES.items():
             correct = {name: NOISE[name] for name in names}
-            found: FloatArray = np.median([figures(setup, seed, feed_step, correct) for seed in SEEDS], axis=0)
-            shown = [f"{v:.{d}f}" for v, d in zip(found, (3, 3, 3, 5, 0), strict=True)]
+            medians: FloatArray = np.median([figures(setup, seed, feed_step, correct) for seed in SEEDS], axis=0)
+            shown = [f"{v:.{d}f}" for v, d in zip(medians, (3, 3, 3, 5, 0), strict=True)]
             table.add_row(f"{feed_step:.0%}", label, *shown)
     Console(width=None if Console().is_terminal else 130).print(table)
 

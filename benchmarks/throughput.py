@@ -127,16 +127,18 @@ def main() -> None:
     count = parser.parse_args().runs
     study = replace(load_study("paper_1000"), seeds=tuple(range(1, count + 1)))
     problem = compiler_problem()
-    found = [measure(study, workers, compiled=c) for c in ([False] if problem else [False, True]) for workers in (1, 2)]
-    seconds = min(m.run_cpu_s for m in found)
-    found += [simulated(study, workers, seconds) for workers in SIMULATED]
+    measurements = [
+        measure(study, workers, compiled=c) for c in ([False] if problem else [False, True]) for workers in (1, 2)
+    ]
+    seconds = min(m.run_cpu_s for m in measurements)
+    measurements += [simulated(study, workers, seconds) for workers in SIMULATED]
     columns = ("runs", "workers", "number", "runs/s", "worker CPU/run [s]", "main CPU/run [ms]", "1000 runs [min]")
     table = Table(*columns, title=f"Scenario 1 x rpem on {core_count()} cores")
-    for m in found:
+    for m in measurements:
         table.add_row(*m.cells())
     console = Console(width=None if Console().is_terminal else 130)
     console.print(table)
-    for m in found[: -len(SIMULATED)]:
+    for m in measurements[: -len(SIMULATED)]:
         if m.workers == 2:
             quiet = 1000 * (m.run_cpu_s + m.main_cpu_s) / 2 / 60
             console.print(f"1000 runs, {m.what}, by processor time over two cores: {quiet:.1f} min (asked <= 5)")

@@ -31,8 +31,8 @@ LABELS = ("n", "C")
 
 def offset(table: pd.DataFrame, label: str) -> FloatArray:
     """By how much an adapted parameter differs from the truth, in percent of it, at each row (N,)."""
-    found: FloatArray = 100 * (table[f"{label}_estimate"] / table[f"{label}_true"] - 1).to_numpy(dtype=float)
-    return found[np.isfinite(found)]
+    relative: FloatArray = 100 * (table[f"{label}_estimate"] / table[f"{label}_true"] - 1).to_numpy(dtype=float)
+    return relative[np.isfinite(relative)]
 
 
 def not_white(table: pd.DataFrame, after: float) -> str:
@@ -49,20 +49,20 @@ def figures(scenario: Scenario, runs: list[Run]) -> dict[str, str]:
     (case,) = cases([(scenario, runs)])
     tables = [case.shown(run) for run in runs]
     ahead = [one_move_errors(t, run.plans)["error"].to_numpy(dtype=float) for t, run in zip(tables, runs, strict=True)]
-    found = {
+    rows = {
         "error one sample ahead, 1e-4": spread([1e4 * rms(one_step_errors(t, OUTPUT)) for t in tables], 1),
         "error one move ahead, 1e-4": spread([1e4 * rms(error) for error in ahead], 1),
     }
     for label in LABELS:
         off = [offset(t, label) for t in tables]
-        found[f"{label} off by, %"] = spread([float(np.median(o)) for o in off], 1)
-        found[f"{label} off by at times, %"] = f"{min(o.min() for o in off):.0f} to {max(o.max() for o in off):.0f}"
+        rows[f"{label} off by, %"] = spread([float(np.median(o)) for o in off], 1)
+        rows[f"{label} off by at times, %"] = f"{min(o.min() for o in off):.0f} to {max(o.max() for o in off):.0f}"
     for name, scale, digits in (("recovery", 1, 4), ("below_limit", 100, 2), ("value_cu_h", 1, 3)):
         shown = {"below_limit": "below limit, % of time", "value_cu_h": "value, cu/h"}.get(name, name)
-        found[shown] = spread([scale * run.account[name] for run in runs], digits)
+        rows[shown] = spread([scale * run.account[name] for run in runs], digits)
     for words, after in (("all", scenario.initial_rows * scenario.dt), ("late", scenario.fits_after)):
-        found[f"{words} windows not white, each seed"] = ", ".join(not_white(run.table, after) for run in runs)
-    return found
+        rows[f"{words} windows not white, each seed"] = ", ".join(not_white(run.table, after) for run in runs)
+    return rows
 
 
 def told(scenario: Scenario, run: Run, inquiry: Inquiry) -> str:
@@ -80,22 +80,22 @@ def told(scenario: Scenario, run: Run, inquiry: Inquiry) -> str:
     air = run.table.loc[run.table["time_s"].between(*inquiry.record_s), f"{effect.driver}_m3_s"]
     ends = np.array([air.min(), air.max()])
     slope = there.coefficients["slope"] / number(there.full_settings, "reference")  # its form is linear
-    found, true = (100 * np.expm1(change) for change in (np.diff(drawn(effect, ends))[0], slope * np.ptp(ends)))
-    return f"{words}; over the air of the record + {found:.1f} %, in the plant + {true:.1f} %"
+    estimated, true = (100 * np.expm1(change) for change in (np.diff(drawn(effect, ends))[0], slope * np.ptp(ends)))
+    return f"{words}; over the air of the record + {estimated:.1f} %, in the plant + {true:.1f} %"
 
 
 def main() -> None:
     """Measure and print."""
     scenario = load_scenario(SCENARIO)
-    found, lines = {}, []
+    columns, lines = {}, []
     for name in scenario.file.estimators:
         runs = run_scenario(scenario, [name], SEEDS)
-        found[name] = figures(scenario, runs)
+        columns[name] = figures(scenario, runs)
         lines += [told(scenario, run, i) for run in runs for i in run.inquiries or ()]
     title = f"{SCENARIO}, seeds {SEEDS[0]} to {SEEDS[-1]}, t > {scenario.fits_after:g} s: median and range"
-    table = Table("figure", *found, title=title)
-    for figure in next(iter(found.values())):
-        table.add_row(figure, *(found[name][figure] for name in found))
+    table = Table("figure", *columns, title=title)
+    for figure in next(iter(columns.values())):
+        table.add_row(figure, *(columns[name][figure] for name in columns))
     console = Console(width=None if Console().is_terminal else 180)
     console.print(table)
     for line in lines:

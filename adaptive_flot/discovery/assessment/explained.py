@@ -58,8 +58,8 @@ def regression_shares(record: Dataset, columns: tuple[int, ...]) -> FloatArray:
     moves it.
     """
     X, Y = _filtered(record), record.outputs[:, columns]
-    found: FloatArray = np.maximum(_validated(X, Y), _validated(_fast(X), _fast(Y)))
-    return found
+    explained: FloatArray = np.maximum(_validated(X, Y), _validated(_fast(X), _fast(Y)))
+    return explained
 
 
 def _validated(X: FloatArray, Y: FloatArray) -> FloatArray:
@@ -76,28 +76,28 @@ def _validated(X: FloatArray, Y: FloatArray) -> FloatArray:
 
 def _fast(series: FloatArray) -> FloatArray:
     """What changes within FAST_ROWS (N, r); NaN stays, and is bridged for what follows."""
-    found = np.full(series.shape, np.nan)
+    faster = np.full(series.shape, np.nan)
     keep = np.exp(-1 / FAST_ROWS)
     for j, s in enumerate(series.T):
         ok = np.flatnonzero(np.isfinite(s))
         if ok.size:
             whole = np.interp(np.arange(len(s)), ok, s[ok])
             slow = lfilter([1 - keep], [1, -keep], whole - whole[0])
-            found[ok, j] = (whole - whole[0] - slow)[ok]
-    return found
+            faster[ok, j] = (whole - whole[0] - slow)[ok]
+    return faster
 
 
 def _filtered(record: Dataset) -> FloatArray:
     """Every input that moves as it is and through lags of 2, 8, 32 ... rows, standardised (N, r)."""
-    found = []
+    regressors = []
     lags = [0.0, *(2.0 * 4**k for k in range(12) if 2.0 * 4**k < len(record) / 8)]
     for u in record.inputs.T:
         if np.std(u) == 0:
             continue
         for lag in lags:
             keep = np.exp(-1 / lag) if lag else 0.0
-            found.append(lfilter([1 - keep], [1, -keep], u - u[0]))
-    X = np.column_stack(found) if found else np.zeros((len(record), 1))
+            regressors.append(lfilter([1 - keep], [1, -keep], u - u[0]))
+    X = np.column_stack(regressors) if regressors else np.zeros((len(record), 1))
     standard: FloatArray = (X - X.mean(axis=0)) / np.maximum(X.std(axis=0), 1e-300)
     return standard
 
@@ -111,12 +111,12 @@ def _ridge(X: FloatArray, y: FloatArray, there: FloatArray) -> FloatArray:
 
 def _shares(measured: FloatArray, predicted: FloatArray) -> FloatArray:
     """1 - mean squared error over variance (m,), minus infinity where nothing can be compared."""
-    found = []
+    shares = []
     for y, p in zip(measured.T, predicted.T, strict=True):
         ok = np.isfinite(y) & np.isfinite(p)
         variance = float(np.var(y[ok])) if ok.sum() > 1 else 0.0
-        found.append(1 - float(np.mean((y[ok] - p[ok]) ** 2)) / variance if variance > 0 else -np.inf)
-    return np.array(found)
+        shares.append(1 - float(np.mean((y[ok] - p[ok]) ** 2)) / variance if variance > 0 else -np.inf)
+    return np.array(shares)
 
 
 def _percent(share: float) -> str:

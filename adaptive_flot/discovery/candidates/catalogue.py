@@ -51,7 +51,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     known = {(k.site, k.driver): k for k in model.known_effects}
     taken = {(e.site, e.driver) for e in model.effects}
     time = responses.problem.record.time
-    found = []
+    candidates = []
     signals = {s.name for s in model.signals} - set(model.late_drivers)
     for site in model.sites:
         unknown = signals - set(site.signals)  # defined further down: no effect here can depend on it
@@ -65,8 +65,8 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
                 variants += tuple(_otherwise(v, site) for v in either)
             if variants:
                 nameable = (site.name, driver) in known or _nameable(site, driver, bool(known))
-                found.append(Candidate(site, driver, nameable, variants))
-    return found
+                candidates.append(Candidate(site, driver, nameable, variants))
+    return candidates
 
 
 def _makes_sense(site: Site, driver: str) -> bool:

@@ -85,9 +85,9 @@ def _without(
     # the spline of the model, from SciPy: the model's own takes a hundred times as long to set up
     basis = CubicSpline(kept, np.eye(len(kept)), bc_type="natural")(knots)
     system = basis.T @ information @ basis
-    found: FloatArray = np.asarray(np.linalg.lstsq(system, basis.T @ information @ values, rcond=None)[0], dtype=float)
-    off = values - basis @ found
-    return float(off @ information @ off), found
+    fitted: FloatArray = np.asarray(np.linalg.lstsq(system, basis.T @ information @ values, rcond=None)[0], dtype=float)
+    off = values - basis @ fitted
+    return float(off @ information @ off), fitted
 
 
 def is_even(knots: list[float]) -> bool:

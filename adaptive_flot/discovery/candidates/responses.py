@@ -88,12 +88,12 @@ class Responses:
             rows = slice(start, min(start + ROWS_AT_ONCE, n))
             count = rows.stop - rows.start
             call = mapped.setdefault(count, over_rows(function, count))
-            found = call(self._at[rows].T, time[rows], self._steps[rows].T, p)
+            blocks = call(self._at[rows].T, time[rows], self._steps[rows].T, p)
             for target, value, height, width in (
-                (self._A, found[2], nx, nx),
-                (self._G, found[3], nx, q),
-                (self._C, found[4], ny, nx),
-                (self._H, found[5], ny, q),
+                (self._A, blocks[2], nx, nx),
+                (self._G, blocks[3], nx, q),
+                (self._C, blocks[4], ny, nx),
+                (self._H, blocks[5], ny, q),
             ):
                 target[rows] = np.array(value).reshape(height, count, width).transpose(1, 0, 2)
         columns = list(self.problem.columns)
@@ -159,12 +159,12 @@ class Responses:
             S[:, pushed] += self._G[i][:, source_of] * by_step[i]
         out[0] = out[1]
         kept = np.arange(len(profiles)) if rows is None else np.flatnonzero(rows)
-        found = np.empty((len(kept), m, r))
+        responses = np.empty((len(kept), m, r))
         for first in range(0, len(kept), FILLED_AT_ONCE):
-            part, part_of = found[first : first + FILLED_AT_ONCE], kept[first : first + FILLED_AT_ONCE]
+            part, part_of = responses[first : first + FILLED_AT_ONCE], kept[first : first + FILLED_AT_ONCE]
             part[:, :, moving] = self._spread(out, part_of)
             part[:, :, at_once] = self._direct[part_of][:, :, where[at_once]] * profiles[part_of][:, None, at_once]
-        return found
+        return responses
 
     def of(self, profiles: list[TimeProfile], rows: BoolArray | None = None) -> FloatArray:
         """Responses (N, m, r) of the measured outputs to r profiles; only of the true rows (N,), if given."""
@@ -185,8 +185,8 @@ class Responses:
         """One over the value at a site (N,), bounded: a pump that is off has no relative change."""
         value = self.site_values[site]
         least = LEAST_VALUE * float(np.max(np.abs(value), initial=0.0))
-        found: FloatArray = np.where(np.abs(value) > least, 1 / np.where(np.abs(value) > least, value, 1.0), 0.0)
-        return found
+        inverse: FloatArray = np.where(np.abs(value) > least, 1 / np.where(np.abs(value) > least, value, 1.0), 0.0)
+        return inverse
 
     def adapted_sites(self) -> tuple[str, ...]:
         """Sites whose constant change does what a change of an adapted parameter does, and nothing else.

@@ -27,8 +27,8 @@ def values_of(effect: Effect) -> list[float]:
 def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
     """Cardinal natural splines (N, knots) at the values (N,): numbers from the very function the model uses."""
     function = _spline_function(tuple(knots))
-    found: FloatArray = np.array(function.map(len(values))(values)).T
-    return found
+    basis: FloatArray = np.array(function.map(len(values))(values)).T
+    return basis
 
 
 @lru_cache(maxsize=64)
@@ -39,8 +39,8 @@ def _spline_function(knots: tuple[float, ...]) -> ca.Function:
 
 def drawn(effect: Effect, values: FloatArray) -> FloatArray:
     """A fitted curve (N,) at the values (N,) of its driver."""
-    found: FloatArray = spline_values(values, knots_of(effect)) @ values_of(effect)
-    return found
+    curve: FloatArray = spline_values(values, knots_of(effect)) @ values_of(effect)
+    return curve
 
 
 def through(like: Effect, knots: Sequence[float] | FloatArray, values: FloatArray) -> tuple[Variant, dict[str, float]]:

@@ -51,11 +51,11 @@ def event_scores(score: Score, curve: Effect) -> list[Score]:
     t = np.linspace(knots[0], knots[-1], POINTS)
     values = drawn(curve, t)
     span = float(t[-1] - t[0])
-    found = []
+    scores = []
     for form, role in (("ramp", CoefficientRole.DURATION), ("washout", CoefficientRole.TIME_CONSTANT)):
         amplitude, onset, length = _best(role, t, values, span)
-        found.append(_event(score, form, amplitude, (("onset", onset), (role.name.lower(), length)), curve, {}))
-    return found
+        scores.append(_event(score, form, amplitude, (("onset", onset), (role.name.lower(), length)), curve, {}))
+    return scores
 
 
 def step_score(score: Score, fitted: Effect, span: float) -> Score | None:

@@ -128,8 +128,8 @@ class Descent:
 
     def _white_std(self) -> FloatArray:
         """Noise by differencing: it needs no model."""
-        found = noise_by_differences(self.problem.measured / self.problem.weights)
-        return cast(FloatArray, np.maximum(np.nan_to_num(found), self.problem.floor))
+        deviations = noise_by_differences(self.problem.measured / self.problem.weights)
+        return cast(FloatArray, np.maximum(np.nan_to_num(deviations), self.problem.floor))
 
     def _first_noise(self, predicted: FloatArray | None = None) -> Noise:
         """White, and large: the first steps must not be steered by what a wrong model leaves.
@@ -157,11 +157,11 @@ class Descent:
         damping, exact = SHAPE_DAMPING if shaped else FIRST_DAMPING, True
         for _ in range(steps):
             A, b = self._system(z, predicted, slope, noise)
-            found = self._tried(z, value, noise, self._step(z, A, b), damping)
-            if found is None and exact:
+            gain_step = self._tried(z, value, noise, self._step(z, A, b), damping)
+            if gain_step is None and exact:
                 break
-            if found is not None:
-                trial, there, new, damping = found
+            if gain_step is not None:
+                trial, there, new, damping = gain_step
                 moved, gained = trial - z, value - new
                 promised = float(2 * b @ moved - moved @ A @ moved)
                 kept = gained > (SHAPE_KEPT if shaped else KEPT) * promised
@@ -217,12 +217,12 @@ class Descent:
         move = ~(at_lower | at_upper)
 
         def step(damping: float) -> FloatArray:
-            found = np.zeros(len(b))
+            moves = np.zeros(len(b))
             if not A.any():
-                return found  # the record says nothing of any unknown
+                return moves  # the record says nothing of any unknown
             system = A[np.ix_(move, move)] + damping * np.diag(size[move])
-            found[move] = np.linalg.solve(system, b[move])
-            return found
+            moves[move] = np.linalg.solve(system, b[move])
+            return moves
 
         return step
 
@@ -257,8 +257,8 @@ class Descent:
 def _corrected(slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
     """Derivatives (N, m, unknowns) that give the `change` (N, m) of the predictions along the step that made it."""
     along = weight * moved
-    found: FloatArray = slope + (change - slope @ moved)[:, :, None] * (along / max(float(moved @ along), 1e-300))
-    return found
+    updated: FloatArray = slope + (change - slope @ moved)[:, :, None] * (along / max(float(moved @ along), 1e-300))
+    return updated
 
 
 def _moderate(slope: FloatArray) -> bool:

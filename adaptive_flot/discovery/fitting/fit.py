@@ -103,8 +103,8 @@ def row_losses(problem: Problem, fit: Fit, rows: BoolArray) -> FloatArray:
     e = fit.noise.whiten((problem.measured - fit.predicted) / problem.weights)[rows]
     present = np.isfinite(e)
     squares = np.minimum(np.abs(np.where(present, e, 0)), problem.clip) ** 2
-    found: FloatArray = np.sum(squares + 2 * np.log(fit.noise.std) * present, axis=1)
-    return found
+    losses: FloatArray = np.sum(squares + 2 * np.log(fit.noise.std) * present, axis=1)
+    return losses
 
 
 def parameters_of(fit: Fit) -> FloatArray:

@@ -137,7 +137,7 @@ class Unknowns:
 def _along(scales: Sequence[float]) -> FloatArray:
     """Directions (nx, r <= 2) of the states whose scale is not zero, a chain of lags: all as one, and evenly spread."""
     new = np.flatnonzero(scales)
-    found = np.zeros((len(scales), min(len(new), 2)))
-    for k in range(found.shape[1]):
-        found[new, k] = LAGGED_SCALES * np.array(scales)[new] * np.linspace(1, -1, len(new)) ** k
-    return found
+    directions = np.zeros((len(scales), min(len(new), 2)))
+    for k in range(directions.shape[1]):
+        directions[new, k] = LAGGED_SCALES * np.array(scales)[new] * np.linspace(1, -1, len(new)) ** k
+    return directions

@@ -99,8 +99,8 @@ class Experiment:
         """Entry of the machine-readable verdict."""
         names = [f"{name} [{unit}]" for name, unit in self.quantities]
 
-        def pairs(found: Names) -> list[dict[str, str]]:
-            return [{"site": s, "driver": d} for s, d in found]
+        def pairs(alternative: Names) -> list[dict[str, str]]:
+            return [{"site": s, "driver": d} for s, d in alternative]
 
         return {
             "test": self.name,

@@ -113,11 +113,11 @@ def fit_variant(
     shape = {effect.parameter(k) for k, _ in score.variant.start}
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
     first = first if drawn else limited(model, effect, first)
-    found = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
+    fit = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
     in_time = effect.driver == "time" and effect.family.is_curve and len(names) <= FINE_TIME_KNOTS
-    if found is not None and steps == MOST_STEPS and in_time:
-        return fitter.settled(found, bounds, WORTH_A_RESTART)
-    return found
+    if fit is not None and steps == MOST_STEPS and in_time:
+        return fitter.settled(fit, bounds, WORTH_A_RESTART)
+    return fit
 
 
 def variant_model(start: Fit, score: Score) -> Model:
@@ -140,14 +140,14 @@ def fixed_coefficients(effect: Effect) -> dict[str, float]:
 
 def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:
     """Start values inside their ranges, and a change at a site of at most a factor of two and a half."""
-    found = {}
+    inside = {}
     for c in effect.terms:
         name = effect.parameter(c.name)
         if name in start:
             parameter = model.parameters[model.index("parameters", name)]
             value = float(np.clip(start[name], parameter.lower, parameter.upper))
-            found[name] = float(np.clip(value, -0.9, 0.9)) if c.is_level else value
-    return found
+            inside[name] = float(np.clip(value, -0.9, 0.9)) if c.is_level else value
+    return inside
 
 
 def effect_bounds(problem: Problem, model: Model, effect: Effect) -> dict[str, tuple[float, float]]:

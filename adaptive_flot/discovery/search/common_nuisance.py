@@ -26,45 +26,45 @@ MOST_RIVALS = 8
 
 
 def adjust_for_common_nuisance(
-    problem: Problem, found: SearchResult, near: Sequence[Alternative], processes: int = 1
+    problem: Problem, result: SearchResult, near: Sequence[Alternative], processes: int = 1
 ) -> SearchResult:
     """The search with its best and those that are `near` it compared anew, each with what the best one lacks added.
 
     Unchanged when nothing of the kind is left, when too many are near, or when who wins does not stand on fresh rows.
     """
-    best = found.alternatives[0]
+    best = result.alternatives[0]
     if not 0 < len(near) <= MOST_RIVALS:
-        return found
+        return result
     score = _lacking(scorer_of(problem, best.fit)[0], best)
     if score is None or score.gain > MINOR * best.gain:
-        return found
+        return result
     nuisance = score.candidate.name
     fitter = Fitter(problem)
     score = _shaped(fitter, best, score)
     if score is None:
-        return found
+        return result
     taking = [best, *(a for a in near if nuisance not in a.names)]
     fits = parallel_map(lambda k: fit_variant(fitter, taking[k].fit, score, MOST_STEPS), range(len(taking)), processes)
     adjusted = {a.names: fit for a, fit in zip(taking, fits, strict=True) if fit}
     if len(adjusted) < len(taking):
-        return found
+        return result
     # a rival that is the nuisance itself is compared with the best that has it: if that is better, it alone is not all
     adjusted |= {a.names: a.fit for a in near if nuisance in a.names}
     winner = min((best, *near), key=lambda a: adjusted[a.names].bic)
-    checked = found.verification if winner is best else verify(problem, found.base, winner.fit)
+    checked = result.verification if winner is best else verify(problem, result.base, winner.fit)
     if winner.names == (nuisance,) or checked is None or not checked.confirmed:
-        return found
+        return result
     differences = loglik_difference_sds(problem, adjusted[winner.names], list(adjusted.values()))
     after = {n: (fit.bic, d) for (n, fit), d in zip(adjusted.items(), differences, strict=True)}
     changed = [
         replace(a, adjusted_bic=after[a.names][0], loglik_difference_sd=after[a.names][1]) if a.names in after else a
-        for a in found.alternatives
+        for a in result.alternatives
     ]
     changed.sort(key=lambda a: (a.adjusted_bic is None, a.fit.bic if a.adjusted_bic is None else a.adjusted_bic))
     scorer, _ = scorer_of(problem, adjusted[winner.names].with_model(lambda: variant_model(winner.fit, score)))
     left, threshold = what_is_left(scorer, threshold_of(scorer))
     return replace(
-        found,
+        result,
         alternatives=tuple(changed),
         verification=checked,
         left=left,

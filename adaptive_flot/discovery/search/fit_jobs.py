@@ -68,15 +68,15 @@ def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
     """Best variant of each form (and mode) of a candidate that comes near the best, from where the first rung ended."""
     name, ended = fitted.score.candidate.name, fitted.alternative
     score = next(s for s in linearisation.scores if s.candidate.name == name)
-    found: dict[tuple[str, str | None], Score] = {}
+    best_of_form: dict[tuple[str, str | None], Score] = {}
     for s in linearisation.scorer.variant_scores(score.candidate):
         key = s.variant.effect.form, s.variant.effect.mode
-        if key not in found and s.gain > 0.5 * score.gain:
-            found[key] = s
+        if key not in best_of_form and s.gain > 0.5 * score.gain:
+            best_of_form[key] = s
     in_time = score.candidate.driver == "time"
-    kept = list(found.values())[:FORMS_EACH]
+    kept = list(best_of_form.values())[:FORMS_EACH]
     if in_time:  # the curve, which events start from
-        kept = [s for s in found.values() if s.variant.effect.family.is_curve] or [score]
+        kept = [s for s in best_of_form.values() if s.variant.effect.family.is_curve] or [score]
     jobs = []
     for s in kept:
         same = s.variant.effect.family.is_curve and s.variant.effect == fitted.score.variant.effect
@@ -97,18 +97,18 @@ def constants(scorer: Scorer, ended: list[Alternative]) -> list[tuple[Score, Fit
     """
     scores = {s.candidate.name: s.gain for s in scorer.scores()}
     at = {s.candidate.site.name: s for s in scorer.scores() if s.candidate.driver == "constant"}
-    found: dict[str, tuple[Score, Fit]] = {}
+    at_site: dict[str, tuple[Score, Fit]] = {}
     for a in ended[:MOST_CONSTANTS]:
         effect = a.effects[-1]
         site, levels = effect.site, effect.levels
-        if effect.driver in ("constant", *DYNAMIC_DRIVERS) or site not in at or site in found or not levels:
+        if effect.driver in ("constant", *DYNAMIC_DRIVERS) or site not in at or site in at_site or not levels:
             continue
         nearly = at[site].gain > NEARLY * scores.get((site, effect.driver), np.inf)
         if not nearly and (effect.driver == "time" or _bend(a.fit, effect) > BENT * max(a.gain, 0.0)):
             continue
         shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
-        found[site] = replace(shift, start={"amplitude": float(np.mean(levels))}), a.fit
-    return list(found.values())
+        at_site[site] = replace(shift, start={"amplitude": float(np.mean(levels))}), a.fit
+    return list(at_site.values())
 
 
 def unbent(constant: FittedJob, ended: list[FittedJob], scorer: Scorer) -> list[Job]:
@@ -150,13 +150,13 @@ def _bend(fit: Fit, effect: Effect) -> float:
 def events(scores: list[Score], ended: list[Alternative]) -> list[Score]:
     """Events at the sites of fitted curves in time, started from the best curve of each."""
     by_name = {s.candidate.name: s for s in scores}
-    found: dict[tuple[str, str], list[Score]] = {}
+    by_candidate: dict[tuple[str, str], list[Score]] = {}
     for a in ended:
         effect, name = a.effects[-1], a.names[-1]
-        wanted = effect.driver == "time" and effect.family.is_curve and name not in found
-        if wanted and len(found) < MOST_PROFILES:
-            found[name] = event_scores(by_name[name], effect)
-    return [s for group in found.values() for s in group]
+        wanted = effect.driver == "time" and effect.family.is_curve and name not in by_candidate
+        if wanted and len(by_candidate) < MOST_PROFILES:
+            by_candidate[name] = event_scores(by_name[name], effect)
+    return [s for group in by_candidate.values() for s in group]
 
 
 def step(fitted: FittedJob, span: float) -> list[Job]:
@@ -168,10 +168,10 @@ def step(fitted: FittedJob, span: float) -> list[Job]:
 def more_freedom(fitted: FittedJob, low: float, high: float) -> list[Job]:
     """The same time profile with more freedom, where a curve or a smooth event was the best of its name."""
     effect = fitted.alternative.effects[-1]
-    found = freer(effect, low, high) if effect.driver == "time" else None
-    if found is None:
+    freed = freer(effect, low, high) if effect.driver == "time" else None
+    if freed is None:
         return []
-    variant, start = found
+    variant, start = freed
     return [
         Job(
             fitted.linearisation,
@@ -184,17 +184,17 @@ def more_freedom(fitted: FittedJob, low: float, high: float) -> list[Job]:
 
 def fewer_knots(runs: list[FittedJob], price: float) -> list[Job]:
     """For each name the curve that should come out best without the knots that it does not need, from its fit."""
-    found: dict[tuple[tuple[str, str], ...], tuple[float, Job]] = {}
+    best: dict[tuple[tuple[str, str], ...], tuple[float, Job]] = {}
     for fitted in runs:
         a = fitted.alternative
         less = trimmed(a.fit, a.effects[-1], price)
         if less is None:
             continue
         promised = a.fit.bic - less.gain
-        if a.names not in found or promised < found[a.names][0]:
+        if a.names not in best or promised < best[a.names][0]:
             score = replace(fitted.score, variant=less.variant, start=less.start)
-            found[a.names] = promised, Job(fitted.linearisation, score, a.fit, drawn=True)
-    return [job for _, job in found.values()]
+            best[a.names] = promised, Job(fitted.linearisation, score, a.fit, drawn=True)
+    return [job for _, job in best.values()]
 
 
 def from_scratch(jobs: list[Job]) -> list[Job]:
@@ -208,9 +208,9 @@ def is_curve(fitted: FittedJob) -> bool:
     return fitted.score.variant.effect.family.is_curve
 
 
-def best_of_each(found: list[FittedJob]) -> list[FittedJob]:
+def best_of_each(jobs: list[FittedJob]) -> list[FittedJob]:
     """The best fit of each name, best first."""
     best: dict[tuple[tuple[str, str], ...], FittedJob] = {}
-    for fitted in sorted(found, key=lambda fitted: fitted.alternative.fit.bic):
+    for fitted in sorted(jobs, key=lambda fitted: fitted.alternative.fit.bic):
         best.setdefault(fitted.alternative.names, fitted)
     return list(best.values())

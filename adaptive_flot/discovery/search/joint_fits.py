@@ -60,7 +60,7 @@ class JointFits:
 
     def rounds(self, most: int, done: Callable[[], None] = lambda: None) -> list[list[Alternative]]:
         """Alternatives with one effect, with two, ... up to `most`, each list best first."""
-        found: list[list[Alternative]] = []
+        ranked_rounds: list[list[Alternative]] = []
         kept: list[Combination] = [Combination(())]
         for _ in range(most):
             wanted: dict[frozenset[tuple[str, str]], Combination] = {}
@@ -73,9 +73,9 @@ class JointFits:
             if not wanted:
                 break
             ranked = self._fits(list(wanted.values()), done)
-            found.append([a for a, _ in ranked])
+            ranked_rounds.append([a for a, _ in ranked])
             kept = [c for _, c in ranked[:BEAM]]
-        return found
+        return ranked_rounds
 
     def _fits(self, wanted: list[Combination], done: Callable[[], None]) -> list[tuple[Alternative, Combination]]:
         """Best of several starts of each combination; the best few to the end, from their best start and a new one."""
@@ -104,11 +104,11 @@ class JointFits:
     def _variants(self, combination: Combination, k: int) -> list[Score]:
         """The best variant of each effect at start 0; another one of its best form at the others."""
         rng = np.random.default_rng([k, len(combination.scores)])
-        found = []
+        variants = []
         for s in combination.scores:
             same = [v for v in self.scorer.variant_scores(s.candidate) if _form(v) == _joint_form(self.scorer, s)]
-            found.append(same[0] if k == 0 else same[int(rng.integers(len(same)))])
-        return found
+            variants.append(same[0] if k == 0 else same[int(rng.integers(len(same)))])
+        return variants
 
     def _from_start(self, combination: Combination, k: int, steps: int) -> Fit | None:
         variants = self._variants(combination, k)
@@ -135,9 +135,9 @@ class JointFits:
     def _model(self, effects: list[Effect]) -> Model:
         return self.base.model.with_effects([replace(e, coefficients=fixed_coefficients(e)) for e in effects])
 
-    def _alternative(self, combination: Combination, k: int, found: Fit) -> Alternative:
+    def _alternative(self, combination: Combination, k: int, fitted: Fit) -> Alternative:
         effects = [v.variant.effect for v in self._variants(combination, k)]
-        fit = found.with_model(lambda: self._model(effects))
+        fit = fitted.with_model(lambda: self._model(effects))
         known = tuple(nameable(fit.model, e, True) for e in fit.model.fitted_effects()[-len(effects) :])
         return Alternative(combination.names, known, fit, self.base.loss - fit.loss, fit.bic - self.base.bic)
 
@@ -176,11 +176,11 @@ def discount(problem: Problem, fit: Fit, rows: float) -> Fit:
 
 def discounted(problem: Problem, base: Fit, alternatives: list[Alternative], rows: float) -> tuple[Alternative, ...]:
     """The same alternatives with evidence counted once every `rows` rows, best first; so is that of `base` already."""
-    found = []
+    ranked = []
     for a in alternatives:
         fit = discount(problem, a.fit, rows)
-        found.append(replace(a, fit=fit, gain=a.gain / rows, delta_bic=fit.bic - base.bic))
-    return tuple(sorted(found, key=lambda a: a.fit.bic))
+        ranked.append(replace(a, fit=fit, gain=a.gain / rows, delta_bic=fit.bic - base.bic))
+    return tuple(sorted(ranked, key=lambda a: a.fit.bic))
 
 
 def cross_validated(problem: Problem, fit: Fit, processes: int) -> Fit:
@@ -195,8 +195,8 @@ def cross_validated(problem: Problem, fit: Fit, processes: int) -> Fit:
     def without(block: NDArray[np.intp]) -> FloatArray | None:
         hidden = problem.splits.copy()
         hidden[block] = ""
-        found = Fitter(replace(problem, splits=hidden)).fit(fit.model, fit.names, like=fit, rounds=1)
-        return found.predicted[block] if found else None
+        refitted = Fitter(replace(problem, splits=hidden)).fit(fit.model, fit.names, like=fit, rounds=1)
+        return refitted.predicted[block] if refitted else None
 
     predicted = fit.predicted.copy()
     for block, values in zip(blocks, parallel_map(without, blocks, processes), strict=True):

@@ -35,9 +35,9 @@ DOMINATES = 3.0
 """Model error this many times as large as the noise is what a noise model would wrongly explain."""
 
 
-def wants_joint(problem: Problem, found: SearchResult) -> bool:
+def wants_joint(problem: Problem, result: SearchResult) -> bool:
     """Whether fits are cheap and the error of the best alternative outweighs the noise by far."""
-    best = found.alternatives[0].fit if found.alternatives else found.base
+    best = result.alternatives[0].fit if result.alternatives else result.base
     steps = len(problem.record) * Stepper(best.model, problem.record.dt).substeps
     cost = steps * len(best.initial_state) ** 2
     return cost <= CHEAP and dominated(problem, best)
@@ -53,7 +53,7 @@ def dominated(problem: Problem, fit: Fit) -> bool:
 
 def search_jointly(
     problem: Problem,
-    found: SearchResult,
+    one_by_one: SearchResult,
     *,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
@@ -79,13 +79,13 @@ def search_jointly(
     """
     chosen = np.where(problem.splits == "confirm", "estimate", problem.splits)
     plain = replace(problem, whiten=False, splits=chosen, weights=np.ones_like(problem.weights))
-    base = Fitter(plain).fit(found.base.model, like=found.base, rounds=2, steps=LAST_STEPS) or found.base
+    base = Fitter(plain).fit(one_by_one.base.model, like=one_by_one.base, rounds=2, steps=LAST_STEPS) or one_by_one.base
     say = "fit several effects at once"
     progress(say)
     scorer, _ = scorer_of(plain, base)
     rounds = [r for r in JointFits(plain, base, scorer, processes).rounds(MOST_AT_ONCE, lambda: progress(say)) if r]
     if not rounds:
-        return problem, found
+        return problem, one_by_one
     rows_per_effective_sample = correlation_time(plain, min((r[0] for r in rounds), key=lambda a: a.fit.loss).fit)
     base = discount(plain, base, rows_per_effective_sample)
     scores = tuple(scorer.scores())
@@ -95,8 +95,8 @@ def search_jointly(
         reference = best.alternatives[0].fit if best else base
         if table.alternatives[0].fit.bic < reference.bic - LEAST_EVIDENCE:
             best = table
-    if best is None or not _better(plain, base, best.alternatives[0].fit, found, rows_per_effective_sample):
-        return problem, found
+    if best is None or not _better(plain, base, best.alternatives[0].fit, one_by_one, rows_per_effective_sample):
+        return problem, one_by_one
     progress("confirm")
     chosen_fit = best.alternatives[0].fit
     seen = replace(plain, splits=np.where(chosen == "estimate", "confirm", chosen))
@@ -104,7 +104,7 @@ def search_jointly(
     checked = replace(checked, where="by cross-validation, on rows that also helped to choose the effects")
     left = _left(plain, chosen_fit, rows_per_effective_sample)
     return plain, replace(
-        found,
+        one_by_one,
         base=base,
         rounds=tuple(tables),
         alternatives=best.alternatives,
@@ -115,11 +115,13 @@ def search_jointly(
     )
 
 
-def _better(problem: Problem, base: Fit, joint: Fit, found: SearchResult, rows_per_effective_sample: float) -> bool:
+def _better(
+    problem: Problem, base: Fit, joint: Fit, one_by_one: SearchResult, rows_per_effective_sample: float
+) -> bool:
     """Whether effects that were found at once beat what one after the other came to, fitted to the same rows."""
-    if not found.alternatives:
+    if not one_by_one.alternatives:
         return True
-    one = found.alternatives[0].fit
+    one = one_by_one.alternatives[0].fit
     again = Fitter(problem).fit(one.model, one.names, like=one, rounds=2, steps=LAST_STEPS)
     return again is None or joint.bic < discount(problem, again, rows_per_effective_sample).bic - LEAST_EVIDENCE
 

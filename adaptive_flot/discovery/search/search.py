@@ -98,23 +98,23 @@ def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
     return fitter.fit(nominal, bounds=bounds, rounds=2)
 
 
-def _confirmed(problem: Problem, found: SearchResult, accepted: list[Round]) -> SearchResult:
+def _confirmed(problem: Problem, result: SearchResult, accepted: list[Round]) -> SearchResult:
     """Keep the largest model that stands on the confirm split; failing that, the first, with what it left."""
     for r in reversed(accepted):
-        verification = verify(problem, found.base, r.alternatives[0].fit)
+        verification = verify(problem, result.base, r.alternatives[0].fit)
         if verification.confirmed or r is accepted[0]:
             last = r is accepted[-1]
-            left = found.left if last else max(found.left, r.alternatives[0].fit.bic - _best_bic(accepted))
+            left = result.left if last else max(result.left, r.alternatives[0].fit.bic - _best_bic(accepted))
             best = r.alternatives[0].fit
-            rows_each = rows_per_effective_sample(problem, found.base, best)
+            rows_each = rows_per_effective_sample(problem, result.base, best)
             differences = loglik_difference_sds(problem, best, [a.fit for a in r.alternatives])
             compared = tuple(
                 replace(a, loglik_difference_sd=d) for a, d in zip(r.alternatives, differences, strict=True)
             )
             return replace(
-                found, alternatives=compared, verification=verification, left=left, rows_per_effective_sample=rows_each
+                result, alternatives=compared, verification=verification, left=left, rows_per_effective_sample=rows_each
             )
-    return found
+    return result
 
 
 def _best_bic(rounds: list[Round]) -> float:
@@ -153,7 +153,7 @@ def _round(
 ) -> Round:
     threshold = max(map(threshold_of, scorers))
     scores = tuple(scorers[0].scores())
-    found: list[Alternative] = []
+    alternatives: list[Alternative] = []
     for k, before in enumerate(beam):
         if before is not None and k:
             scorers = [scorer_of(problem, before.fit)[0]]
@@ -165,18 +165,18 @@ def _round(
             wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
             linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")
-        found += refit(fitter, base, linearisations, before, processes, lambda: progress("fit"))
-    if found and beam[0] is not None:
-        found += simpler(fitter, base, min(found, key=lambda a: a.fit.bic))
+        alternatives += refit(fitter, base, linearisations, before, processes, lambda: progress("fit"))
+    if alternatives and beam[0] is not None:
+        alternatives += simpler(fitter, base, min(alternatives, key=lambda a: a.fit.bic))
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
-    for a in sorted(found, key=lambda a: a.fit.bic):
+    for a in sorted(alternatives, key=lambda a: a.fit.bic):
         unique.setdefault(frozenset(a.names), a)
     return Round(scores, threshold, _without_flat(problem, base, list(unique.values())))
 
 
-def _without_flat(problem: Problem, base: Fit, found: list[Alternative]) -> tuple[Alternative, ...]:
+def _without_flat(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tuple[Alternative, ...]:
     """Leave out dependences that turned out flat: those that add next to nothing to a constant at the same site."""
-    by_names = {frozenset(a.names): a for a in found}
+    by_names = {frozenset(a.names): a for a in alternatives}
 
     def flat(a: Alternative) -> bool:
         for k, (site, driver) in enumerate(a.names):
@@ -187,7 +187,7 @@ def _without_flat(problem: Problem, base: Fit, found: list[Alternative]) -> tupl
                 return True
         return False
 
-    return tuple(a for a in found if not flat(a))
+    return tuple(a for a in alternatives if not flat(a))
 
 
 def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None]:
@@ -195,16 +195,16 @@ def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None
     return [best, *others[: width - 1]]
 
 
-def better(problem: Problem, base: Fit, before: Alternative | None, found: Round) -> bool:
+def better(problem: Problem, base: Fit, before: Alternative | None, latest: Round) -> bool:
     """Whether the best alternative of a round brings evidence and, as a further effect, substance.
 
     Evidence: its BIC is lower by the round's threshold. Substance: it removes more than SUBSTANCE of the excess error
     (see `_excess`) of the model as it is.
     """
-    if not found.alternatives:
+    if not latest.alternatives:
         return False
-    best, reference = found.alternatives[0], before.fit if before else base
-    if not best.fit.bic <= reference.bic - found.threshold:
+    best, reference = latest.alternatives[0], before.fit if before else base
+    if not best.fit.bic <= reference.bic - latest.threshold:
         return False
     return before is None or _excess(problem, reference, best.fit) > SUBSTANCE * _excess(problem, base, best.fit)
 

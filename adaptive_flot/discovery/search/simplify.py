@@ -21,7 +21,7 @@ def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
 
     Left out is what would name a constant twice, and what can not be simulated.
     """
-    found = []
+    alternatives = []
     for k, effect in enumerate(a.effects):
         constant = (effect.site, "constant")
         if effect.driver in STATELESS_DRIVERS or constant in a.names or effect.family.static is None:
@@ -32,8 +32,8 @@ def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
         if fit is not None:
             names = (*a.names[:k], constant, *a.names[k + 1 :])
             known = (*a.known[:k], True, *a.known[k + 1 :])
-            found.append(Alternative(names, known, fit, base.loss - fit.loss, fit.bic - base.bic))
-    return found
+            alternatives.append(Alternative(names, known, fit, base.loss - fit.loss, fit.bic - base.bic))
+    return alternatives
 
 
 def _middle(effect: Effect) -> float:

@@ -74,9 +74,9 @@ def refit(
     last = halving.last(first)
     followers = halving.followers(last)
     bent = halving.bent(followers, last)
-    found = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
-    found = best_of_each([*halving.trimmed(found[:MOST_FREED]), *found])
-    ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(found, last), *found])]
+    best = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
+    best = best_of_each([*halving.trimmed(best[:MOST_FREED]), *best])
+    ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(best, last), *best])]
     exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
     return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
 
@@ -107,7 +107,7 @@ class _SuccessiveHalving:
             return fit_variant(self.fitter, self._start(job.linearisation), job.score, steps, job.warm, job.drawn)
 
         fits = parallel_map(work, range(len(jobs)), self.processes, self.done)
-        found = [
+        done = [
             FittedJob(
                 job.linearisation,
                 job.score,
@@ -116,7 +116,7 @@ class _SuccessiveHalving:
             for job, fit in zip(jobs, fits, strict=True)
             if fit
         ]
-        return sorted(found, key=lambda fitted: fitted.alternative.fit.bic)
+        return sorted(done, key=lambda fitted: fitted.alternative.fit.bic)
 
     def _start(self, linearisation: int) -> Fit:
         return self.linearisations[linearisation].scorer.fit
@@ -169,13 +169,13 @@ class _SuccessiveHalving:
         near = [fitted for fitted in best_of_each(followers) if fitted.alternative.gain > CLOSE_GAIN * most]
         return self._run([job for fitted in near for job in step(fitted, self.high - self.low)])
 
-    def freed(self, found: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
+    def freed(self, best: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
         """Time profiles with more freedom where that pays; whom a rough profile is to tell apart must all have it."""
-        freed = self._freer(found[:FREED], found, last)
+        freed = self._freer(best[:FREED], best, last)
         if freed:
             ended = {fitted.alternative.names for fitted in last}
-            others = [fitted for fitted in found[FREED:MOST_FREED] if fitted.alternative.names in ended]
-            freed += self._freer(others, found, last)
+            others = [fitted for fitted in best[FREED:MOST_FREED] if fitted.alternative.names in ended]
+            freed += self._freer(others, best, last)
         return freed
 
     def trimmed(self, jobs: list[FittedJob]) -> list[FittedJob]:
@@ -188,22 +188,22 @@ class _SuccessiveHalving:
         count = self.fitter.problem.count(self.fitter.rows)
         return fewer_knots(near, float(np.log(max(count, 2))))
 
-    def _freer(self, jobs: list[FittedJob], found: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
+    def _freer(self, jobs: list[FittedJob], best: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
         names = {fitted.alternative.names for fitted in jobs}
         curves = best_of_each([fitted for fitted in last if fitted.alternative.names in names and is_curve(fitted)])
         both = [*(fitted for fitted in jobs if not is_curve(fitted)), *curves]
         free = self._run([job for fitted in both for job in more_freedom(fitted, self.low, self.high)])
         fewer = self._fewer(free)
         free += self._run([*fewer, *from_scratch(fewer)])
-        bound = {fitted.alternative.names: fitted.alternative.fit for fitted in found}
+        bound = {fitted.alternative.names: fitted.alternative.fit for fitted in best}
         problem = self.fitter.problem
         return [r for r in free if worth_its_freedom(problem, bound[r.alternative.names], r.alternative.fit)]
 
 
-def _close(found: list[Alternative]) -> list[Alternative]:
+def _close(alternatives: list[Alternative]) -> list[Alternative]:
     """Alternatives that gained about as much as the best: what else is far behind it is not worth more forms."""
-    most = max((a.gain for a in found), default=0.0)
-    return [a for a in found if a.gain > CLOSE_GAIN * most]
+    most = max((a.gain for a in alternatives), default=0.0)
+    return [a for a in alternatives if a.gain > CLOSE_GAIN * most]
 
 
 def _exact(fitter: Fitter, base: Fit, a: Alternative) -> Alternative:
@@ -227,8 +227,8 @@ def _finalists(loss: float, ranked: list[FittedJob], tied: set[tuple[str, str]])
     return chosen[:MOST_FINALISTS]
 
 
-def _alternative(base: Fit, start: Fit, score: Score, found: Fit, before: Alternative | None) -> Alternative:
-    fit = found.with_model(lambda: variant_model(start, score))
+def _alternative(base: Fit, start: Fit, score: Score, fitted: Fit, before: Alternative | None) -> Alternative:
+    fit = fitted.with_model(lambda: variant_model(start, score))
     return Alternative(
         (*(before.names if before else ()), score.candidate.name),
         (*(before.known if before else ()), nameable(fit.model, fit.model.fitted_effects()[-1], score.candidate.known)),

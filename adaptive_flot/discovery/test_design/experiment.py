@@ -83,7 +83,9 @@ def plan_experiment(
     if not moved:
         return None
     best = moved[0]
-    found = [Pair(compared[a].names, compared[b].names, float(d)) for (a, b), d in zip(pairs, table[best], strict=True)]
+    separations = [
+        Pair(compared[a].names, compared[b].names, float(d)) for (a, b), d in zip(pairs, table[best], strict=True)
+    ]
     return Experiment(
         tests[best].name,
         problem.record.dt,
@@ -92,7 +94,7 @@ def plan_experiment(
         tuple(run[best].outputs for run in runs),
         tuple(a.names for a in compared),
         noise.stationary_std() * np.median(problem.weights, axis=0),
-        tuple(sorted(found, key=lambda pair: pair.separation)),
+        tuple(sorted(separations, key=lambda pair: pair.separation)),
         tuple(Tried(tests[k].name, float(closest[k])) for k in order),
         needed,
     )

@@ -53,15 +53,15 @@ def predictions(problem: Problem, fit: Fit, noise: Noise, tests: Sequence[FloatA
     stepper = Stepper(held, record.dt)
     weight = np.median(problem.weights, axis=0)
     measured = np.isfinite(problem.measured)[-len(tests[0]) :]
-    found = []
+    predicted = []
     for test in tests:
         zero = np.zeros((len(start), len(names)))
         s = stepper.simulate_sensitivities(start, test, held.parameter_values, names, zero, end)
         y = s.outputs[:, columns]
         white = noise.whiten(y / weight)[measured]
         slopes = noise.whiten(s.gradient[:, columns] / weight[:, None])[measured]
-        found.append(Prediction(y, white, slopes @ root))
-    return found
+        predicted.append(Prediction(y, white, slopes @ root))
+    return predicted
 
 
 def hold_time(model: Model, time: float) -> Model:

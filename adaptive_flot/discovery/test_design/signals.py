@@ -123,5 +123,5 @@ def _binary(rows: int, place: int = 0, count: int = 1) -> FloatArray:
     """Maximum-length sequence over the test; several inputs get it turned by equal shares, which keeps them apart."""
     bits = max_len_seq(REGISTER)[0]
     turned = np.roll(bits, place * len(bits) // count)
-    found: FloatArray = turned[np.arange(rows) * len(bits) // rows].astype(float)
-    return found
+    levels: FloatArray = turned[np.arange(rows) * len(bits) // rows].astype(float)
+    return levels

@@ -120,17 +120,17 @@ def _spread(gradient: FloatArray, covariance: FloatArray) -> FloatArray:
 
     sqrt(diag(G C G')): the delta method (Rao, *Linear Statistical Inference*, 2nd ed., 6a.2).
     """
-    found: FloatArray = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0))
-    return found
+    deviations: FloatArray = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradient, covariance, gradient), 0))
+    return deviations
 
 
 def _covariance(fit: Fit, names: Sequence[str]) -> FloatArray:
     """Covariance of some parameters; zero where one was held."""
-    found = np.zeros((len(names), len(names)))
+    covariance = np.zeros((len(names), len(names)))
     free = [i for i, n in enumerate(names) if n in fit.names]
     where = [fit.names.index(names[i]) for i in free]
-    found[np.ix_(free, free)] = fit.covariance[np.ix_(where, where)]
-    return found
+    covariance[np.ix_(free, free)] = fit.covariance[np.ix_(where, where)]
+    return covariance
 
 
 def _law(effect: Effect, value: float) -> tuple[ca.Function, ca.Function]:

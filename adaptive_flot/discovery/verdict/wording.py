@@ -30,7 +30,7 @@ def _largest_move(values: list[float]) -> float:
 
 def reason_words(
     judgement: Judgement,
-    found: SearchResult,
+    result: SearchResult,
     effects: tuple[NamedEffect, ...],
     drift: tuple[str, ...],
     contradiction: str = "",
@@ -52,7 +52,7 @@ def reason_words(
             "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
             "noise would, or what it removes does not stand on rows that did not choose it."
         )
-    evidence = f"{found.verification}" if found.verification else ""
+    evidence = f"{result.verification}" if result.verification else ""
     said = "; and ".join(f"{e.effect.site} depends on {e.effect.driver} ({e.meaning})" for e in effects)
     if judgement.word == "named":
         return f"The model lacks this: {said}. {evidence}."

@@ -17,7 +17,7 @@ def findings(comparison: Comparison) -> list[str]:
 
 
 def _gains(comparison: Comparison) -> list[str]:
-    found = []
+    sentences = []
     for oracle in (c for c in comparison.contenders if c.estimator == ORACLE):
         fixed, gains = comparison.rival(oracle, FIXED), comparison.gain(oracle, "value_cu_h")
         if fixed is None or not gains.size:
@@ -41,15 +41,15 @@ def _gains(comparison: Comparison) -> list[str]:
             if np.isfinite(share).any()
         ]
         if told:
-            found.append(f"{text}; {', '.join(told)}.")
+            sentences.append(f"{text}; {', '.join(told)}.")
         elif gain.median > 0:
-            found.append(f"{text}.")
+            sentences.append(f"{text}.")
         else:
-            found.append(
+            sentences.append(
                 f"{text}, so there is no gain to take a share of: fixed parameters spend {_below(fixed)} of the time "
                 f"below the grade limit, the oracle {_below(oracle)}."
             )
-    return found
+    return sentences
 
 
 def _limit(comparison: Comparison) -> list[str]:

@@ -28,7 +28,7 @@ TITLES = {
 }
 
 
-def write_discovery_report(found: Discovery, name: str, path: Path | str, command: str = "") -> None:
+def write_discovery_report(discovery: Discovery, name: str, path: Path | str, command: str = "") -> None:
     """Write the report as a single HTML file without external parts.
 
     Parameters
@@ -42,75 +42,79 @@ def write_discovery_report(found: Discovery, name: str, path: Path | str, comman
     command
         Command line that made it, for the footer.
     """
-    write_text(Path(path), discovery_report(found, name, command))
+    write_text(Path(path), discovery_report(discovery, name, command))
 
 
-def discovery_report(found: Discovery, name: str, command: str = "") -> str:
+def discovery_report(discovery: Discovery, name: str, command: str = "") -> str:
     """Return the page that `write_discovery_report` writes."""
     album = Album()
     content: dict[str, object] = {
-        "word": found.verdict.word,
-        "reason": found.verdict.reason,
+        "word": discovery.verdict.word,
+        "reason": discovery.verdict.reason,
         "facts": [],
         "coefficients": None,
     }
-    content |= {"curve": None, "errors": None, "experiment": None, "absorbed": None, "data": _data(found)}
+    content |= {"curve": None, "errors": None, "experiment": None, "absorbed": None, "data": _data(discovery)}
     contents = [("verdict", "Verdict")]
-    searched = found.search is not None  # nothing is searched in a record whose inputs explain nothing
-    if searched and found.problem is not None and found.before is not None and found.after is not None:
-        content |= _evidence(found, found.problem, found.before, found.after, album)
+    searched = discovery.search is not None  # nothing is searched in a record whose inputs explain nothing
+    if searched and discovery.problem is not None and discovery.before is not None and discovery.after is not None:
+        content |= _evidence(discovery, discovery.problem, discovery.before, discovery.after, album)
         contents += [("errors", "Error before and after"), ("residual", "Residual"), ("evidence", "Evidence")]
         contents += [("experiment", "Which input moves would tell")] if content["experiment"] else []
         contents += [("absorbed", "Absorbed")] if content["absorbed"] else []
-    made = made_by(command, [("Model", found.model.name), ("Time", f"{found.verdict.seconds:.1f} s")])
-    lead = f"Record: {name}, {len(found.screening.record)} rows, one every {found.screening.record.dt:g} s."
-    title = f"Discovery report: {TITLES[found.verdict.word]}"
+    made = made_by(command, [("Model", discovery.model.name), ("Time", f"{discovery.verdict.seconds:.1f} s")])
+    lead = f"Record: {name}, {len(discovery.screening.record)} rows, one every {discovery.screening.record.dt:g} s."
+    title = f"Discovery report: {TITLES[discovery.verdict.word]}"
     page = Page(title, lead, [*contents, ("data", "Data screening")], made)
     return render("discovery.html", page, **content)
 
 
-def _evidence(found: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> dict[str, object]:
-    verdict = found.verdict
-    curve = _curve_picture(found, problem, after, album)
-    columns = _telling(found, problem)
+def _evidence(discovery: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> dict[str, object]:
+    verdict = discovery.verdict
+    curve = _curve_picture(discovery, problem, after, album)
+    columns = _telling(discovery, problem)
     planned = verdict.experiment
     return {
-        "facts": _facts(found),
-        "coefficients": tables.coefficient_table(found) if verdict.effects else None,
+        "facts": _facts(discovery),
+        "coefficients": tables.coefficient_table(discovery) if verdict.effects else None,
         "curve": curve,
-        "errors": tables.error_table(found),
+        "errors": tables.error_table(discovery),
         "before_after": [_before_after(problem, before, after, album)],
-        "tests": tables.test_table(found),
-        "symptoms": tables.symptom_table(found),
-        "places": tables.place_table(found),
-        "residuals": [_residuals(found, problem, j, album) for j in columns],
-        "map": _map(found, album),
-        "alternatives": tables.alternative_table(found) if tables.ranked_alternatives(found) else None,
-        "open": tables.not_told_apart(found),
-        "experiment": experiment_chapter(planned, found.model, problem.columns, album) if planned else None,
-        "absorbed": tables.absorbed_table(found) if verdict.absorbed and found.before is not found.after else None,
+        "tests": tables.test_table(discovery),
+        "symptoms": tables.symptom_table(discovery),
+        "places": tables.place_table(discovery),
+        "residuals": [_residuals(discovery, problem, j, album) for j in columns],
+        "map": _map(discovery, album),
+        "alternatives": tables.alternative_table(discovery) if tables.ranked_alternatives(discovery) else None,
+        "open": tables.not_told_apart(discovery),
+        "experiment": experiment_chapter(planned, discovery.model, problem.columns, album) if planned else None,
+        "absorbed": tables.absorbed_table(discovery)
+        if verdict.absorbed and discovery.before is not discovery.after
+        else None,
     }
 
 
-def _facts(found: Discovery) -> list[str]:
-    said = [f"{tables.effect_text([(e.effect.site, e.effect.driver)])}: {e.meaning}." for e in found.verdict.effects]
-    said += [f"Drift of an adapted parameter: {d}." for d in found.verdict.drift]
-    if found.search is not None and found.search.verification is not None:
-        said.append(f"On rows that did not choose it: {found.search.verification}.")
+def _facts(discovery: Discovery) -> list[str]:
+    said = [
+        f"{tables.effect_text([(e.effect.site, e.effect.driver)])}: {e.meaning}." for e in discovery.verdict.effects
+    ]
+    said += [f"Drift of an adapted parameter: {d}." for d in discovery.verdict.drift]
+    if discovery.search is not None and discovery.search.verification is not None:
+        said.append(f"On rows that did not choose it: {discovery.search.verification}.")
     return said
 
 
-def _data(found: Discovery) -> list[str]:
-    said = [f"Insufficient: {r}." for r in found.screening.reasons] + [f"{n}." for n in found.screening.notes]
+def _data(discovery: Discovery) -> list[str]:
+    said = [f"Insufficient: {r}." for r in discovery.screening.reasons] + [f"{n}." for n in discovery.screening.notes]
     return said or ["Every measured output and every input can be used."]
 
 
-def _curve_picture(found: Discovery, problem: Problem, after: Fit, album: Album) -> Picture | None:
-    best = found.judgement.best if found.judgement else None
+def _curve_picture(discovery: Discovery, problem: Problem, after: Fit, album: Album) -> Picture | None:
+    best = discovery.judgement.best if discovery.judgement else None
     curves = effect_curves(problem, after, len(best.names)) if best else ()
     if not curves:
         return None
-    told = "the effect" if found.verdict.effects else "the best alternative, which the verdict does not tell"
+    told = "the effect" if discovery.verdict.effects else "the best alternative, which the verdict does not tell"
     caption = (
         f"{tables.effect_text([(c.effect.site, c.effect.driver) for c in curves])}: {told}, over what the record "
         "covers, with the 95 % band from the covariance of the fit. Below: how often the record was there."
@@ -132,23 +136,23 @@ def _before_after(problem: Problem, before: Fit, after: Fit, album: Album) -> Pi
     return album.add(figures.time_figure(panels), caption, "Residual of each output over time, before and after")
 
 
-def _telling(found: Discovery, problem: Problem) -> list[int]:
+def _telling(discovery: Discovery, problem: Problem) -> list[int]:
     """Places of the outputs whose error fell most, in units of their noise."""
-    fell = {c.output: (c.before - c.after) / max(c.noise, 1e-300) for c in found.verdict.error}
-    names = [found.model.outputs[c].name for c in problem.columns]
+    fell = {c.output: (c.before - c.after) / max(c.noise, 1e-300) for c in discovery.verdict.error}
+    names = [discovery.model.outputs[c].name for c in problem.columns]
     ranked = sorted(range(len(names)), key=lambda j: -fell.get(names[j], 0.0))
     return ranked[:MOST_RESIDUALS]
 
 
-def _residuals(found: Discovery, problem: Problem, j: int, album: Album) -> Picture:
-    q = found.model.outputs[problem.columns[j]]
-    assert found.before is not None and found.after is not None  # called with a search at hand
+def _residuals(discovery: Discovery, problem: Problem, j: int, album: Album) -> Picture:
+    q = discovery.model.outputs[problem.columns[j]]
+    assert discovery.before is not None and discovery.after is not None  # called with a search at hand
     shown = slice(problem.first_row, None)
-    std = found.after.noise.stationary_std()[j] * problem.weights[shown, j]
+    std = discovery.after.noise.stationary_std()[j] * problem.weights[shown, j]
     rows = []
-    fits = [("before", found.before), ("after", found.after)] if found.after is not found.before else []
-    for k, (label, fit) in enumerate(fits or [("model as it is", found.before)]):
-        p = found.verdict.tests.get(f"ljung_box_{'after' if label == 'after' else 'before'}_{q.name}", float("nan"))
+    fits = [("before", discovery.before), ("after", discovery.after)] if discovery.after is not discovery.before else []
+    for k, (label, fit) in enumerate(fits or [("model as it is", discovery.before)]):
+        p = discovery.verdict.tests.get(f"ljung_box_{'after' if label == 'after' else 'before'}_{q.name}", float("nan"))
         role = Role.CONSTANT if k == 0 else Role.ESTIMATE
         rows.append(Residuals(label, role, 0, problem.record.time[shown], fit.residual(problem)[shown, j] / std, p))
     caption = (
@@ -158,9 +162,9 @@ def _residuals(found: Discovery, problem: Problem, j: int, album: Album) -> Pict
     return album.add(figures.residual_figure(rows), caption, f"Residual of {tables.words(q.name)}")
 
 
-def _map(found: Discovery, album: Album) -> Picture:
-    assert found.search is not None  # called with a search at hand
-    best = found.judgement.best if found.judgement else None
+def _map(discovery: Discovery, album: Album) -> Picture:
+    assert discovery.search is not None  # called with a search at hand
+    best = discovery.judgement.best if discovery.judgement else None
     names = best.names if best else ()
     caption = (
         "What each site (row) with each driver (column) would explain of the residual of the model as it is, to first "
@@ -168,4 +172,6 @@ def _map(found: Discovery, album: Album) -> Picture:
         "White: the record tells nothing about it. Dot: known by name."
         + (" Frame: the best alternative after full fits." if names else "")
     )
-    return album.add(heat_map(found.search.rounds[0].scores, names), caption, "Map of what would explain the residual")
+    return album.add(
+        heat_map(discovery.search.rounds[0].scores, names), caption, "Map of what would explain the residual"
+    )

@@ -30,27 +30,27 @@ def effect_text(names: Sequence[tuple[str, str]]) -> str:
     return ", and ".join(f"{words(site)} by {words(driver)}" for site, driver in names)
 
 
-def error_table(found: Discovery) -> Table:
+def error_table(discovery: Discovery) -> Table:
     """Free-run error of each output before and after."""
     rows = []
-    for c in found.verdict.error:
+    for c in discovery.verdict.error:
         power = exponent(np.array([c.before, c.after]))
         values = (number(v * 10.0**-power, ".4g") for v in (c.before, c.after, c.noise))
         low, high = (number(100 * r, ".0f") for r in c.reduction95)
         rows.append((words(c.output), unit_text(c.unit, power), *values, f"{low} to {high}"))
     caption = (
-        f"Root mean square error of the free run on the {found.verdict.split} split, which neither chose "
+        f"Root mean square error of the free run on the {discovery.verdict.split} split, which neither chose "
         "nor fitted anything. Noise: what no model can remove, as fitted. Reduction: 95 % interval of a paired block "
         "bootstrap."
     )
     return Table(caption, ("Output", "Unit", "Before", "After", "Noise", "Reduction [%]"), tuple(rows), words=2)
 
 
-def coefficient_table(found: Discovery) -> Table:
+def coefficient_table(discovery: Discovery) -> Table:
     """Coefficients of the effects that the verdict tells, with their intervals."""
     rows = []
-    for named in found.verdict.effects:
-        units = effect_units(found.model, named.effect)
+    for named in discovery.verdict.effects:
+        units = effect_units(discovery.model, named.effect)
         for name, value in named.effect.coefficients.items():
             low, high = named.interval95.get(name, (np.nan, np.nan))
             interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"
@@ -64,9 +64,9 @@ def coefficient_table(found: Discovery) -> Table:
     return Table(caption, ("Effect", "Form", "Coefficient", "Unit", "Value", "95 % interval"), tuple(rows), words=4)
 
 
-def alternative_table(found: Discovery) -> Table:
+def alternative_table(discovery: Discovery) -> Table:
     """Ranked alternatives with their evidence, each refitted in full."""
-    ranked = ranked_alternatives(found)[:MOST_ROWS]
+    ranked = ranked_alternatives(discovery)[:MOST_ROWS]
     rows = []
     for k, a in enumerate(ranked):
         forms = ", and ".join(_form(e) for e in a.effects)
@@ -85,33 +85,33 @@ def alternative_table(found: Discovery) -> Table:
     return Table(caption, header, tuple(rows), words=4)
 
 
-def ranked_alternatives(found: Discovery) -> tuple[Alternative, ...]:
+def ranked_alternatives(discovery: Discovery) -> tuple[Alternative, ...]:
     """Alternatives of the accepted number of effects; where none was accepted, those of the first round."""
-    if found.search is None:
+    if discovery.search is None:
         return ()
-    return found.search.alternatives or found.search.rounds[0].alternatives
+    return discovery.search.alternatives or discovery.search.rounds[0].alternatives
 
 
 def _form(effect: Effect) -> str:
     return f"{effect.form} ({effect.mode})" if effect.mode else effect.form
 
 
-def test_table(found: Discovery) -> Table:
+def test_table(discovery: Discovery) -> Table:
     """Ljung-Box p value of each output, before and after."""
-    tests = found.verdict.tests
-    names = [q.name for q in found.model.outputs if f"ljung_box_before_{q.name}" in tests]
+    tests = discovery.verdict.tests
+    names = [q.name for q in discovery.model.outputs if f"ljung_box_before_{q.name}" in tests]
     shown = [[p_text(tests.get(f"ljung_box_{when}_{n}", np.nan)) for when in ("before", "after")] for n in names]
     rows = [(words(n), *(p.removeprefix("= ") for p in pair)) for n, pair in zip(names, shown, strict=True)]
     caption = "p value of the Ljung–Box test (20 lags) of the free-run residual; small: something is left."
     return Table(caption, ("Output", "p before", "p after"), tuple(rows))
 
 
-def symptom_table(found: Discovery) -> Table | None:
+def symptom_table(discovery: Discovery) -> Table | None:
     """What the residual of the model as it is shows, output by output."""
-    if found.verdict.detection is None:
+    if discovery.verdict.detection is None:
         return None
     rows = []
-    for s in found.verdict.detection.symptoms:
+    for s in discovery.verdict.detection.symptoms:
         follows = ", ".join(map(words, s.follows)) or "none"
         onset = "-" if s.onset_s is None else number(s.onset_s, ".0f")
         rows.append((words(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
@@ -125,13 +125,13 @@ def symptom_table(found: Discovery) -> Table | None:
     return Table(caption, header, tuple(rows), words=3)
 
 
-def place_table(found: Discovery) -> Table | None:
+def place_table(discovery: Discovery) -> Table | None:
     """Kinds of places and causes by what the best candidate of each would explain."""
-    if found.verdict.location is None:
+    if discovery.verdict.location is None:
         return None
     rows = [
         (group, p.kind, effect_text([(p.site, p.driver)]), number(100 * p.share, ".0f"))
-        for group, places in (("where", found.verdict.location.places), ("when", found.verdict.location.causes))
+        for group, places in (("where", discovery.verdict.location.places), ("when", discovery.verdict.location.causes))
         for p in places
     ]
     caption = (
@@ -141,12 +141,12 @@ def place_table(found: Discovery) -> Table | None:
     return Table(caption, ("Question", "Kind", "Best candidate", "Share [%]"), tuple(rows), words=3)
 
 
-def absorbed_table(found: Discovery) -> Table:
+def absorbed_table(discovery: Discovery) -> Table:
     """Adapted parameters with and without the effect: what they had absorbed."""
     rows = []
-    for label, share in found.verdict.absorbed.items():
-        after = found.verdict.parameters[label]
-        unit = next((p.unit for p in found.model.parameters if label in (p.symbol, p.name)), "-")
+    for label, share in discovery.verdict.absorbed.items():
+        after = discovery.verdict.parameters[label]
+        unit = next((p.unit for p in discovery.model.parameters if label in (p.symbol, p.name)), "-")
         power = exponent(np.array([after]))
         values = (number(v * 10.0**-power, ".4g") for v in (after * (1 + share), after))
         rows.append((label, unit_text(unit, power), *values, number(100 * share, "+.2f")))
@@ -157,9 +157,9 @@ def absorbed_table(found: Discovery) -> Table:
     return Table(caption, ("Parameter", "Unit", "Without", "With", "Absorbed [%]"), tuple(rows), words=2)
 
 
-def not_told_apart(found: Discovery) -> list[str]:
+def not_told_apart(discovery: Discovery) -> list[str]:
     """Sentences on what this record leaves open."""
-    judged = found.judgement
+    judged = discovery.judgement
     if judged is None or judged.best is None:
         return ["There is no alternative to tell apart."]
     best = judged.best
@@ -172,6 +172,6 @@ def not_told_apart(found: Discovery) -> list[str]:
                 f"differs by {number(a.worse_than(best), '.1f')}, and {least:.0f} is the least that tells them "
                 "apart."
             )
-    if not said and found.verdict.experiment is not None:
+    if not said and discovery.verdict.experiment is not None:
         said = ["Nothing comes as near as that to the best alternative; the test below is for those next to it."]
     return said or ["Nothing comes near the best alternative."]

@@ -99,7 +99,7 @@ def _error_table(result: RecordEstimate) -> Table:
 
 def _findings(result: RecordEstimate) -> list[str]:
     """Sentences from the numbers: who predicts the test block best, and whether something is left."""
-    found = []
+    sentences = []
     for q in series.measured_outputs(result):
         tests = {r.estimator: e for r in result.replays for e in r.errors if e.block == "test" and e.output == q.name}
         name = q.name.replace("_", " ")
@@ -110,8 +110,8 @@ def _findings(result: RecordEstimate) -> list[str]:
         if np.isfinite(p):
             left = "something is left that the model does not explain" if p < 0.05 else "they pass for white"
             text += f"; Ljung–Box p of its innovations there {figures.p_text(p)}: {left}"
-        found.append(text + ".")
-    return found
+        sentences.append(text + ".")
+    return sentences
 
 
 def _fit_table(result: RecordEstimate) -> Table:

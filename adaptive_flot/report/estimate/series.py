@@ -19,11 +19,11 @@ def measured_outputs(result: RecordEstimate) -> list[Quantity]:
 
 def roles(result: RecordEstimate) -> dict[str, tuple[Role, int]]:
     """Role and colour of each estimator: `fixed` is the constant model; the others get a colour each."""
-    found: dict[str, tuple[Role, int]] = {}
+    role_of: dict[str, tuple[Role, int]] = {}
     for replay in result.replays:
         role = Role.CONSTANT if replay.estimator == "fixed" else Role.ESTIMATE
-        found[replay.estimator] = role, sum(r is role for r, _ in found.values())
-    return found
+        role_of[replay.estimator] = role, sum(r is role for r, _ in role_of.values())
+    return role_of
 
 
 def input_panels(result: RecordEstimate) -> list[Panel]:

@@ -117,12 +117,12 @@ def seed_list(seeds: Iterable[int]) -> str:
     >>> seed_list([1, 2, 3]), seed_list([4, 9]), seed_list([1])
     ('3 seeds (1–3)', '2 seeds (4, 9)', 'seed 1')
     """
-    found = list(seeds)
-    if len(found) == 1:
-        return f"seed {found[0]}"
-    runs_on = len(found) > 2 and found == list(range(found[0], found[0] + len(found)))
-    inside = f"{found[0]}–{found[-1]}" if runs_on else ", ".join(map(str, found))
-    return f"{len(found)} seeds ({inside})"
+    listed = list(seeds)
+    if len(listed) == 1:
+        return f"seed {listed[0]}"
+    runs_on = len(listed) > 2 and listed == list(range(listed[0], listed[0] + len(listed)))
+    inside = f"{listed[0]}–{listed[-1]}" if runs_on else ", ".join(map(str, listed))
+    return f"{len(listed)} seeds ({inside})"
 
 
 @cache

@@ -60,17 +60,17 @@ def _course(case: Case, q: Quantity, height: float) -> Panel:
 def _disturbance_panels(case: Case, limits: Limits) -> list[Panel]:
     """What moves though no controller and no estimator moves it: truth, and what is known where it is measured."""
     table = case.shown(next(iter(case.first.values())))
-    found = []
+    disturbances = []
     for q in case.scenario.model.inputs:
         if q.name not in limits.inputs and changes(table[acted(table, q.column)].to_numpy()):
             known = q.column if acted(table, q.column) != q.column else ""
-            found.append((q.name, q.unit, acted(table, q.column), known))
+            disturbances.append((q.name, q.unit, acted(table, q.column), known))
     for p in case.scenario.model.parameters:
         if p.label not in case.labels and f"{p.label}_true" in table:
             known = f"{p.label}_known" if f"{p.label}_known" in table else ""
-            found.append((p.label, p.unit, f"{p.label}_true", known))
+            disturbances.append((p.label, p.unit, f"{p.label}_true", known))
     time, panels = table["time_s"].to_numpy(), []
-    for name, unit, true, known in found:
+    for name, unit, true, known in disturbances:
         traces = [Trace("truth", time, table[true].to_numpy(), Role.TRUTH, held=True)]
         if known:
             traces.append(Trace("measured", time, table[known].to_numpy(dtype=float), Role.CONSTANT, held=True))
@@ -119,11 +119,11 @@ def chosen_plans(plans: pd.DataFrame) -> list[pd.DataFrame]:
     >>> [int(p["planned_at_s"].iloc[0]) for p in chosen_plans(plans)]
     [0, 2]
     """
-    found: list[pd.DataFrame] = []
+    chosen: list[pd.DataFrame] = []
     for at, plan in plans.groupby("planned_at_s"):
-        if not found or at >= found[-1]["time_s"].iloc[-1]:
-            found.append(plan)
-    return found
+        if not chosen or at >= chosen[-1]["time_s"].iloc[-1]:
+            chosen.append(plan)
+    return chosen
 
 
 def _plan_traces(plans: list[pd.DataFrame], column: str, came: pd.Series[float] | None = None) -> list[Trace]:
@@ -140,7 +140,7 @@ def _plan_traces(plans: list[pd.DataFrame], column: str, came: pd.Series[float] 
 
 def strips(case: Case) -> list[Strip]:
     """Status of estimate and decision, who decided and injected faults, for each estimator of the first seed."""
-    found = []
+    strip_rows = []
     for who, run in case.first.items():
         table = case.shown(run)
         time = table["time_s"].to_numpy()
@@ -151,8 +151,8 @@ def strips(case: Case) -> list[Strip]:
         }
         for label, (column, usual) in rows.items():
             usual = usual if usual in set(table[column]) else str(table[column].mode().iloc[0])
-            found.append(Strip(f"{who}: {label}", time, table[column].astype(str).tolist(), usual))
-    return found + _fault_strips(case.shown(next(iter(case.first.values()))))
+            strip_rows.append(Strip(f"{who}: {label}", time, table[column].astype(str).tolist(), usual))
+    return strip_rows + _fault_strips(case.shown(next(iter(case.first.values()))))
 
 
 def _fault_strips(table: pd.DataFrame) -> list[Strip]:
@@ -160,10 +160,12 @@ def _fault_strips(table: pd.DataFrame) -> list[Strip]:
     if "faults" not in table:
         return []
     acting = [text.split("; ") for text in table["faults"].fillna("").astype(str)]
-    names = dict.fromkeys(name for found in acting for name in found if name)
+    names = dict.fromkeys(name for active in acting for name in active if name)
     time = table["time_s"].to_numpy()
     return [
-        Strip(name.replace("_", " "), time, ["fault" if name in found else "no fault" for found in acting], "no fault")
+        Strip(
+            name.replace("_", " "), time, ["fault" if name in active else "no fault" for active in acting], "no fault"
+        )
         for name in names
     ]
 

@@ -140,7 +140,7 @@ def _sentences(
 ) -> list[str]:
     """Whether the parameters can be told apart at each moment."""
     true = {run.seed: (run, bounds[run.estimator, run.seed]) for run in runs}.values()
-    found = []
+    sentences = []
     for which, text in (("alone", "With the driving outputs alone"), ("more", f"With {_spaced(sensors)} too")):
         parts = []
         for i, label in enumerate(case.labels):
@@ -157,8 +157,8 @@ def _sentences(
                 f"median, {INSEPARABLE} or more in size {np.mean(np.abs(r) >= INSEPARABLE):.0%} of the time, so that "
                 f"{float(np.median(1 - r**2)):.1%} of the information on one is left where the other is unknown"
             )
-        found.append(sentence + ".")
-    return found
+        sentences.append(sentence + ".")
+    return sentences
 
 
 def _seeds(runs: list[Run]) -> str:

@@ -60,30 +60,30 @@ def _against_published(case: Case) -> list[str]:
                 below.append(f"{name}: {number(median(fits))}, {number(-gap)} below {number(published)} ({best})")
             else:
                 reached.append(f"{name}: {number(median(fits))} against {number(published)}")
-    found = []
+    sentences = []
     if below:
-        found.append(f"Below the published fit in the median: {'; '.join(below)}.")
+        sentences.append(f"Below the published fit in the median: {'; '.join(below)}.")
     if reached:
-        found.append(f"At or above the published fit in the median: {'; '.join(reached)}.")
-    return found
+        sentences.append(f"At or above the published fit in the median: {'; '.join(reached)}.")
+    return sentences
 
 
 def _plant_differs(case: Case, who: str) -> list[str]:
     """What no estimator can change tells whether plant and inputs are those of the publication."""
-    found: list[str] = []
+    sentences: list[str] = []
     plugin = case.scenario.file.estimators.get(who)
     if plugin is None or plugin.start != "nominal":
-        return found
+        return sentences
     for quantity in (q.name for q in case.outputs):
         published, fits = case.published(who, quantity), case.fits(who, quantity)
         if published is None or not np.isfinite(fits).any() or np.nanmin(fits) <= published <= np.nanmax(fits):
             continue
-        found.append(
+        sentences.append(
             f"Constant parameters ({who}) give {number(median(fits))} for {_spaced(quantity)}, {number(published)} is "
             "published, outside the range of our seeds. No estimation enters this number: inputs, plant or start "
             "differ from the published runs, so the other fits do not compare like with like either."
         )
-    return found
+    return sentences
 
 
 def _against_constant(case: Case, who: str, other: str) -> list[str]:
@@ -101,18 +101,18 @@ def _statistics(case: Case, who: str) -> list[str]:
 
 
 def _whiteness(case: Case, who: str) -> list[str]:
-    found = []
+    sentences = []
     for q in case.outputs:
         rows = [residuals(case, run, q) for run in case.of(who)]
         p = np.array([r.p_value for r in rows])
         rejected, tested = int(np.sum(p < SIGNIFICANT)), int(np.sum(np.isfinite(p)))
         size = median(np.array([rmse(r.values) for r in rows]))
         verdict = "are not white" if 2 * rejected > tested else "pass for white"
-        found.append(
+        sentences.append(
             f"The innovations of {who} for {_spaced(q.name)} {verdict} (Ljung–Box p < {SIGNIFICANT:g} in {rejected} of "
             f"{tested} runs); their RMS is {number(size, '.1f')} times the standard deviation the estimator expects."
         )
-    return found
+    return sentences
 
 
 def _coverage(case: Case, who: str) -> str:
@@ -127,16 +127,16 @@ def _coverage(case: Case, who: str) -> str:
 
 def _swings(case: Case, who: str) -> list[str]:
     """Name an estimate that swings to and fro by more than its noise explains."""
-    found = []
+    swings = []
     for label in case.labels:
         share = median(np.array([swing_share(case, run, label) for run in case.of(who)]))
         if share > NOTABLE:
-            found.append(f"{label} {number(100 * share, '.0f')} %")
-    if not found:
+            swings.append(f"{label} {number(100 * share, '.0f')} %")
+    if not swings:
         return []
     return [
         f"{who} swings from sample to sample: in this share of the samples its estimate turns back by more than half "
-        f"of its σ (median over the runs): {', '.join(found)}."
+        f"of its σ (median over the runs): {', '.join(swings)}."
     ]
 
 
@@ -150,17 +150,17 @@ def swing_share(case: Case, run: Run, label: str) -> float:
 
 
 def _tied(case: Case, who: str) -> list[str]:
-    found = []
+    ties = []
     for a, b in combinations(case.labels, 2):
         r = median(
             np.array([_correlation(relative_error(case, x, a), relative_error(case, x, b)) for x in case.of(who)])
         )
         if abs(r) >= TIED:
-            found.append(
+            ties.append(
                 f"The errors of {a} and {b} in {who} have a correlation of {number(r, '+.2f')} (median over the runs): "
                 "they lie along one line."
             )
-    return found
+    return ties
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:
@@ -172,11 +172,11 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
 
 def candidates(cases: Sequence[Case]) -> list[str]:
     """Candidate causes of fits below the published ones, from what scenario and model say; none is proved here."""
-    found: list[str] = []
+    causes: list[str] = []
     for case in cases:
         if below_published(case):
-            found += [*_unknown_inputs(case), *_chosen_constants(case), *_estimator_causes(case), *_one_ridge(case)]
-    return list(dict.fromkeys(found))
+            causes += [*_unknown_inputs(case), *_chosen_constants(case), *_estimator_causes(case), *_one_ridge(case)]
+    return list(dict.fromkeys(causes))
 
 
 def _unknown_inputs(case: Case) -> list[str]:
@@ -201,22 +201,22 @@ def _chosen_constants(case: Case) -> list[str]:
 
 
 def _estimator_causes(case: Case) -> list[str]:
-    found = []
+    causes = []
     for who, plugin in case.scenario.file.estimators.items():
         forgetting = plugin.options.get("forgetting")
         if who not in case.roles or plugin.use != "rpem":
             continue
-        found.append(
+        causes.append(
             f"{who} differentiates its one-step prediction with the state before it held, and does not correct that "
             "state: an effect of the parameters that builds up over many samples hardly enters the gradient, and an "
             "error in the state lasts as long as the slow states of the model."
         )
         if isinstance(forgetting, float) and forgetting < 1.0:
             memory = case.scenario.dt / (1.0 - forgetting)
-            found.append(
+            causes.append(
                 f"With a forgetting factor of {forgetting:g}, {who} follows a change about {memory:.0f} s late."
             )
-    return found
+    return causes
 
 
 def _one_ridge(case: Case) -> list[str]:

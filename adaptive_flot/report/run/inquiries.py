@@ -44,13 +44,13 @@ def watch_section(case: Case, which: str, album: Album) -> Watch | None:
 
 def _sentences(case: Case) -> list[str]:
     """What came of each alarm, a paragraph each."""
-    found = []
+    sentences = []
     for run in case.runs:
         who = f"{run.estimator}, seed {run.seed}"
-        found += [f"{who}: {_sentence(case, i)}" for i in run.inquiries or ()]
+        sentences += [f"{who}: {_sentence(case, i)}" for i in run.inquiries or ()]
         if run.inquiries is not None and not run.inquiries:
-            found.append(f"{who}: no search ended within the run.")
-    return found
+            sentences.append(f"{who}: no search ended within the run.")
+    return sentences
 
 
 def _sentence(case: Case, i: Inquiry) -> str:
@@ -145,6 +145,6 @@ def _move_panel(case: Case) -> Panel:
     traces = []
     for who, (role, j) in colours(case).items():
         run = case.first[who]
-        found = one_move_errors(run.table, run.plans)
-        traces.append(Trace(who, found["time_s"].to_numpy(), found["error"].to_numpy(), role, j))
+        errors = one_move_errors(run.table, run.plans)
+        traces.append(Trace(who, errors["time_s"].to_numpy(), errors["error"].to_numpy(), role, j))
     return Panel("one move ahead", "-", tuple(traces), height=1.2)

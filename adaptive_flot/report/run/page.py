@@ -108,11 +108,11 @@ def _made(cases: Sequence[Case]) -> list[tuple[str, str]]:
 
 def _closed_loops(results: Sequence[tuple[Scenario, Sequence[Run]]], album: Album) -> list[compare.Chapter]:
     """Controllers and estimators side by side for each scenario with economics."""
-    found = []
+    chapters = []
     for i, (scenario, runs) in enumerate(results, 1):
         if any(run.account for run in runs):
-            found.append(compare.compare_chapter(compare_runs(scenario, runs), f"closed-loop-{i}", album))
-    return found
+            chapters.append(compare.compare_chapter(compare_runs(scenario, runs), f"closed-loop-{i}", album))
+    return chapters
 
 
 def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> Chapter:
@@ -183,7 +183,7 @@ def _outputs(case: Case) -> _Made:
 
 
 def _residuals(case: Case, album: Album) -> list[Picture]:
-    found = []
+    pictures = []
     for q in case.outputs:
         rows = [series.residuals(case, run, q) for run in case.first.values()]
         name = q.name.replace("_", " ")
@@ -192,8 +192,8 @@ def _residuals(case: Case, album: Album) -> list[Picture]:
             "±2), their autocorrelation with the 95 % band of white noise, and their histogram with the standard "
             f"normal density. {_first(case)}"
         )
-        found.append(album.add(figures.residual_figure(rows), caption, f"Innovations of {name}"))
-    return found
+        pictures.append(album.add(figures.residual_figure(rows), caption, f"Innovations of {name}"))
+    return pictures
 
 
 def _spread(case: Case, album: Album) -> Picture | None:

@@ -53,12 +53,12 @@ class Case:
     @cached_property
     def roles(self) -> dict[str, tuple[Role, int]]:
         """Role and colour index of each estimator: constant is one whose estimates never move."""
-        found: dict[str, tuple[Role, int]] = {}
+        role_of: dict[str, tuple[Role, int]] = {}
         for name, run in self.first.items():
             moves = any(changes(run.table[f"{x}_estimate"].to_numpy()) for x in self.labels)
             role = Role.ESTIMATE if moves else Role.CONSTANT
-            found[name] = (role, sum(r is role for r, _ in found.values()))
-        return found
+            role_of[name] = (role, sum(r is role for r, _ in role_of.values()))
+        return role_of
 
     @property
     def closed_loop(self) -> bool:
@@ -178,24 +178,24 @@ def spreads(case: Case) -> list[Spread]:
     """Fits over the seeds; empty when there are fewer than five seeds."""
     if len(case.seeds) < FEWEST_SEEDS:
         return []
-    found = []
+    quantities_spread = []
     for quantity in (*case.labels, *(q.name for q in case.outputs)):
         published = {who: case.published(who, quantity) for who in case.roles}
         known = {who: value for who, value in published.items() if value is not None}
         label = f"fit of {quantity.replace('_', ' ')} [%]"
-        found.append(Spread(label, {who: case.fits(who, quantity) for who in case.roles}, known))
-    return found
+        quantities_spread.append(Spread(label, {who: case.fits(who, quantity) for who in case.roles}, known))
+    return quantities_spread
 
 
 def _distinct(case: Case, column: str) -> list[tuple[str, FloatArray, FloatArray]]:
     """(estimator, time, values) of each different course; in open loop there is one, and it gets no name."""
-    found: list[tuple[str, FloatArray, FloatArray]] = []
+    distinct: list[tuple[str, FloatArray, FloatArray]] = []
     for name, run in case.first.items():
         table = case.shown(run)
         values = table[column].to_numpy()
-        if not any(np.array_equal(values, other, equal_nan=True) for _, _, other in found):
-            found.append((name, table["time_s"].to_numpy(), values))
-    return found if len(found) > 1 else [("", *found[0][1:])]
+        if not any(np.array_equal(values, other, equal_nan=True) for _, _, other in distinct):
+            distinct.append((name, table["time_s"].to_numpy(), values))
+    return distinct if len(distinct) > 1 else [("", *distinct[0][1:])]
 
 
 def _truth(case: Case, column: str) -> list[Trace]:

@@ -69,10 +69,12 @@ def innovation_table(case: Case) -> Table:
     rows = []
     for q in case.outputs:
         for who in case.roles:
-            found = [residuals(case, run, q) for run in case.of(who)]
-            size = median(np.array([rmse(r.values) for r in found]))
-            bias = median(np.array([float(np.nanmean(r.values)) for r in found if np.isfinite(r.values).any()]))
-            p = np.array([r.p_value for r in found])
+            residual_of_run = [residuals(case, run, q) for run in case.of(who)]
+            size = median(np.array([rmse(r.values) for r in residual_of_run]))
+            bias = median(
+                np.array([float(np.nanmean(r.values)) for r in residual_of_run if np.isfinite(r.values).any()])
+            )
+            p = np.array([r.p_value for r in residual_of_run])
             rejected = f"{int(np.sum(p < SIGNIFICANT))} of {int(np.sum(np.isfinite(p)))}"
             rows.append((_spaced(q.name), who, number(bias, "+.2f"), number(size), p_text(p[0]), rejected))
     caption = (

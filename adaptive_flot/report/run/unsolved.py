@@ -31,8 +31,8 @@ def _rows(run: Run) -> list[tuple[str, ...]]:
     if "control_message" not in run.table:
         return []
     failed = run.table[run.table["control_message"].fillna("") != ""]
-    found: pd.DataFrame = failed.groupby(["decided_by", "control_message"], sort=False)["time_s"].agg(["min", "size"])
+    groups: pd.DataFrame = failed.groupby(["decided_by", "control_message"], sort=False)["time_s"].agg(["min", "size"])
     return [
         (run.controller, run.estimator, str(run.seed), str(who), number(first, "g"), str(count), str(words))
-        for (who, words), first, count in zip(found.index, found["min"], found["size"], strict=True)
+        for (who, words), first, count in zip(groups.index, groups["min"], groups["size"], strict=True)
     ]

@@ -132,23 +132,23 @@ CATALOGUE = (
 
 def equivalents(site: str, driver: str, shape: str) -> list[dict[str, str]]:
     """Other names of the same thing: `site`, `driver` and `why`, not counting the name itself."""
-    found = []
+    same = []
     if driver in ("level", "froth_depth"):
         other = "froth_depth" if driver == "level" else "level"
-        found.append({"site": site, "driver": other, "why": "froth depth is cell height minus level"})
+        same.append({"site": site, "driver": other, "why": "froth depth is cell height minus level"})
     if driver == "delay" and shape != "dead_time":
         why = "a cascade, or sample and hold, lies between a lag and a dead time"
-        found.append({"site": site, "driver": "lag", "why": why})
+        same.append({"site": site, "driver": "lag", "why": why})
     if site in ("coalescence", "growth_exponent"):
         why = "n and C act only through the froth bubble size: exactly alike over time, nearly so over other drivers"
         other = "growth_exponent" if site == "coalescence" else "coalescence"
-        found += [{"site": other, "driver": d, "why": why} for d in {driver, *(f["driver"] for f in found)}]
+        same += [{"site": other, "driver": d, "why": why} for d in {driver, *(f["driver"] for f in same)}]
     if shape in ("gain", "bent") and site == "grade_sensor":
-        found.append({"site": site, "driver": "grade", "why": "a calibration error is a function of the grade"})
+        same.append({"site": site, "driver": "grade", "why": "a calibration error is a function of the grade"})
     if shape == "gain" and site == "level_sensor":
         why = "a calibration error is a function of the level"
-        found += [{"site": site, "driver": d, "why": why} for d in ("level", "froth_depth")]
+        same += [{"site": site, "driver": d, "why": why} for d in ("level", "froth_depth")]
     if shape == "stiction":
         why = "a sticking valve is late by no fixed time: any statement on the valve is right"
-        found += [{"site": site, "driver": d, "why": why} for d in ("constant", "time", "level")]
-    return sorted(found, key=lambda f: (f["site"], f["driver"]))
+        same += [{"site": site, "driver": d, "why": why} for d in ("constant", "time", "level")]
+    return sorted(same, key=lambda f: (f["site"], f["driver"]))

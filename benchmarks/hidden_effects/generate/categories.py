@@ -65,10 +65,10 @@ def _sized_effect(experiment: Experiment, entry: Entry, rng: Rng, last: bool) ->
     pilot = run(experiment)
     spec = draw_effect(rng, entry, pilot)
     target = float(np.exp(rng.uniform(*_TARGETS)))
-    found = scale_to(experiment, spec, target, limits_of(entry, spec.shape), pilot)
-    if found is None or (found[1].of(entry.site) < ORDINARY[0] and not last):
+    scaled = scale_to(experiment, spec, target, limits_of(entry, spec.shape), pilot)
+    if scaled is None or (scaled[1].of(entry.site) < ORDINARY[0] and not last):
         raise DrawError(f"{entry.site}/{entry.driver}: too small")
-    return found
+    return scaled
 
 
 def _single(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
@@ -106,10 +106,10 @@ def _drift(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
 
 def _pair(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     experiment = draw_experiment(rng, thin_allowed=False)
-    found = [_sized_effect(experiment, entry, rng, last) for entry in schedule.pair_entries(seed, k)]
-    specs = tuple(spec for spec, _ in found)
+    effects = [_sized_effect(experiment, entry, rng, last) for entry in schedule.pair_entries(seed, k)]
+    specs = tuple(spec for spec, _ in effects)
     together = measure(experiment, specs)
-    hidden = tuple(Hidden.of(spec, sized.removable) for spec, sized in found)
+    hidden = tuple(Hidden.of(spec, sized.removable) for spec, sized in effects)
     return DrawnRecord("pair", experiment, "named", (), specs, hidden, size=together.removable, done=together.done)
 
 

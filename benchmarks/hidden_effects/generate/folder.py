@@ -79,9 +79,9 @@ def _claim(folder: Path, seed: int) -> None:
     """Write the manifest, or check that the one there is ours."""
     manifest, wanted = folder / "manifest.json", {"seed": seed, "version": VERSION}
     if manifest.is_file():
-        found = json.loads(manifest.read_text())
-        if found != wanted:
-            raise DataError(f"{manifest}: holds records of {found}, not of {wanted}; give another folder")
+        present = json.loads(manifest.read_text())
+        if present != wanted:
+            raise DataError(f"{manifest}: holds records of {present}, not of {wanted}; give another folder")
         return
     write_text(manifest, json.dumps(wanted) + "\n")
 

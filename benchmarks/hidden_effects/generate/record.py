@@ -83,15 +83,15 @@ def _errors(measured: dict[str, Array], predicted: dict[str, Array]) -> dict[str
     """Root mean square of measured - predicted on the part fitted and the part reported on; missing left out."""
     count = len(next(iter(measured.values())))
     fit, report = slice(nominal_fit.BURN_IN, int(FIT_SHARE * count)), slice(int(REPORT_SHARE * count), None)
-    found = {}
+    errors = {}
     for name, y in measured.items():
         error = y - predicted[name]
         parts = {"fit": error[fit], "report": error[report]}
-        found[name] = {
+        errors[name] = {
             part: float(np.sqrt(np.mean(e[np.isfinite(e)] ** 2))) if np.isfinite(e).any() else float("nan")
             for part, e in parts.items()
         }
-    return found
+    return errors
 
 
 def _squares(
@@ -101,7 +101,7 @@ def _squares(
 
     So the error on any part of the record can be told, whatever a command kept for its report.
     """
-    found = {}
+    squares = {}
     for name, y in measured.items():
         bins = len(y) // BIN
         present = np.isfinite(y[: bins * BIN]).reshape(bins, BIN)
@@ -109,8 +109,8 @@ def _squares(
         for key, columns in (("base", base), ("oracle", oracle)):
             error = (y - columns[name])[: bins * BIN].reshape(bins, BIN)
             sums[key] = [float(f"{e:.6g}") for e in np.sum(np.where(present, error, 0.0) ** 2, axis=1)]
-        found[name] = sums
-    return found
+        squares[name] = sums
+    return squares
 
 
 def _base(

@@ -113,10 +113,10 @@ def fit(file: Path) -> tuple[Fitted, BaseRun]:
     start = steady_state(inputs[0], World())
     count, names = len(table), tuple(measured)
     part = slice(FIRST, int(0.6 * count))
-    found = fit_nominal(inputs, measured, noise, start, part, (World.n, World.C), iterations=3)
-    base, rows = found.predicted, np.arange(FIRST, count, EVERY)
+    nominal = fit_nominal(inputs, measured, noise, start, part, (World.n, World.C), iterations=3)
+    base, rows = nominal.predicted, np.arange(FIRST, count, EVERY)
     sigma = np.array([noise[name] for name in names])
-    slopes = sensitivity(np.log(np.array([found.n, found.C])), inputs, start, base, names)
+    slopes = sensitivity(np.log(np.array([nominal.n, nominal.C])), inputs, start, base, names)
     fitted = Fitted(
         residual=_stack({name: measured[name] - base[name] for name in names}, names, sigma, rows),
         slopes=np.column_stack([_stack(s, names, sigma, rows) for s in slopes]),
@@ -126,7 +126,7 @@ def fit(file: Path) -> tuple[Fitted, BaseRun]:
         time=rows.astype(np.float64),
         seconds=float(count),
     )
-    return fitted, BaseRun(inputs, start, base, found.n, found.C)
+    return fitted, BaseRun(inputs, start, base, nominal.n, nominal.C)
 
 
 def prepare(fitted: Fitted, run: BaseRun) -> Prepared:
@@ -151,15 +151,15 @@ def _stack(columns: dict[str, Array], names: tuple[str, ...], noise: Array, rows
 def _responses(inputs: Array, start: list[float], base: dict[str, Array], n: float, C: float
                ) -> dict[str, dict[str, Array]]:  # fmt: skip
     """Change of the outputs for a sustained relative change at each process site that the cell survives."""
-    found = {}
+    responses = {}
     for site in PROCESS_SITES:
         world = World(n, C, (influence(Spec(site, "constant", "level", FACTOR), inputs[0].tolist()),))
         try:
             moved = replay(world, inputs, start)
         except SimulationError:
             continue
-        found[site] = {name: (moved[name] - base[name]) / FACTOR for name in OUTPUTS}
-    return found
+        responses[site] = {name: (moved[name] - base[name]) / FACTOR for name in OUTPUTS}
+    return responses
 
 
 def _moves(x: Array) -> bool:

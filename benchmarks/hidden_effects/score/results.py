@@ -76,14 +76,14 @@ def _held_out(answer: Answer, verdict: SubmittedVerdict, output: str) -> tuple[f
 def result_row(answer: Answer, verdict: SubmittedVerdict | str, meta: dict[str, Any]) -> dict[str, Any]:
     """One row; `meta` tells how the command ended (status, seconds)."""
     status = meta.get("status", "ok")
-    found = verdict if isinstance(verdict, SubmittedVerdict) and status == "ok" else None
-    if found is None:
+    readable = verdict if isinstance(verdict, SubmittedVerdict) and status == "ok" else None
+    if readable is None:
         outcome = {"timeout": "timeout", "refused": "abstained"}.get(status, "failed")
         if status == "refused" and "insufficient" in answer["right_verdicts"]:
             outcome = "right"
     else:
-        outcome = classify(answer, found)
-    said = [] if found is None else (found.members if found.verdict == "class" else found.effects)
+        outcome = classify(answer, readable)
+    said = [] if readable is None else (readable.members if readable.verdict == "class" else readable.effects)
     return {
         "record": answer["record"],
         "category": answer["category"],
@@ -92,10 +92,10 @@ def result_row(answer: Answer, verdict: SubmittedVerdict | str, meta: dict[str, 
         "size": max(answer["size"].values(), default=0.0),
         "loop": answer["loop"],
         "noise": answer["noise"]["kind"],
-        "verdict": found.verdict if found else status,
+        "verdict": readable.verdict if readable else status,
         "said": "+".join(f"{n.site}:{n.driver}" for n in said),
         "outcome": outcome,
-        "removed_share": removed_share(answer, found),
+        "removed_share": removed_share(answer, readable),
         "output": main_output(answer) or "",
         "seconds": meta.get("seconds", math.nan),
         "problem": verdict if isinstance(verdict, str) else "",

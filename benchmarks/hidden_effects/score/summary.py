@@ -78,14 +78,14 @@ def rates(table: pd.DataFrame) -> list[Rate]:
 def removal(table: pd.DataFrame) -> dict[str, float]:
     """Held-out error removed as a share of an oracle's: single ordinary records, all and only those found."""
     single = table[(table["category"] == "single") & table["ordinary"] & table["removed_share"].notna()]
-    found = single[single["outcome"].isin(FOUND)]
+    hits = single[single["outcome"].isin(FOUND)]
     return {
         "all_median": float(single["removed_share"].median()),
         "all_mean": float(single["removed_share"].mean()),
         "all_count": len(single),
-        "found_median": float(found["removed_share"].median()),
-        "found_mean": float(found["removed_share"].mean()),
-        "found_count": len(found),
+        "found_median": float(hits["removed_share"].median()),
+        "found_mean": float(hits["removed_share"].mean()),
+        "found_count": len(hits),
     }
 
 
@@ -121,10 +121,10 @@ def mistaken(table: pd.DataFrame) -> pd.DataFrame:
 
 def as_json(table: pd.DataFrame) -> dict[str, Any]:
     """Everything a summary says."""
-    found = rates(table)
+    all_rates = rates(table)
     return {
         "records": len(table),
-        "rates": [{**asdict(r), "share": r.share} for r in found],
+        "rates": [{**asdict(r), "share": r.share} for r in all_rates],
         "removed_share": removal(table),
         "seconds": times(table),
         "confusion": {str(k): {str(o): int(n) for o, n in row.items()} for k, row in confusion(table).iterrows()},
