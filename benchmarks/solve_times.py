@@ -75,7 +75,7 @@ def setup_of(scenario: Scenario) -> ControllerSetup:
 
 
 @dataclass
-class Lane:
+class TimedLoop:
     """One controller and its copy of the cell."""
 
     name: str
@@ -97,46 +97,46 @@ class Lane:
         return 1e3 * statistics.median(self.wall[1:])
 
 
-def closed_loops(scenario: Scenario, controllers: dict[str, Decides], moves: int = MOVES) -> dict[str, Lane]:
+def closed_loops(scenario: Scenario, controllers: dict[str, Decides], moves: int = MOVES) -> dict[str, TimedLoop]:
     """Run the controllers on `scenario`'s cell while C rises by 20 % and then n by 10 %; times and realised value."""
     model, theta, held = scenario.model, scenario.model.parameter_values, Realisation(scenario, 1).schedule[0]
     x0, step = steady_state(model, held).state, Stepper(model, scenario.dt)
-    lanes = {name: Lane(name, decide, x0, held) for name, decide in controllers.items()}
+    loops = {name: TimedLoop(name, decide, x0, held) for name, decide in controllers.items()}
     drift = dict(zip(("C", "n"), ((1.2, 0.1, 0.4), (1.1, 0.5, 0.8)), strict=True))
     for k in range(moves):
         p = theta.copy()
         for name, (change, begin, end) in drift.items():
             p[model.index("parameters", name)] *= np.interp(k / moves, [begin, end], [1.0, change])
-        for lane in lanes.values():
-            _move(scenario, lane, step, p, k)
-    return lanes
+        for loop in loops.values():
+            _move(scenario, loop, step, p, k)
+    return loops
 
 
-def _move(scenario: Scenario, lane: Lane, step: Stepper, p: FloatArray, k: int) -> None:
+def _move(scenario: Scenario, loop: TimedLoop, step: Stepper, p: FloatArray, k: int) -> None:
     model, prices = scenario.model, scenario.prices
     assert prices is not None
     now = float(MOVE_S * k)
     wall, cpu = time.perf_counter(), time.thread_time()
-    lane.held = lane.decide(now, lane.state, p, lane.held)
-    lane.wall.append(time.perf_counter() - wall)
-    lane.cpu.append(time.thread_time() - cpu)
-    run = step.simulate(lane.state, np.tile(lane.held, (MOVE_S, 1)), p, now)
-    lane.state = run.states[-1]
+    loop.held = loop.decide(now, loop.state, p, loop.held)
+    loop.wall.append(time.perf_counter() - wall)
+    loop.cpu.append(time.thread_time() - cpu)
+    run = step.simulate(loop.state, np.tile(loop.held, (MOVE_S, 1)), p, now)
+    loop.state = run.states[-1]
     grade, recovery = (run.outputs[:, model.index("outputs", name)] for name in ("concentrate_grade", "recovery"))
-    air, feed = (lane.held[model.index("inputs", name)] for name in ("air_flow", "feed_flow"))
+    air, feed = (loop.held[model.index("inputs", name)] for name in ("air_flow", "feed_flow"))
     rich = p[model.index("parameters", "feed_concentration.chalcopyrite")]
-    lane.value += float(sum(np.sum(r) for r in value_rates(grade, recovery, air, feed, rich, prices.prices()).values()))
+    loop.value += float(sum(np.sum(r) for r in value_rates(grade, recovery, air, feed, rich, prices.prices()).values()))
 
 
 def solver_figures() -> list[Figure]:
     """Time of a decision with each solver, horizon 20, and what each earned."""
     scenario = load_scenario("closed_loop_drift")
-    lanes = closed_loops(scenario, {name: Ours(scenario, name) for name in SOLVERS})
+    loops = closed_loops(scenario, {name: Ours(scenario, name) for name in SOLVERS})
     figures = [
-        Figure(f"Economic MPC, horizon 20, {n}", str(lane), f"<= {ASKED_MS[n]:g} ms", lane.median_ms <= ASKED_MS[n])
-        for n, lane in lanes.items()
+        Figure(f"Economic MPC, horizon 20, {n}", str(loop), f"<= {ASKED_MS[n]:g} ms", loop.median_ms <= ASKED_MS[n])
+        for n, loop in loops.items()
     ]
-    return [*figures, equal_economics("three solvers", list(lanes.values()))]
+    return [*figures, equal_economics("three solvers", list(loops.values()))]
 
 
 def do_mpc_figures() -> list[Figure]:
@@ -149,18 +149,18 @@ def do_mpc_figures() -> list[Figure]:
     ours = {name: Ours(scenario, name) for name in SOLVERS}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # its optional parts, and how it calls CasADi, are no concern here
-        lanes = closed_loops(scenario, {**ours, "do-mpc": DoMpc(scenario)}, moves=SHORT)
-    theirs = lanes.pop("do-mpc")
+        loops = closed_loops(scenario, {**ours, "do-mpc": DoMpc(scenario)}, moves=SHORT)
+    theirs = loops.pop("do-mpc")
     figures = [Figure("do-mpc on the same problem (ipopt)", str(theirs), "", None)]
-    for name, lane in lanes.items():
-        ratio = statistics.median(b / a for a, b in zip(lane.wall[1:], theirs.wall[1:], strict=True))
+    for name, loop in loops.items():
+        ratio = statistics.median(b / a for a, b in zip(loop.wall[1:], theirs.wall[1:], strict=True))
         figures.append(Figure(f"... against ours with {name}", f"{ratio:.1f} x faster", ">= 3 x", ratio >= 3))
-    return [*figures, equal_economics("do-mpc among them", [*lanes.values(), theirs])]
+    return [*figures, equal_economics("do-mpc among them", [*loops.values(), theirs])]
 
 
-def equal_economics(who: str, lanes: Sequence[Lane]) -> Figure:
+def equal_economics(who: str, loops: Sequence[TimedLoop]) -> Figure:
     """Largest relative difference of realised value."""
-    values = [lane.value for lane in lanes]
+    values = [loop.value for loop in loops]
     apart = (max(values) - min(values)) / abs(statistics.median(values))
     return Figure(f"Realised economic value, {who}", f"{apart:.2%} apart", "<= 0.20%", apart <= 2e-3)
 

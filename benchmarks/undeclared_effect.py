@@ -65,7 +65,7 @@ def figures(scenario: Scenario, runs: list[Run]) -> dict[str, str]:
     return rows
 
 
-def told(scenario: Scenario, run: Run, inquiry: Inquiry) -> str:
+def described(scenario: Scenario, run: Run, inquiry: Inquiry) -> str:
     """One search in words, with the size of what was found and of what is there."""
     words = f"seed {run.seed}: alarm at {inquiry.alarm_s:g} s, result at {inquiry.judged_s:g} s: "
     if inquiry.verdict is None or not inquiry.verdict.effects:
@@ -91,7 +91,7 @@ def main() -> None:
     for name in scenario.file.estimators:
         runs = run_scenario(scenario, [name], SEEDS)
         columns[name] = figures(scenario, runs)
-        lines += [told(scenario, run, i) for run in runs for i in run.inquiries or ()]
+        lines += [described(scenario, run, i) for run in runs for i in run.inquiries or ()]
     title = f"{SCENARIO}, seeds {SEEDS[0]} to {SEEDS[-1]}, t > {scenario.fits_after:g} s: median and range"
     table = Table("figure", *columns, title=title)
     for figure in next(iter(columns.values())):

@@ -15,7 +15,7 @@ from adaptive_flot.report.kit.plotdata import Role
 from adaptive_flot.report.kit.strips import Strip, spells, strip_figure
 from adaptive_flot.report.run import closed_loop, series
 from adaptive_flot.report.run.page import run_report
-from adaptive_flot.report.run.series import Case
+from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import write_runs
 from adaptive_flot.runner.commands.run_result import Run
@@ -37,7 +37,7 @@ def result() -> Result:
 
 
 @pytest.fixture(scope="module")
-def case(result: Result) -> Case:
+def case(result: Result) -> CaseRuns:
     return series.cases([result])[0]
 
 
@@ -71,7 +71,7 @@ def test_plans_lie_beside_the_time_series(result: Result, tmp_path: Path, suffix
     np.testing.assert_allclose(back["concentrate_grade"], run.plans["concentrate_grade"], rtol=1e-11)
 
 
-def test_plans_are_shown_one_after_the_other_from_the_truth_on(case: Case) -> None:
+def test_plans_are_shown_one_after_the_other_from_the_truth_on(case: CaseRuns) -> None:
     air, level, grade = closed_loop.plan_panels(case, case.first["rpem"])
     plans = [t for t in grade.traces if t.role is Role.PLAN]
     assert [t.time[0] for t in plans] == [301.0, 391.0]
@@ -80,12 +80,12 @@ def test_plans_are_shown_one_after_the_other_from_the_truth_on(case: Case) -> No
     assert (air.limits, level.limits, grade.limits) == ((9.05e-4, 2.17e-3), (0.33, 0.42), (0.20,))
 
 
-def test_a_plan_beyond_the_end_does_not_stretch_the_axis(case: Case) -> None:
+def test_a_plan_beyond_the_end_does_not_stretch_the_axis(case: CaseRuns) -> None:
     figure = time_figure(closed_loop.plan_panels(case, case.first["rpem"]))
     assert figure.axes[-1].get_xlim() == (300.0, 420.0)
 
 
-def test_limits_are_drawn_and_within_the_axis(case: Case) -> None:
+def test_limits_are_drawn_and_within_the_axis(case: CaseRuns) -> None:
     air = time_figure(closed_loop.operation_panels(case)).axes[0]
     drawn = sorted(float(np.asarray(line.get_ydata())[0]) for line in air.lines if line.get_label() == "limit")
     assert drawn == pytest.approx([0.905, 2.17])

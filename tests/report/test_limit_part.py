@@ -10,7 +10,7 @@ import pytest
 from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit.page import Album
 from adaptive_flot.report.run.cramer_rao_limit import limit_part
-from adaptive_flot.report.run.series import Case, cases
+from adaptive_flot.report.run.series import CaseRuns, cases
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
 from adaptive_flot.runner.scenario.loading import load_scenario
@@ -25,14 +25,14 @@ def short(scenario: Scenario, **changes: object) -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def case() -> Case:
+def case() -> CaseRuns:
     scenario = load_scenario("random_walk")
     walks = {k: v.model_copy(update={"from_s": 100.0}) for k, v in scenario.file.parameters.items()}
     scenario = short(scenario, parameters=walks)
     return cases([(scenario, run_scenario(scenario, ["ekf", "fixed"], seeds=[1, 2]))])[0]
 
 
-def test_ratios_are_errors_over_bounds_pooled_over_the_seeds(case: Case) -> None:
+def test_ratios_are_errors_over_bounds_pooled_over_the_seeds(case: CaseRuns) -> None:
     part = limit_part(case, Album())
     assert part is not None
     assert [row[0] for row in part.table.rows] == ["n", "C"] and part.table.header[3:] == ("ekf: error / bound",)
@@ -45,12 +45,12 @@ def test_ratios_are_errors_over_bounds_pooled_over_the_seeds(case: Case) -> None
         assert float(row[2]) < float(row[1]), "more sensors do not lower the bound"
 
 
-def test_it_says_how_far_the_parameters_can_be_told_apart(case: Case) -> None:
+def test_it_says_how_far_the_parameters_can_be_told_apart(case: CaseRuns) -> None:
     part = limit_part(case, Album())
     assert part is not None and len(part.sentences) == 2
     assert "correlation of n and C" in part.sentences[0] and "air recovery" in part.sentences[1]
 
 
-def test_there_is_none_where_the_plant_lacks_what_is_estimated(case: Case) -> None:
+def test_there_is_none_where_the_plant_lacks_what_is_estimated(case: CaseRuns) -> None:
     setup = replace(case.scenario.setup, parameters=("growth_exponent", "of_an_effect"))
     assert limit_part(replace(case, scenario=replace(case.scenario, setup=setup)), Album()) is None

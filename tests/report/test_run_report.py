@@ -38,7 +38,7 @@ def result() -> Result:
     return short, run_scenario(short, seeds=[1, 2])
 
 
-def with_fits(result: Result, estimator: str, fits: dict[str, float]) -> series.Case:
+def with_fits(result: Result, estimator: str, fits: dict[str, float]) -> series.CaseRuns:
     scenario, runs = result
     changed = [replace(r, fit={**r.fit, **fits}) if r.estimator == estimator else r for r in runs]
     return series.cases([(scenario, changed)])[0]
@@ -151,7 +151,7 @@ def test_every_row_has_as_many_cells_as_headings(result: Result) -> None:
     assert all(len(row) == len(t.header) for t in tables for row in t.rows)
 
 
-def test_closed_loop_shows_each_course(result: Result) -> None:
+def test_closed_loop_shows_each_time_series(result: Result) -> None:
     """Where the estimator acts on the plant, inputs and truth differ and are named."""
     scenario, runs = result
     column = scenario.model.inputs[0].column

@@ -35,13 +35,13 @@ def _gains(comparison: Comparison) -> list[str]:
             and comparison.rival(c, ORACLE) is oracle
         ]
         shares = [(c, comparison.share(c, "value_cu_h")) for c in rivals]
-        told = [
+        recaptured = [
             f"{c.estimator} recaptures {_percent(SeedSpread.of(share), share.size)} of it"
             for c, share in shares
             if np.isfinite(share).any()
         ]
-        if told:
-            sentences.append(f"{text}; {', '.join(told)}.")
+        if recaptured:
+            sentences.append(f"{text}; {', '.join(recaptured)}.")
         elif gain.median > 0:
             sentences.append(f"{text}.")
         else:

@@ -11,17 +11,17 @@ from adaptive_flot.contracts import Limits
 from adaptive_flot.greybox.model import Quantity
 from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 from adaptive_flot.report.kit.strips import Strip
-from adaptive_flot.report.run.series import Case, changes
+from adaptive_flot.report.run.series import CaseRuns, changes
 from adaptive_flot.runner.commands.comparison import ORACLE
 from adaptive_flot.runner.commands.run_result import Run
 
 
-def colours(case: Case) -> dict[str, tuple[Role, int]]:
-    """A colour for each estimator, whether its estimates move or not: here it stands for a course of the plant."""
+def colours(case: CaseRuns) -> dict[str, tuple[Role, int]]:
+    """A colour for each estimator, whether its estimates move or not: here it stands for a time series of the plant."""
     return {who: (Role.KNOWING if who == ORACLE else Role.ESTIMATE, j) for j, who in enumerate(case.first)}
 
 
-def operation_panels(case: Case) -> list[Panel]:
+def operation_panels(case: CaseRuns) -> list[Panel]:
     """Moved inputs with their limits (dotted: what follows a set-point), disturbances, grade and recovery."""
     limits = case.scenario.limits
     assert limits is not None  # the caller shows closed loops only
@@ -29,13 +29,13 @@ def operation_panels(case: Case) -> list[Panel]:
     panels = [_input_panel(case, q, limits) for q in model.inputs if q.name in limits.inputs]
     panels += _disturbance_panels(case, limits)
     outputs = {q.name: q for q in model.outputs}
-    panels.append(_true_course(case, outputs["concentrate_grade"], 1.3, limits.outputs["concentrate_grade"][:1]))
-    panels.append(_true_course(case, outputs["recovery"], 1.0, ()))
+    panels.append(_true_output(case, outputs["concentrate_grade"], 1.3, limits.outputs["concentrate_grade"][:1]))
+    panels.append(_true_output(case, outputs["recovery"], 1.0, ()))
     return panels
 
 
-def _input_panel(case: Case, q: Quantity, limits: Limits) -> Panel:
-    traces = list(_course(case, q, 1.0).traces)
+def _input_panel(case: CaseRuns, q: Quantity, limits: Limits) -> Panel:
+    traces = list(_output_panel(case, q, 1.0).traces)
     target = q.name.removesuffix("_setpoint")
     followed = next((o for o in case.scenario.model.outputs if o.name == target != q.name), None)
     if followed is not None:
@@ -46,7 +46,7 @@ def _input_panel(case: Case, q: Quantity, limits: Limits) -> Panel:
     return Panel(q.name.replace("_", " "), q.unit, tuple(traces), limits=limits.inputs[q.name])
 
 
-def _course(case: Case, q: Quantity, height: float) -> Panel:
+def _output_panel(case: CaseRuns, q: Quantity, height: float) -> Panel:
     """An input as it acted on the plant, one line an estimator."""
     traces = []
     for who, (role, j) in colours(case).items():
@@ -57,7 +57,7 @@ def _course(case: Case, q: Quantity, height: float) -> Panel:
     return Panel(q.name.replace("_", " "), q.unit, tuple(traces), height=height)
 
 
-def _disturbance_panels(case: Case, limits: Limits) -> list[Panel]:
+def _disturbance_panels(case: CaseRuns, limits: Limits) -> list[Panel]:
     """What moves though no controller and no estimator moves it: truth, and what is known where it is measured."""
     table = case.shown(next(iter(case.first.values())))
     disturbances = []
@@ -78,7 +78,7 @@ def _disturbance_panels(case: Case, limits: Limits) -> list[Panel]:
     return panels
 
 
-def _true_course(case: Case, q: Quantity, height: float, limits: tuple[float, ...]) -> Panel:
+def _true_output(case: CaseRuns, q: Quantity, height: float, limits: tuple[float, ...]) -> Panel:
     traces = []
     for who, (role, j) in colours(case).items():
         table = case.shown(case.first[who])
@@ -86,7 +86,7 @@ def _true_course(case: Case, q: Quantity, height: float, limits: tuple[float, ..
     return Panel(q.name.replace("_", " "), q.unit, tuple(traces), height=height, limits=limits)
 
 
-def plan_panels(case: Case, run: Run) -> list[Panel]:
+def plan_panels(case: CaseRuns, run: Run) -> list[Panel]:
     """A few plans over the inputs and the grade that came; each shown plan starts where the one before ends."""
     limits = case.scenario.limits
     assert limits is not None
@@ -138,7 +138,7 @@ def _plan_traces(plans: list[pd.DataFrame], column: str, came: pd.Series[float] 
     return traces
 
 
-def strips(case: Case) -> list[Strip]:
+def strips(case: CaseRuns) -> list[Strip]:
     """Status of estimate and decision, who decided and injected faults, for each estimator of the first seed."""
     strip_rows = []
     for who, run in case.first.items():

@@ -7,12 +7,12 @@ from adaptive_flot.report.kit.page import Album, Picture
 from adaptive_flot.report.kit.strips import strip_figure
 from adaptive_flot.report.kit.style import amount
 from adaptive_flot.report.run import closed_loop
-from adaptive_flot.report.run.series import Case
+from adaptive_flot.report.run.series import CaseRuns
 
 Sections = list[tuple[str, list[Picture]]]
 
 
-def closed_loop_sections(case: Case, which: str, album: Album) -> Sections:
+def closed_loop_sections(case: CaseRuns, which: str, album: Album) -> Sections:
     """Operation, plans (where the controller makes any) and statuses of the first seed; `which` names it."""
     name = f"{case.scenario.name}, {case.controller}"
     sections = [("Operation", [_operation(case, name, which, album)])]
@@ -23,7 +23,7 @@ def closed_loop_sections(case: Case, which: str, album: Album) -> Sections:
     return sections
 
 
-def _operation(case: Case, name: str, which: str, album: Album) -> Picture:
+def _operation(case: CaseRuns, name: str, which: str, album: Album) -> Picture:
     limits = case.scenario.limits
     assert limits is not None
     panels = closed_loop.operation_panels(case)
@@ -41,7 +41,7 @@ def _operation(case: Case, name: str, which: str, album: Album) -> Picture:
     return album.add(figures.time_figure(panels), caption, "Inputs, disturbances, grade and recovery over time")
 
 
-def _plans(case: Case, who: str, name: str, which: str, album: Album) -> Picture:
+def _plans(case: CaseRuns, who: str, name: str, which: str, album: Album) -> Picture:
     figure = figures.time_figure(closed_loop.plan_panels(case, case.first[who]))
     caption = (
         f"{name}, {who}: what the controller planned at a moment (dot) and what then happened; dashed: limits. Of all "
@@ -50,7 +50,7 @@ def _plans(case: Case, who: str, name: str, which: str, album: Album) -> Picture
     return album.add(figure, caption, f"Plans of {who} against inputs and grade that came")
 
 
-def _strips(case: Case, name: str, which: str, album: Album) -> Picture:
+def _strips(case: CaseRuns, name: str, which: str, album: Album) -> Picture:
     figure = strip_figure(closed_loop.strips(case))
     faults = "; below, when the injected faults acted" if case.scenario.file.faults else ""
     caption = (

@@ -14,7 +14,7 @@ from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit import figures
 from adaptive_flot.report.kit.page import Album, Picture, Table, number, seed_list
 from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
-from adaptive_flot.report.run.series import Case
+from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
 from adaptive_flot.runner.scenario.realisation import Realisation
@@ -40,7 +40,7 @@ class _Bounds:
     more: FloatArray
 
 
-def limit_part(case: Case, album: Album) -> LimitPart | None:
+def limit_part(case: CaseRuns, album: Album) -> LimitPart | None:
     """Bound beside the errors; None where the plant has not all that is estimated, or a bound can not be computed."""
     if not has_limit(case.scenario):
         return None
@@ -63,13 +63,13 @@ def limit_part(case: Case, album: Album) -> LimitPart | None:
     return LimitPart(picture, _table(case, runs, bounds), _sentences(case, runs, bounds, sensors))
 
 
-def _sensors(case: Case) -> dict[str, float]:
+def _sensors(case: CaseRuns) -> dict[str, float]:
     """Further outputs that the plant has and that do not drive the adaptation yet."""
     known = case.scenario.plant_model.names("outputs")
     return {k: v for k, v in MORE_SENSORS.items() if k in known and k not in case.scenario.setup.outputs}
 
 
-def _bounds(case: Case, run: Run, sensors: Mapping[str, float], seen: dict[bytes, _Bounds]) -> _Bounds:
+def _bounds(case: CaseRuns, run: Run, sensors: Mapping[str, float], seen: dict[bytes, _Bounds]) -> _Bounds:
     """Bounds of a run; in open loop all estimators of a seed share them."""
     columns = [q.column for q in case.scenario.model.inputs]
     acted = [f"{c}_true" if f"{c}_true" in run.table else c for c in columns]
@@ -82,7 +82,7 @@ def _bounds(case: Case, run: Run, sensors: Mapping[str, float], seen: dict[bytes
     return seen[key]
 
 
-def _panels(case: Case, bound: _Bounds, first: Run) -> list[Panel]:
+def _panels(case: CaseRuns, bound: _Bounds, first: Run) -> list[Panel]:
     model, time = case.scenario.model, case.shown(first)["time_s"].to_numpy()
     panels = []
     for i, (label, name) in enumerate(zip(case.labels, case.scenario.setup.parameters, strict=True)):
@@ -102,7 +102,7 @@ def _panels(case: Case, bound: _Bounds, first: Run) -> list[Panel]:
     return panels
 
 
-def _table(case: Case, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds]) -> Table:
+def _table(case: CaseRuns, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds]) -> Table:
     """Root mean square of bound and error, over time and seeds."""
     moving = [who for who, (role, _) in case.roles.items() if role is Role.ESTIMATE]
     rows = []
@@ -129,14 +129,14 @@ def _table(case: Case, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds
     return Table(caption, heads, tuple(rows))
 
 
-def _ratio(case: Case, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds], who: str, i: int) -> float:
+def _ratio(case: CaseRuns, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds], who: str, i: int) -> float:
     mine = [run for run in runs if run.estimator == who]
     error = rmse(np.concatenate([_error(case, run, case.labels[i]) for run in mine]))
     return float(error / np.sqrt(np.mean([bounds[who, run.seed].alone[:, i, i] for run in mine])))
 
 
 def _sentences(
-    case: Case, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds], sensors: Mapping[str, float]
+    case: CaseRuns, runs: list[Run], bounds: Mapping[tuple[str, int], _Bounds], sensors: Mapping[str, float]
 ) -> list[str]:
     """Whether the parameters can be told apart at each moment."""
     true = {run.seed: (run, bounds[run.estimator, run.seed]) for run in runs}.values()
@@ -165,7 +165,7 @@ def _seeds(runs: list[Run]) -> str:
     return seed_list(dict.fromkeys(run.seed for run in runs))
 
 
-def _error(case: Case, run: Run, label: str) -> FloatArray:
+def _error(case: CaseRuns, run: Run, label: str) -> FloatArray:
     table = case.shown(run)
     error: FloatArray = table[f"{label}_estimate"].to_numpy() - table[f"{label}_true"].to_numpy()
     return error

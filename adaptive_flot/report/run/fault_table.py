@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from adaptive_flot.report.kit.page import Table, number
-from adaptive_flot.report.run.series import Case
+from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.scenario.faults import Fault, Stuck
 
 
-def fault_table(case: Case) -> Table | None:
+def fault_table(case: CaseRuns) -> Table | None:
     """Injected faults with the intervals in which each acted, over all runs; None where a scenario has none."""
     faults = case.scenario.file.faults
     if not faults:
@@ -27,7 +27,7 @@ def fault_table(case: Case) -> Table | None:
     return Table(caption, ("Fault", "Time [s]", *case.roles), tuple(rows), words=2)
 
 
-def _name(case: Case, fault: Fault) -> str:
+def _name(case: CaseRuns, fault: Fault) -> str:
     if isinstance(fault, Stuck):
         names = {q.column: q.name for q in case.scenario.model.inputs}
         return f"{fault.fault} {names[fault.input]}"

@@ -12,7 +12,7 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit.page import number
 from adaptive_flot.report.kit.plotdata import Role
-from adaptive_flot.report.run.series import Case, residuals
+from adaptive_flot.report.run.series import CaseRuns, residuals
 from adaptive_flot.report.run.tables import SIGNIFICANT, coverage, median, quantities, relative_error
 from adaptive_flot.runner.commands.run_result import Run
 
@@ -24,7 +24,7 @@ SAME = 0.005
 """Difference [%] that two decimals do not show."""
 
 
-def findings(case: Case) -> list[str]:
+def findings(case: CaseRuns) -> list[str]:
     """Say where the runs stand: against the published fits, against constant parameters, and in their statistics."""
     adaptive = [who for who, (role, _) in case.roles.items() if role is Role.ESTIMATE]
     constant = [who for who, (role, _) in case.roles.items() if role is Role.CONSTANT]
@@ -35,18 +35,18 @@ def findings(case: Case) -> list[str]:
     return sentences
 
 
-def below_published(case: Case) -> bool:
+def below_published(case: CaseRuns) -> bool:
     """Whether any median stays below its published value."""
     return any(_gap(case, who, quantity) < -SAME for who in case.roles for quantity in quantities(case))
 
 
-def _gap(case: Case, who: str, quantity: str) -> float:
+def _gap(case: CaseRuns, who: str, quantity: str) -> float:
     """Median minus published [%]; NaN where nothing is published."""
     published = case.published(who, quantity)
     return float("nan") if published is None else median(case.fits(who, quantity)) - published
 
 
-def _against_published(case: Case) -> list[str]:
+def _against_published(case: CaseRuns) -> list[str]:
     below, reached = [], []
     for who in case.roles:
         for quantity in quantities(case):
@@ -68,7 +68,7 @@ def _against_published(case: Case) -> list[str]:
     return sentences
 
 
-def _plant_differs(case: Case, who: str) -> list[str]:
+def _plant_differs(case: CaseRuns, who: str) -> list[str]:
     """What no estimator can change tells whether plant and inputs are those of the publication."""
     sentences: list[str] = []
     plugin = case.scenario.file.estimators.get(who)
@@ -86,7 +86,7 @@ def _plant_differs(case: Case, who: str) -> list[str]:
     return sentences
 
 
-def _against_constant(case: Case, who: str, other: str) -> list[str]:
+def _against_constant(case: CaseRuns, who: str, other: str) -> list[str]:
     gains = {q: median(case.fits(who, q)) - median(case.fits(other, q)) for q in quantities(case)}
     known = [f"{_spaced(q)} {number(gain, '+.2f')}" for q, gain in gains.items() if np.isfinite(gain)]
     return (
@@ -96,11 +96,11 @@ def _against_constant(case: Case, who: str, other: str) -> list[str]:
     )
 
 
-def _statistics(case: Case, who: str) -> list[str]:
+def _statistics(case: CaseRuns, who: str) -> list[str]:
     return [*_whiteness(case, who), _coverage(case, who), *_swings(case, who), *_tied(case, who)]
 
 
-def _whiteness(case: Case, who: str) -> list[str]:
+def _whiteness(case: CaseRuns, who: str) -> list[str]:
     sentences = []
     for q in case.outputs:
         rows = [residuals(case, run, q) for run in case.of(who)]
@@ -115,7 +115,7 @@ def _whiteness(case: Case, who: str) -> list[str]:
     return sentences
 
 
-def _coverage(case: Case, who: str) -> str:
+def _coverage(case: CaseRuns, who: str) -> str:
     shares = (
         f"{label} {number(100 * median(np.array([coverage(case, run, label) for run in case.of(who)])), '.0f')} %"
         for label in case.labels
@@ -125,7 +125,7 @@ def _coverage(case: Case, who: str) -> str:
     )
 
 
-def _swings(case: Case, who: str) -> list[str]:
+def _swings(case: CaseRuns, who: str) -> list[str]:
     """Name an estimate that swings to and fro by more than its noise explains."""
     swings = []
     for label in case.labels:
@@ -140,7 +140,7 @@ def _swings(case: Case, who: str) -> list[str]:
     ]
 
 
-def swing_share(case: Case, run: Run, label: str) -> float:
+def swing_share(case: CaseRuns, run: Run, label: str) -> float:
     """Share of the rows shown at which two successive moves of an estimate, each above half its σ, are opposite."""
     table = case.shown(run)
     with np.errstate(divide="ignore", invalid="ignore"):  # σ is zero where nothing is estimated
@@ -149,7 +149,7 @@ def swing_share(case: Case, run: Run, label: str) -> float:
     return float(np.mean(turns)) if len(turns) else float("nan")
 
 
-def _tied(case: Case, who: str) -> list[str]:
+def _tied(case: CaseRuns, who: str) -> list[str]:
     ties = []
     for a, b in combinations(case.labels, 2):
         r = median(
@@ -170,7 +170,7 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
     return float(np.corrcoef(a[known], b[known])[0, 1])
 
 
-def candidates(cases: Sequence[Case]) -> list[str]:
+def candidates(cases: Sequence[CaseRuns]) -> list[str]:
     """Candidate causes of fits below the published ones, from what scenario and model say; none is proved here."""
     causes: list[str] = []
     for case in cases:
@@ -179,7 +179,7 @@ def candidates(cases: Sequence[Case]) -> list[str]:
     return list(dict.fromkeys(causes))
 
 
-def _unknown_inputs(case: Case) -> list[str]:
+def _unknown_inputs(case: CaseRuns) -> list[str]:
     file = case.scenario.file
     drawn = [
         q.name.replace("_", " ")
@@ -191,7 +191,7 @@ def _unknown_inputs(case: Case) -> list[str]:
     return [f"The published sequence of {', '.join(drawn)} is not known; each seed draws another one."]
 
 
-def _chosen_constants(case: Case) -> list[str]:
+def _chosen_constants(case: CaseRuns) -> list[str]:
     groups = dict.fromkeys(
         p.name.split(".")[0].replace("_", " ") for p in case.scenario.model.parameters if "chosen" in p.source
     )
@@ -200,7 +200,7 @@ def _chosen_constants(case: Case) -> list[str]:
     return [f"Not all constants of the plant are published; chosen by us in whole or in part: {', '.join(groups)}."]
 
 
-def _estimator_causes(case: Case) -> list[str]:
+def _estimator_causes(case: CaseRuns) -> list[str]:
     causes = []
     for who, plugin in case.scenario.file.estimators.items():
         forgetting = plugin.options.get("forgetting")
@@ -219,7 +219,7 @@ def _estimator_causes(case: Case) -> list[str]:
     return causes
 
 
-def _one_ridge(case: Case) -> list[str]:
+def _one_ridge(case: CaseRuns) -> list[str]:
     pairs = next(iter(case.first.values())).initial.identifiability.pairs
     return [
         f"{a} and {b} act on the driving outputs in nearly the same way, so that one can stand in for the other (in "

@@ -12,7 +12,7 @@ from adaptive_flot.report.kit import figures, style
 from adaptive_flot.report.kit.page import Album, Picture, Table, number
 from adaptive_flot.report.kit.plotdata import Panel, Trace
 from adaptive_flot.report.run.closed_loop import colours
-from adaptive_flot.report.run.series import Case
+from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
 
@@ -29,7 +29,7 @@ class Watch:
     picture: Picture
 
 
-def watch_section(case: Case, which: str, album: Album) -> Watch | None:
+def watch_section(case: CaseRuns, which: str, album: Album) -> Watch | None:
     """Section of a case of whose estimators one was watched; None where none was. `which` names the seed shown."""
     if all(run.inquiries is None for run in case.runs):
         return None
@@ -42,7 +42,7 @@ def watch_section(case: Case, which: str, album: Album) -> Watch | None:
     return Watch(_sentences(case), _prediction_table(case), picture)
 
 
-def _sentences(case: Case) -> list[str]:
+def _sentences(case: CaseRuns) -> list[str]:
     """What came of each alarm, a paragraph each."""
     sentences = []
     for run in case.runs:
@@ -53,7 +53,7 @@ def _sentences(case: Case) -> list[str]:
     return sentences
 
 
-def _sentence(case: Case, i: Inquiry) -> str:
+def _sentence(case: CaseRuns, i: Inquiry) -> str:
     units = {q.name: q.unit for q in case.scenario.model.outputs}
     tests = ", ".join(f"{name.replace('_', ' ')} (p {figures.p_text(p)})" for name, p in i.p_values.items())
     began, ended = (number(t, "g") for t in i.record_s)
@@ -81,7 +81,7 @@ def _told(i: Inquiry) -> str:
     return f"{i.verdict.word}, {'; '.join(effects)}" if effects else i.verdict.word
 
 
-def _prediction_table(case: Case) -> Table:
+def _prediction_table(case: CaseRuns) -> Table:
     output = case.outputs[0]
     rows = []
     for who in case.roles:
@@ -108,13 +108,13 @@ def _prediction_table(case: Case) -> Table:
     return Table(caption, header, tuple(rows))
 
 
-def _offsets(case: Case, who: str, label: str) -> FloatArray:
+def _offsets(case: CaseRuns, who: str, label: str) -> FloatArray:
     tables = [case.shown(run) for run in case.of(who)]
     ratios: FloatArray = np.concatenate([(t[f"{label}_estimate"] / t[f"{label}_true"] - 1).to_numpy() for t in tables])
     return ratios[np.isfinite(ratios)] if np.isfinite(ratios).any() else np.full(1, np.nan)
 
 
-def _figure(case: Case) -> Figure:
+def _figure(case: CaseRuns) -> Figure:
     output = case.outputs[0]
     panels = [_step_panel(case, output)]
     if any(not run.plans.empty for run in case.first.values()):
@@ -130,7 +130,7 @@ def _figure(case: Case) -> Figure:
     return figure
 
 
-def _step_panel(case: Case, output: Quantity) -> Panel:
+def _step_panel(case: CaseRuns, output: Quantity) -> Panel:
     traces = []
     rows = max(1, round(SMOOTHED_S / case.scenario.dt))
     for who, (role, j) in colours(case).items():
@@ -141,7 +141,7 @@ def _step_panel(case: Case, output: Quantity) -> Panel:
     return Panel("one sample ahead", output.unit, tuple(traces), height=1.2)
 
 
-def _move_panel(case: Case) -> Panel:
+def _move_panel(case: CaseRuns) -> Panel:
     traces = []
     for who, (role, j) in colours(case).items():
         run = case.first[who]

@@ -17,7 +17,7 @@ from adaptive_flot.report.run.cramer_rao_limit import LimitPart, limit_part
 from adaptive_flot.report.run.fault_table import fault_table
 from adaptive_flot.report.run.findings import below_published, candidates, findings
 from adaptive_flot.report.run.inquiries import Watch, watch_section
-from adaptive_flot.report.run.series import Case
+from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
 from adaptive_flot.runner.commands.run_result import Run
@@ -35,7 +35,7 @@ class Chapter:
     fits: Table
     findings: list[str]
     spread: Picture | None
-    course: Sections
+    time_series: Sections
     watch: Watch | None
     parameters: Picture
     parameter_table: Table
@@ -95,13 +95,13 @@ def run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], command: str =
     )
 
 
-def _lead(cases: Sequence[Case]) -> str:
+def _lead(cases: Sequence[CaseRuns]) -> str:
     estimators = list(dict.fromkeys(who for case in cases for who in case.roles))
     runs = sum(len(case.runs) for case in cases)
     return f"{runs} simulated {'run' if runs == 1 else 'runs'} with the estimators {', '.join(estimators)}."
 
 
-def _made(cases: Sequence[Case]) -> list[tuple[str, str]]:
+def _made(cases: Sequence[CaseRuns]) -> list[tuple[str, str]]:
     seeds = {case.scenario.path.name: seed_list(case.seeds) for case in cases}
     return [(f"Seeds of {name}", text) for name, text in seeds.items()]
 
@@ -115,10 +115,10 @@ def _closed_loops(results: Sequence[tuple[Scenario, Sequence[Run]]], album: Albu
     return chapters
 
 
-def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> Chapter:
+def _chapter(case: CaseRuns, anchor: str, album: Album, spread: Picture | None) -> Chapter:
     published = case.scenario.file.published
     title = f"{case.scenario.name}, controller {case.controller}" if case.several_controllers else case.scenario.name
-    course = (
+    time_series = (
         closed_loop_sections(case, _first(case), album)
         if case.closed_loop
         else [("Inputs", [_add(album, *_inputs(case))])]
@@ -132,7 +132,7 @@ def _chapter(case: Case, anchor: str, album: Album, spread: Picture | None) -> C
         source=published.source if published else "",
         fits=tables.fits_table(case),
         findings=findings(case),
-        course=course,
+        time_series=time_series,
         watch=watch,
         parameters=parameters,
         parameter_table=tables.parameter_table(case),
@@ -155,25 +155,25 @@ def _add(album: Album, panels: list[Panel], caption: str, alt: str) -> Picture:
     return album.add(figures.time_figure(panels), caption, alt)
 
 
-def _first(case: Case) -> str:
+def _first(case: CaseRuns) -> str:
     """Say which seed a time series shows; with one seed there is nothing to tell apart."""
     return f"Seed {case.seeds[0]}, the first of {len(case.seeds)}." if len(case.seeds) > 1 else f"Seed {case.seeds[0]}."
 
 
-def _inputs(case: Case) -> _Made:
+def _inputs(case: CaseRuns) -> _Made:
     panels, still = series.input_panels(case)
     constant = f" Constant: {', '.join(still)}." if still else ""
     names = ", ".join(p.label for p in panels)
     return panels, f"{case.scenario.name}: inputs. {_first(case)}{constant}", f"Inputs over time: {names}"
 
 
-def _parameters(case: Case) -> _Made:
+def _parameters(case: CaseRuns) -> _Made:
     names = ", ".join(case.labels)
     caption = f"{case.scenario.name}: adapted parameters {names}, with the ±2σ the estimator claims. {_first(case)}"
     return series.parameter_panels(case), caption, f"Truth and estimates over time of {names}"
 
 
-def _outputs(case: Case) -> _Made:
+def _outputs(case: CaseRuns) -> _Made:
     names = ", ".join(q.name.replace("_", " ") for q in case.outputs)
     caption = (
         f"{case.scenario.name}: {names}, true and predicted before each sample is used; below, the error on its own "
@@ -182,7 +182,7 @@ def _outputs(case: Case) -> _Made:
     return series.output_panels(case), caption, f"True and predicted {names} over time, and the errors"
 
 
-def _residuals(case: Case, album: Album) -> list[Picture]:
+def _residuals(case: CaseRuns, album: Album) -> list[Picture]:
     pictures = []
     for q in case.outputs:
         rows = [series.residuals(case, run, q) for run in case.first.values()]
@@ -196,7 +196,7 @@ def _residuals(case: Case, album: Album) -> list[Picture]:
     return pictures
 
 
-def _spread(case: Case, album: Album) -> Picture | None:
+def _spread(case: CaseRuns, album: Album) -> Picture | None:
     spreads = series.spreads(case)
     if not spreads:
         return None

@@ -21,7 +21,7 @@ FEWEST_SEEDS = 5
 
 
 @dataclass(frozen=True)
-class Case:
+class CaseRuns:
     """The runs of one scenario with one controller: what one chapter of the report shows."""
 
     scenario: Scenario
@@ -88,16 +88,16 @@ class Case:
         return run.table[run.table["time_s"] > self.scenario.fits_after + 1e-9]
 
 
-def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[Case]:
+def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[CaseRuns]:
     """Split results into one case for each scenario and controller, in the order run."""
     return [
-        Case(scenario, controller, tuple(r for r in runs if r.controller == controller))
+        CaseRuns(scenario, controller, tuple(r for r in runs if r.controller == controller))
         for scenario, runs in results
         for controller in dict.fromkeys(r.controller for r in runs)
     ]
 
 
-def input_panels(case: Case) -> tuple[list[Panel], list[str]]:
+def input_panels(case: CaseRuns) -> tuple[list[Panel], list[str]]:
     """Panels of the inputs that move, and a phrase for each that does not ("feed flow 0.000167 m3/s")."""
     panels, still = [], []
     inputs = case.scenario.model.inputs
@@ -116,7 +116,7 @@ def input_panels(case: Case) -> tuple[list[Panel], list[str]]:
     return panels, still
 
 
-def _followed(case: Case, q: Quantity) -> list[Trace]:
+def _followed(case: CaseRuns, q: Quantity) -> list[Trace]:
     """Return the true output that follows a set-point: `level` for `level_setpoint`."""
     names = [o.name for o in case.scenario.model.outputs]
     target = q.name.removesuffix("_setpoint")
@@ -129,7 +129,7 @@ def _followed(case: Case, q: Quantity) -> list[Trace]:
     ]
 
 
-def parameter_panels(case: Case) -> list[Panel]:
+def parameter_panels(case: CaseRuns) -> list[Panel]:
     """Adapted parameters: truth, and each estimator with its standard deviation."""
     panels = []
     for label, name in zip(case.labels, case.scenario.setup.parameters, strict=True):
@@ -145,7 +145,7 @@ def parameter_panels(case: Case) -> list[Panel]:
     return panels
 
 
-def output_panels(case: Case) -> list[Panel]:
+def output_panels(case: CaseRuns) -> list[Panel]:
     """Driving outputs: truth and predictions, and below the error of each prediction on its own scale."""
     panels = []
     for q in case.outputs:
@@ -166,7 +166,7 @@ def output_panels(case: Case) -> list[Panel]:
     return panels
 
 
-def residuals(case: Case, run: Run, output: Quantity) -> Residuals:
+def residuals(case: CaseRuns, run: Run, output: Quantity) -> Residuals:
     """Innovations of a run for one output, divided by the standard deviation the estimator expects."""
     table = case.shown(run)
     values = table[f"{output.column}_innovation"].to_numpy() / table[f"{output.column}_innovation_std"].to_numpy()
@@ -174,7 +174,7 @@ def residuals(case: Case, run: Run, output: Quantity) -> Residuals:
     return Residuals(_named(run.estimator, role), role, j, table["time_s"].to_numpy(), values, ljung_box_p(values))
 
 
-def spreads(case: Case) -> list[Spread]:
+def spreads(case: CaseRuns) -> list[Spread]:
     """Fits over the seeds; empty when there are fewer than five seeds."""
     if len(case.seeds) < FEWEST_SEEDS:
         return []
@@ -187,8 +187,8 @@ def spreads(case: Case) -> list[Spread]:
     return quantities_spread
 
 
-def _distinct(case: Case, column: str) -> list[tuple[str, FloatArray, FloatArray]]:
-    """(estimator, time, values) of each different course; in open loop there is one, and it gets no name."""
+def _distinct(case: CaseRuns, column: str) -> list[tuple[str, FloatArray, FloatArray]]:
+    """(estimator, time, values) of each different time series; in open loop there is one, and it gets no name."""
     distinct: list[tuple[str, FloatArray, FloatArray]] = []
     for name, run in case.first.items():
         table = case.shown(run)
@@ -198,9 +198,9 @@ def _distinct(case: Case, column: str) -> list[tuple[str, FloatArray, FloatArray
     return distinct if len(distinct) > 1 else [("", *distinct[0][1:])]
 
 
-def _truth(case: Case, column: str) -> list[Trace]:
-    courses = enumerate(_distinct(case, column))
-    return [Trace(_suffixed("truth", who), time, values, Role.TRUTH, j) for j, (who, time, values) in courses]
+def _truth(case: CaseRuns, column: str) -> list[Trace]:
+    distinct = enumerate(_distinct(case, column))
+    return [Trace(_suffixed("truth", who), time, values, Role.TRUTH, j) for j, (who, time, values) in distinct]
 
 
 def _suffixed(text: str, who: str) -> str:

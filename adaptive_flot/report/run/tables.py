@@ -11,7 +11,7 @@ from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.page import Table, number, seed_list
 from adaptive_flot.report.kit.plotdata import Role
 from adaptive_flot.report.kit.style import exponent, unit_text
-from adaptive_flot.report.run.series import Case, residuals
+from adaptive_flot.report.run.series import CaseRuns, residuals
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS
 
@@ -25,12 +25,12 @@ def median(values: FloatArray) -> float:
     return float(np.median(finite)) if len(finite) else float("nan")
 
 
-def quantities(case: Case) -> list[str]:
+def quantities(case: CaseRuns) -> list[str]:
     """Names of the fits: adapted parameters, then driving outputs."""
     return [*case.labels, *(q.name for q in case.outputs)]
 
 
-def fits_table(case: Case) -> Table:
+def fits_table(case: CaseRuns) -> Table:
     """Fit of each estimator and quantity over the seeds, beside the published one."""
     rows = []
     for who in case.roles:
@@ -48,7 +48,7 @@ def fits_table(case: Case) -> Table:
     return Table(caption, header if case.scenario.file.published else header[:4], tuple(rows), words=2)
 
 
-def parameter_table(case: Case) -> Table:
+def parameter_table(case: CaseRuns) -> Table:
     """Error of each adapted parameter and how often the truth lies within two standard deviations."""
     rows = []
     for who, (role, _) in case.roles.items():
@@ -64,7 +64,7 @@ def parameter_table(case: Case) -> Table:
     return Table(caption, header, tuple(rows), words=2)
 
 
-def innovation_table(case: Case) -> Table:
+def innovation_table(case: CaseRuns) -> Table:
     """Size and whiteness of the innovations over all seeds."""
     rows = []
     for q in case.outputs:
@@ -86,7 +86,7 @@ def innovation_table(case: Case) -> Table:
     return Table(caption, header, tuple(rows), words=2)
 
 
-def initial_table(case: Case) -> Table:
+def initial_table(case: CaseRuns) -> Table:
     """Batch estimate that the recursive estimators start from."""
     fits = {run.seed: run.initial for run in case.runs}
     first = fits[case.seeds[0]]
@@ -122,7 +122,7 @@ def initial_table(case: Case) -> Table:
     return Table(caption, header, tuple(rows), words=3)
 
 
-def status_table(case: Case) -> Table:
+def status_table(case: CaseRuns) -> Table:
     """How often each estimator returned which status, and how long a run took."""
     known = [s for s in Status if any(run.status_counts.get(s.name.lower()) for run in case.runs)]
     rows = []
@@ -139,7 +139,7 @@ def status_table(case: Case) -> Table:
     return Table(caption, header, tuple(rows))
 
 
-def relative_error(case: Case, run: Run, label: str) -> FloatArray:
+def relative_error(case: CaseRuns, run: Run, label: str) -> FloatArray:
     """(estimate − truth) / truth of a parameter over the rows shown (N,)."""
     table = case.shown(run)
     true = table[f"{label}_true"].to_numpy()
@@ -147,7 +147,7 @@ def relative_error(case: Case, run: Run, label: str) -> FloatArray:
     return error
 
 
-def coverage(case: Case, run: Run, label: str) -> float:
+def coverage(case: CaseRuns, run: Run, label: str) -> float:
     """Share of the rows shown in which the truth lies within two standard deviations of the estimate."""
     table = case.shown(run)
     distance = np.abs(table[f"{label}_estimate"].to_numpy() - table[f"{label}_true"].to_numpy())
@@ -157,7 +157,7 @@ def coverage(case: Case, run: Run, label: str) -> float:
     return float(np.mean(distance[known] <= 2 * table[f"{label}_std"].to_numpy()[known]))
 
 
-def seeds_text(case: Case) -> str:
+def seeds_text(case: CaseRuns) -> str:
     """Name the seeds of a case: "20 seeds (1–20)", "seed 1"."""
     return seed_list(case.seeds)
 
