@@ -12,6 +12,7 @@ effects.py           Effect: a form at a site, with a driver and values.
 extension.py         A model with effects, and without them.
 sensors.py           A model without the errors of its sensors.
 stepping/            Simulation of one sampling interval and of whole records, with exact sensitivities.
+filtering/           A model in innovations form: extended Kalman filter, smoother, k-step prediction, likelihood.
 data/                Measured tables.
 steady_state.py      Steady states and their sensitivities.
 linear.py            State space at an operating point (imports python-control, so it is not part of this front).

@@ -21,7 +21,7 @@ from adaptive_flot.greybox.quantities import Parameter, Quantity
 Mode = Literal["factor", "offset"]
 DYNAMIC_DRIVERS = ("lag", "delay", "saturation")
 """What acts on the value at a site itself: it is delayed, or limited."""
-STATELESS_DRIVERS = ("constant", "time", *DYNAMIC_DRIVERS)
+STATELESS_DRIVERS = ("constant", "time", "own_value", *DYNAMIC_DRIVERS)
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class Effect:
         Name of the site where it acts.
     driver
         What it depends on: an input, a state or a signal of the model that is known where the site is passed;
-        "constant" or "time"; "lag", "delay" or "saturation" for the forms of that kind.
+        "constant" or "time"; "own_value" where it acts on the value itself (a part that leaks, an instrument that does
+        not see a sign); "lag", "delay" or "saturation" for the forms of that kind.
     form
         Name of a family in `FORMS`.
     coefficients

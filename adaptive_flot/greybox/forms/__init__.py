@@ -6,5 +6,6 @@ form.py     What a form is.
 static.py   Forms without memory: constant, linear, power, spline, step in time.
 direct.py   Forms that replace the value.
 lagging.py  Forms with memory: lag, dead time.
+faults.py   Parts that stick or leak, switches, hidden stores.
 catalogue.py  All forms by name.
 """

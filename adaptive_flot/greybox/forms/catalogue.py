@@ -7,8 +7,9 @@ Each form is a *family* whose shape is free (its coefficients), and each is noth
 from collections.abc import Mapping
 
 from adaptive_flot.greybox.forms.direct import DIRECT_FORMS
+from adaptive_flot.greybox.forms.faults import FAULT_FORMS
 from adaptive_flot.greybox.forms.form import Form
 from adaptive_flot.greybox.forms.lagging import LAGGING_FORMS
 from adaptive_flot.greybox.forms.static import STATIC_FORMS
 
-FORMS: Mapping[str, Form] = {form.name: form for form in (*STATIC_FORMS, *DIRECT_FORMS, *LAGGING_FORMS)}
+FORMS: Mapping[str, Form] = {form.name: form for form in (*STATIC_FORMS, *DIRECT_FORMS, *LAGGING_FORMS, *FAULT_FORMS)}

@@ -39,6 +39,10 @@ class CoefficientRole(Enum):
     THRESHOLD = "value of the driver at which something begins"
     LIMIT = "value that can not be passed"
     BAND = "half the width of a dead band"
+    FLOOR = "value that is not gone below"
+    POSITION = "value at which a part stays"
+    OFFSET = "what is added to the value"
+    PERIOD = "time after which a disturbance repeats itself"
 
 
 _AMPLITUDES = frozenset(
@@ -48,6 +52,7 @@ _AMPLITUDES = frozenset(
         CoefficientRole.SLOPE,
         CoefficientRole.GAIN,
         CoefficientRole.BLEND,
+        CoefficientRole.OFFSET,
     }
 )
 
@@ -63,6 +68,9 @@ class FormKind(Enum):
     PROPORTIONAL = "a change in proportion to the driver"
     EVENT = "something begins at a time"
     LIMIT = "the value can not pass a limit"
+    FAULT = "a part does something else than is asked of it"
+    CALIBRATION = "an instrument shows a fixed function of the value"
+    PERIODIC = "a change that repeats itself in time"
     MEMORY = "the value answers to its own past"
 
 
@@ -179,7 +187,13 @@ class Form:
     @property
     def is_linear(self) -> bool:
         """Whether the law is linear in all coefficients."""
-        return self.kind in (FormKind.CONSTANT, FormKind.LINE, FormKind.CURVE, FormKind.PROPORTIONAL)
+        return self.kind in (
+            FormKind.CONSTANT,
+            FormKind.LINE,
+            FormKind.CURVE,
+            FormKind.PROPORTIONAL,
+            FormKind.CALIBRATION,
+        )
 
     @property
     def has_memory(self) -> bool:
@@ -203,11 +217,13 @@ def wrong_setting(name: str, value: float | tuple[float, ...]) -> str | None:
     several = np.atleast_1d(np.asarray(value, dtype=float))
     if not np.isfinite(several).all():
         return "give finite numbers"
+    if name == "middle":
+        return None if several.size == 1 else "give one number"
     if name == "knots":
         return None if several.size >= 2 and (np.diff(several) > 0).all() else "give two or more numbers that rise"
     if several.size != 1 or not several[0] > 0:
         return "give one positive number"
-    return "give a whole number" if name == "stages" and several[0] % 1 else None
+    return "give a whole number" if name in ("stages", "count") and several[0] % 1 else None
 
 
 BLEND = Coefficient("amplitude", CoefficientRole.BLEND, 0.0, 0.0, 1.0, 1.0)

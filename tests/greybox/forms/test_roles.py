@@ -13,7 +13,7 @@ from adaptive_flot.greybox.forms.catalogue import FORMS
 from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole, Form, FormKind
 
 KNOTS = (-1.0, 0.5, 2.0, 4.0)
-NEEDED: dict[str, float | tuple[float, ...]] = {"reference": 2.0, "scale": 3.0, "knots": KNOTS}
+NEEDED: dict[str, float | tuple[float, ...]] = {"reference": 2.0, "scale": 3.0, "knots": KNOTS, "middle": 2.0}
 """Settings that some forms ask for."""
 DRIVERS = {"signal": "drive"}
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False)
@@ -74,6 +74,12 @@ def test_without_amplitude_a_form_of_any_shape_is_the_nominal_model_to_the_bit(
 # each amplitude alone, at a value, driver, time and state where the law of every form is awake
 AT = {"value": 5.0, "drive": 3.0, "time": 900.0, "own": 0.5}
 AWAKE = {CoefficientRole.ONSET: 100.0, CoefficientRole.THRESHOLD: 1.0, CoefficientRole.LIMIT: 2.0}
+AWAKE |= {
+    CoefficientRole.FLOOR: 8.0,
+    CoefficientRole.POSITION: 2.0,
+    CoefficientRole.BAND: 1.0,
+    CoefficientRole.PERIOD: 70.0,
+}
 
 
 @pytest.mark.parametrize("name", FORMS)
@@ -100,7 +106,7 @@ def test_every_coefficient_has_a_role_that_fits_the_kind_of_its_form(name: str) 
     assert (CoefficientRole.LIMIT in roles) == (form.kind is FormKind.LIMIT)
     assert bool(effect(form, {}).states()) == form.has_memory
     assert (form.drivers == ("constant",)) == form.is_constant
-    assert (form.drivers == ("time",)) == form.is_event
+    assert (form.drivers == ("time",)) == (form.is_event or form.kind is FormKind.PERIODIC)
     for c in terms(form):
         assert not (c.is_level and form.static is None), "a level is a number g of a static law"
         assert c.is_shape or c.default == 0.0

@@ -1,0 +1,144 @@
+"""The extended Kalman filter over a whole record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.filtering.noise_model import STUDENT, NoiseModel
+from adaptive_flot.greybox.filtering.step import filter_step, first_correction
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.recursion import Recursion
+
+CHUNK = 100
+"""Rows of one call."""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What the filter makes of one stretch of N rows, for m outputs and n = nx + w entries of z.
+
+    Attributes
+    ----------
+    predicted, variance
+        Outputs predicted from the row before, and the variance of the innovation (N, m).
+    log_likelihood
+        Log-density of each row (N,).
+    z, P
+        States and walking parameters at each row, corrected by it (N, n), with covariance (N, n, n).
+    ahead, F
+        Where row k leads before row k + 1 is used (N - 1, n), and the derivative of that map (N - 1, n, n).
+    Q
+        Variance that process noise adds at the start of each interval (n,).
+    """
+
+    predicted: FloatArray
+    variance: FloatArray
+    log_likelihood: FloatArray
+    z: FloatArray
+    P: FloatArray
+    ahead: FloatArray
+    F: FloatArray
+    Q: FloatArray
+
+
+class RecordFilter:
+    """The filter of one model for records of one sampling interval.
+
+    Parameters
+    ----------
+    model
+        The model.
+    dt
+        Sampling interval [s].
+    outputs
+        Indices of the outputs that correct (m,).
+    walking
+        Names of parameters that walk (w,).
+    degrees_of_freedom
+        Of the innovations; infinity is the Gaussian filter.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        dt: float,
+        outputs: Sequence[int],
+        walking: Sequence[str] = (),
+        degrees_of_freedom: float = STUDENT,
+    ) -> None:
+        if not outputs:
+            raise ModelError(f"model '{model.name}': a filter needs a measured output; name at least one")
+        self.model, self.dt = model, dt
+        self.outputs, self.walking = tuple(outputs), tuple(walking)
+        step = filter_step(model, dt, self.outputs, self.walking, degrees_of_freedom)
+        self._first = FastCall(first_correction(model, self.outputs, self.walking, degrees_of_freedom), ["P", "P_next"])
+        self._many = Recursion(step, {"z": "z_next", "P": "P_next"}, CHUNK)
+
+    def run(self, record: Dataset, noise: NoiseModel, z0: FloatArray, P0: FloatArray, p: FloatArray) -> Filtered:
+        """Filter one record.
+
+        Parameters
+        ----------
+        record
+            N rows without a gap; a missing output is NaN.
+        noise
+            Process and measurement noise.
+        z0, P0
+            States and walking parameters before the first row (n,), and their covariance (n, n).
+        p
+            Parameters (np,); those that walk are taken from z.
+
+        Raises
+        ------
+        ModelError
+            Wrong shapes.
+        """
+        n, rows = len(self.model.states) + len(self.walking), len(record)
+        if z0.shape != (n,) or P0.shape != (n, n):
+            raise ModelError(f"the filter takes z0 ({n},) and P0 ({n}, {n}); got {z0.shape} and {P0.shape}")
+        y = record.outputs[:, list(self.outputs)]
+        there = np.isfinite(y).astype(float)
+        y = np.where(there > 0, y, 0.0)
+        r, Q = noise.std(self.model)[list(self.outputs)], noise.variances(self.model, self.dt)
+        z, P, predicted, variance, likelihood = self._first(
+            z0, P0, float(record.time[0]), record.inputs[0], p, r, y[0], there[0]
+        )
+        count = math.ceil((rows - 1) / CHUNK) * CHUNK
+        take = np.minimum(1 + np.arange(count), rows - 1)
+        real = 1 + np.arange(count) <= rows - 1
+        t = record.time[0] + self.dt * np.arange(count, dtype=float)
+        u, seen, present = record.inputs[take], y[take], there[take] * real[:, None]
+        parts: list[dict[str, FloatArray]] = []
+        at = {"z": z, "P": P}
+        for start in range(0, count, CHUNK):
+            cut = slice(start, start + CHUNK)
+            each = {
+                "t": t[cut, None], "u": u[cut], "p": p, "Q": Q, "r": r, "y": seen[cut], "there": present[cut],
+            }  # fmt: skip
+            part = self._many(at, each)
+            part["F"] = part["F"].reshape(-1, n, n).transpose(0, 2, 1)  # a matrix comes row by row, transposed
+            parts.append(part)
+            at = {"z": part["z_next"][-1], "P": part["P_next"][-1]}
+        if not parts:
+            empty = np.empty((0, n, n))
+            return Filtered(
+                predicted[None], variance[None], likelihood.ravel(), z[None], P[None], np.empty((0, n)), empty, Q
+            )
+        joined = {k: np.concatenate([part[k] for part in parts])[: rows - 1] for k in parts[0]}
+        return Filtered(
+            np.vstack([predicted[None], joined["predicted"]]),
+            np.vstack([variance[None], joined["variance"]]),
+            np.concatenate([likelihood.ravel(), joined["log_likelihood"].ravel()]),
+            np.vstack([z[None], joined["z_next"]]),
+            np.concatenate([P[None], joined["P_next"].reshape(-1, n, n)]),
+            joined["ahead"],
+            joined["F"],
+            Q,
+        )
