@@ -20,13 +20,24 @@ from tests.cli.test_discover import write_tank
 PATIENCE_S = 120.0
 
 
+def _hear_hangup() -> None:
+    """Tests under `nohup` would hand on a signal that is ignored, and an ignored one stays so on purpose."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 def at_work(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
     """A `discover` whose two workers are there, and these."""
     write_tank(folder)
     arguments = ["tank.csv", "--model", "heated:make_model", "--processes", "2", "--out", "out"]
     command = [sys.executable, "-m", "adaptive_flot", "discover", *arguments]
     process = subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_hear_hangup,
     )
     end = time.monotonic() + PATIENCE_S
     workers: list[psutil.Process] = []
