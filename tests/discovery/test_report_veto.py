@@ -14,6 +14,8 @@ from adaptive_flot.discovery.verdict.report_veto import (
     contradiction_at_the_end,
     last_report_rows,
 )
+from adaptive_flot.greybox import Effect
+from tests.discovery.heated import heated_tank
 
 NOISE = np.array([0.1])
 
@@ -61,10 +63,17 @@ def test_only_names_are_taken_back(draught: Discovery, word: str) -> None:
     assert contradiction(_judged(draught, word), [_change(2.0, 9.0, -4.0, -3.0)], NOISE) == ""
 
 
-@pytest.mark.parametrize(("driver", "taken"), [("time", True), ("fan_speed", False)])
-def test_a_course_in_time_must_hold_beyond_what_it_was_fitted_to(draught: Discovery, driver: str, taken: bool) -> None:
-    """Only what depends on time is asked to."""
-    against = contradiction_at_the_end(_judged(draught, driver=driver), [_change(2.0, 4.0, -2.0, 0.5)], NOISE)
+@pytest.mark.parametrize(("site", "taken"), [("thermometer", True), ("heat_loss", False)])
+def test_a_curve_in_time_at_a_sensor_must_hold_beyond_what_it_was_fitted_to(
+    draught: Discovery, site: str, taken: bool
+) -> None:
+    """Only a sensor is asked to: its free curve can mimic any residual."""
+    judged = _judged(draught)
+    assert judged.best is not None
+    curve = Effect(site, "time", "curve", {}, {"knots": (0.0, 5000.0, 10000.0)})
+    fit = replace(judged.best.fit, model=heated_tank().with_effects([curve]))
+    judged = replace(judged, best=replace(judged.best, names=((site, "time"),), fit=fit))
+    against = contradiction_at_the_end(judged, [_change(2.0, 4.0, -2.0, 0.5)], NOISE)
     assert bool(against) == taken
 
 

@@ -1,8 +1,8 @@
 """The report split has a veto: what rows that chose nothing contradict is not told as a name.
 
-A name is contradicted where an output gets worse on these rows, or where no output surely gets better. What depends on
-time must also hold on the last of these rows, which lie beyond all that it was fitted to: a curve in time can mimic any
-residual between rows that it has seen.
+A name is contradicted where an output gets worse on these rows, or where no output surely gets better. A free curve in
+time at a sensor must also hold on the last of these rows, which lie beyond all that it was fitted to: such a curve can
+mimic any residual between rows that it has seen.
 """
 
 from __future__ import annotations
@@ -60,12 +60,15 @@ def _is_worse(change: OutputChange, noise: float) -> bool:
 
 
 def contradiction_at_the_end(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
-    """What the last report rows say against a name that depends on time; empty where nothing.
+    """What the last report rows say against a sensor whose error is a free curve in time; empty where nothing.
 
     Arguments are as in `contradiction`, for the rows of `last_report_rows` alone.
     """
     best = judgement.best
-    if judgement.word not in ("named", "class") or best is None or all(driver != "time" for _, driver in best.names):
+    if judgement.word not in ("named", "class") or best is None:
+        return ""
+    sensors = {site.name for site in best.fit.model.sites if site.role == "sensor"}
+    if not any(e.driver == "time" and e.family.is_curve and e.site in sensors for e in best.effects):
         return ""
     worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
     if not worse:
