@@ -58,7 +58,7 @@ def discover(
         Names of the free parameters instead of those of role "estimated".
     report_record
         A further record of the same process that starts in the same (unknown) state. It reports the error before and
-        after and is used for nothing else; the whole of `record` can then be used to search.
+        after, and may take a name back; the whole of `record` can then be used to search.
     limits
         Lowest and highest value of inputs by name, for the test that is proposed; where it is not given, the test
         stays where the record has been.

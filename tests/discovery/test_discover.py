@@ -127,13 +127,14 @@ def test_what_was_found_is_not_found_again(draught: Discovery) -> None:
     assert verdict.word == "none", verdict
 
 
-def test_a_record_of_its_own_reports_and_does_nothing_else(draught: Discovery) -> None:
-    """The error is that of the other record, and what is found does not depend on it."""
+def test_a_record_of_its_own_reports_and_may_only_take_a_name_back(draught: Discovery) -> None:
+    """The error is that of the other record. What is fitted does not depend on it, but it has a veto."""
     other = tank_record(seed=7)
     a = discover(heated_tank(), tank_record(), report_record=other)
     spoilt = Dataset("spoilt", other.time, other.dt, other.inputs, other.outputs + 5.0)
     b = discover(heated_tank(), tank_record(), report_record=spoilt)
-    assert [e.as_dict() for e in a.verdict.effects] == [e.as_dict() for e in b.verdict.effects]
+    assert a.after is not None and b.after is not None and a.after.values.tolist() == b.after.values.tolist()
+    assert (a.verdict.word, b.verdict.word, b.verdict.effects) == ("named", "abstain", ())
     assert a.verdict.error[0].after < 0.1 < 4.0 < b.verdict.error[0].after
 
 
