@@ -166,10 +166,10 @@ def _memory(a: FloatArray) -> float:
 
 
 def proportional(residual: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Weights (N, m): `|prediction|` over its mean where the noise grows with the value, else 1.
+    """Weights (N, m): size of the prediction over its mean where the noise grows with the value, else 1.
 
     Judged on differences d of the residual, in which slow model errors cancel, by minus two log-likelihood: with
-    w = |prediction| / mean, the noise is proportional where::
+    w = size / mean, the noise is proportional where::
 
         2 n log s(d / w) + 2 sum log w < 2 n log s(d) - 10
     """

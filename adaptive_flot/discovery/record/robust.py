@@ -71,8 +71,10 @@ def clipped_std(e: FloatArray, *, robust: bool = True) -> float:
 def without_spikes(residual: FloatArray) -> FloatArray:
     """A residual (N, m) in which single values far from their neighbours are put in their midst.
 
-    v_k becomes the median m_k of SPIKE_WINDOW values around it where |v_k - m_k| > SPIKE 1.4826 median |v - m|:
-    Hampel's filter, Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782.
+    Hampel's filter (Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782): v_k becomes the median m_k of
+    SPIKE_WINDOW values around it where::
+
+        |v_k - m_k| > SPIKE 1.4826 median |v - m|
 
     What a model lacks changes from row to row by less than the noise; a spike in its place would be explained by
     whatever happens to fit it.
