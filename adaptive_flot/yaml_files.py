@@ -7,6 +7,7 @@ alias is counted as often as it stands, so that a few lines can not grow to giga
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,31 @@ def read_yaml(path: Path, error: type[AdaptiveFlotError], empty: str) -> dict[st
     if not isinstance(content, dict):
         raise error(f"{path}: {empty}")
     return content
+
+
+def line_of(path: Path, place: Sequence[int | str]) -> int | None:
+    """Line of a YAML file that holds a key, or the nearest one above it that is there; None for the file as a whole.
+
+    Parameters
+    ----------
+    path
+        A file that `read_yaml` has read.
+    place
+        Keys and positions from the outermost level inwards, as pydantic names them.
+    """
+    node = yaml.compose(path.read_text(encoding="utf-8-sig"), Loader=yaml.SafeLoader)
+    line = None
+    for part in place:
+        if isinstance(node, yaml.MappingNode):
+            pair = next((pair for pair in node.value if pair[0].value == str(part)), None)
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            pair = node.value[part], node.value[part]
+        else:
+            pair = None
+        if pair is None:
+            return line
+        line, node = pair[0].start_mark.line + 1, pair[1]
+    return line
 
 
 class _RefusedError(Exception):

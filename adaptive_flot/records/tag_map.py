@@ -1,0 +1,230 @@
+"""The map from the tags of a plant to the quantities of a model: a YAML file.
+
+::
+
+    time: {column: Timestamp, zone: Europe/London}
+    grid: {step: 10 s, hold_at_most: 30 s, gaps: split}
+    air_flow: {tag: FIC_101.PV, unit: L/min, bad: [Bad Input, -9999]}
+    concentrate_grade: {tag: AI_401.PV, unit: "%", delay: 90 s}
+
+The importer and the live link read the same file. This module needs neither pandas nor a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from zoneinfo import ZoneInfo
+
+import yaml
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from adaptive_flot.errors import DataError, near_match
+from adaptive_flot.records.units import read_unit, seconds
+from adaptive_flot.yaml_files import line_of, read_yaml
+from adaptive_flot.yaml_problems import first_problem
+
+SECTIONS = ("file", "time", "grid")
+"""Keys of the outermost level that are no quantities."""
+FORMATS = ("iso", "day-first", "month-first", "epoch s", "epoch ms", "excel", "seconds")
+
+
+def _duration(text: object) -> object:
+    if not isinstance(text, str):
+        raise ValueError("a duration has a unit; write it as 10 s, 5 min or 1 h")
+    try:
+        value = seconds(text)
+    except DataError as error:
+        raise ValueError(str(error)) from error
+    if not 0 < value < 1e9:
+        raise ValueError("a duration is longer than nothing")
+    return text
+
+
+def _unit(text: str) -> str:
+    try:
+        read_unit(text)
+    except DataError as error:
+        raise ValueError(str(error)) from error
+    return text
+
+
+def _zone(name: str) -> str:
+    try:
+        ZoneInfo(name)
+    except (LookupError, ValueError, OSError) as error:
+        raise ValueError("no time zone; write one as Europe/London, or UTC") from error
+    return name
+
+
+def _format(text: str) -> str:
+    if text not in FORMATS and "%" not in text:
+        raise ValueError(f"no form of time; write one of {', '.join(FORMATS)}, or one as '%d.%m.%Y %H:%M'")
+    return text
+
+
+def _codes(given: object) -> object:
+    """Texts and numbers, one or a list of them, as texts."""
+    listed = given if isinstance(given, (list, tuple)) else [given]
+    return [str(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else v for v in listed]
+
+
+Duration = Annotated[str, BeforeValidator(_duration)]
+Codes = Annotated[tuple[str, ...], BeforeValidator(_codes)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class FileKeys(_Part):
+    """How the file is to be read, where it does not say so itself; a key left out is found out."""
+
+    sheet: str | None = None
+    separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Literal[".", ","] | None = None
+    form: Literal["wide", "long"] | None = None
+    """wide: a column a tag. long: a row a value, with the columns named by the keys below."""
+    tag: str | None = None
+    value: str | None = None
+    quality: str | None = None
+    good: Codes | None = None
+    """What the quality of a good value is; default `Good`, `OK`, 192 and the like."""
+
+
+class TimeKeys(_Part):
+    """Where the time stands, and what clock it is of.
+
+    `column` is one column, or two (date, then time of day). `zone` counts where the stamps have no offset of their own.
+    """
+
+    column: str | tuple[str, str] | None = None
+    zone: Annotated[str, AfterValidator(_zone)] | None = None
+    format: Annotated[str, AfterValidator(_format)] | None = None
+
+
+class GridKeys(_Part):
+    """The rows of the record.
+
+    `step` is the sampling interval. An input is held for `hold_at_most` after its last value; after that it is missing,
+    which is a gap. `gaps`: `split` the record into stretches, keep the `longest` one, or `refuse`.
+    """
+
+    step: Duration | None = None
+    hold_at_most: Duration | None = None
+    gaps: Literal["split", "longest", "refuse"] = "split"
+
+
+class TagKeys(_Part):
+    """One quantity of the model, and the tag that measures it.
+
+    Attributes
+    ----------
+    tag
+        Column of the file, or name in its tag column.
+    unit
+        Unit of the tag.
+    bad
+        Texts and numbers that stand for no value.
+    delay
+        How much later than the process the tag shows a value: the analyser's sample line, for example.
+    average
+        `interval`: the mean over each interval of the grid (of an input: over the time it acted). `sample`: the value
+        at the time of the row (of an input: at the start of the interval). Default: interval for an input, else sample.
+    repeats
+        `drop`: a value equal to the one before is no new measurement, as an analyser shows that holds.
+    frozen
+        Values that do not change for longer than this count as bad.
+    spikes
+        `drop`: values far from their neighbours count as bad.
+    range
+        Lowest and highest good value, in the tag's unit; default the physical range of the quantity.
+    """
+
+    tag: str
+    unit: Annotated[str, AfterValidator(_unit)] | None = None
+    bad: Codes = ()
+    delay: Duration | None = None
+    average: Literal["interval", "sample"] | None = None
+    repeats: Literal["keep", "drop"] = "keep"
+    frozen: Duration | None = None
+    spikes: Literal["keep", "drop"] = "keep"
+    range: tuple[float, float] | None = None
+
+    @property
+    def delay_s(self) -> float:
+        """The delay [s]."""
+        return 0.0 if self.delay is None else seconds(self.delay)
+
+    @property
+    def frozen_s(self) -> float | None:
+        """Longest time [s] without change of a good signal; None where it may stand still."""
+        return None if self.frozen is None else seconds(self.frozen)
+
+
+class TagMap(_Part):
+    """A map file. What it leaves out, an import finds out and asks for; see `adaptive_flot.records.guess`."""
+
+    file: FileKeys = FileKeys()
+    time: TimeKeys = TimeKeys()
+    grid: GridKeys = GridKeys()
+    quantities: dict[str, TagKeys] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather(cls, content: Any) -> Any:
+        """Put the keys of quantities, which stand beside the sections in the file, together."""
+        if not isinstance(content, Mapping) or "quantities" in content:
+            return content
+        sections = {k: v for k, v in content.items() if k in SECTIONS}
+        return {**sections, "quantities": {k: v for k, v in content.items() if k not in SECTIONS}}
+
+    def check_names(self, known: tuple[str, ...], model: str) -> None:
+        """Check that every quantity is one of the model's.
+
+        Raises
+        ------
+        DataError
+            Names the first that is not, and the nearest that is.
+        """
+        for name in self.quantities:
+            if name not in known:
+                raise DataError(f"{name}: no such quantity of model '{model}'; {near_match(name, known)}")
+
+    def text(self) -> str:
+        """The map as YAML, one line a section or quantity, keys at their default left out."""
+        content = self.model_dump(mode="json", exclude_defaults=True)
+        parts = {k: content[k] for k in SECTIONS if k in content} | content.get("quantities", {})
+        return "".join(
+            yaml.safe_dump({k: v}, default_flow_style=None, sort_keys=False, width=10_000, allow_unicode=True)
+            if not v
+            else f"{k}: {_flow(v)}\n"
+            for k, v in parts.items()
+        )
+
+
+def _flow(value: Any) -> str:
+    text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=10_000, allow_unicode=True)
+    return str(text).strip()
+
+
+def load_tag_map(path: Path | str) -> TagMap:
+    """Read a map file and check its form.
+
+    Raises
+    ------
+    DataError
+        Not YAML, an unknown key, a wrong type, no unit, no duration, no time zone: file, line, what, and what to do.
+    """
+    file = Path(path)
+    content = read_yaml(file, DataError, "holds no keys; write at least one line as 'air_flow: {tag: FIC_101.PV}'")
+    content = {str(k): v for k, v in content.items()}
+    try:
+        return TagMap.model_validate(content)
+    except ValidationError as error:
+        place = error.errors()[0]["loc"]
+        outer = place[1:] if place[:1] == ("quantities",) else place
+        line = line_of(file, outer)
+        problem = first_problem(error, TagMap).replace("quantities.", "", 1)
+        raise DataError(f"{file}: {'' if line is None else f'line {line}: '}{problem}") from error
