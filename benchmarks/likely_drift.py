@@ -1,8 +1,8 @@
 """What the first 600 s tell of a drift that comes later: `python -m benchmarks.likely_drift`.
 
-Most likely drift of the joint filter (`estimators/shared/drift.py`) and the largest that is not rejected at 95 %, from
-the record before the estimators start and, in hindsight, from the whole run. In the paper's scenarios nothing drifts
-in the first 600 s, so that maximum likelihood there asks for a filter that follows nothing afterwards.
+Most likely drift of the joint filter (`estimators/ekf/likely_drift.py`) and the largest that is not rejected at 95 %:
+from the record before the estimators start and, in hindsight, from the whole run. In the scenarios of the paper
+nothing drifts in the first 600 s. Maximum likelihood there asks for a filter that follows nothing afterwards.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
-from estimators.shared.drift import DriftFit, most_likely_drift
+from estimators.ekf.likely_drift import DriftFit, most_likely_drift
 
 SCENARIOS = ("paper_scenario_1", "random_walk")
 SEEDS = (1001,)

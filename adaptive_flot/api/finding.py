@@ -20,7 +20,6 @@ from adaptive_flot.discovery.results import Discovery, Verdict
 from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
 from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.extension import effect_units
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.runner.commands.discover import discover_file
 
@@ -78,7 +77,7 @@ class Finding:
         """Coefficients of the effects that the verdict tells: a row a coefficient, with its 95 % interval."""
         rows = []
         for named in self.verdict.effects:
-            units = effect_units(self.model, named.effect)
+            units = self.model.effect_units(named.effect)
             place = {"site": named.effect.site, "driver": named.effect.driver, "form": named.effect.form}
             for key, value in named.effect.coefficients.items():
                 low, high = named.interval95.get(key, (float("nan"), float("nan")))

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from adaptive_flot.contracts.sample import DelayedValue, Sample
 from adaptive_flot.contracts.status import Status
+from adaptive_flot.described import Described
 from adaptive_flot.greybox.model import FloatArray, Model
 
 State = TypeVar("State")
 
 
-@dataclass(frozen=True)
-class Setup:
+@dataclass(frozen=True, repr=False)
+class Setup(Described):
     """What an estimator is built for.
 
     Attributes
@@ -37,6 +38,15 @@ class Setup:
     parameters: tuple[str, ...]
     outputs: tuple[str, ...]
     truth: FloatArray | None = None
+
+    def described(self) -> Mapping[str, object]:
+        """For what it is; see `Described`."""
+        return {
+            "model": self.model.name,
+            "dt": f"{self.dt:g} s",
+            "parameters": ", ".join(self.parameters),
+            "outputs": ", ".join(self.outputs),
+        }
 
 
 @dataclass(frozen=True)

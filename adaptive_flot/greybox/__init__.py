@@ -4,12 +4,12 @@ Map, in the order of use
 ------------------------
 quantities.py        Named quantities, parameters and known effects.
 scope.py             What equations are written into: symbols, sites, derivatives, outputs.
+lookup.py            Names, places and ranges of the quantities of a model.
 model.py             Model: quantities and equations, its functions, its effects.
 build.py             Equations to CasADi functions.
 function_cache.py    Functions derived from a model, each made once.
 forms/               Forms of an effect, their coefficients and what each coefficient does (its role).
 effects.py           Effect: a form at a site, with a driver and values.
-extension.py         A model with effects, and without them.
 sensors.py           A model without the errors of its sensors.
 stepping/            Simulation of one sampling interval and of whole records, with exact sensitivities.
 filtering/           A model in innovations form: extended Kalman filter, smoother, k-step prediction, likelihood.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
@@ -12,9 +11,6 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.quantities import Kind
 from adaptive_flot.greybox.scope import Scope, Site
-
-if TYPE_CHECKING:
-    from adaptive_flot.greybox.model import Model
 
 NEWTON_STEPS = 3
 """Newton iterations that close the algebraic loop inside the explicit right-hand side. Convergence is quadratic from a
@@ -95,16 +91,16 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
     return Built(dae, ode, decay, tuple(scope.sites.values()), site_values)
 
 
-def tangent(ode: ca.Function, dae: ca.Function, decay: ca.Function, seeds: ca.DM) -> ca.Function:
+def tangent(built: Built, seeds: ca.DM) -> ca.Function:
     """The right-hand side and its derivatives along several directions: Jacobians, worked out once, times each.
 
     The directions of the parameters, `seeds` (np, q), are constants: as symbols they would triple the work of building.
     The algebraic variable is solved for inside, as in `ode`: the solution and the derivatives have much in common.
     """
-    t, x, u, p, z = dae.sx_in()
+    t, x, u, p, z = built.dae.sx_in()
     dx = ca.SX.sym("dx", x.numel(), seeds.shape[1])
-    rates, residual, y, _ = dae(t, x, u, p, z)
-    decays = decay(t, x, u, p, z)
+    rates, residual, y, _ = built.dae(t, x, u, p, z)
+    decays = built.decay(t, x, u, p, z)
     both = ca.vertcat(rates, y, decays)
 
     def along(value: ca.SX) -> ca.SX:
@@ -122,16 +118,8 @@ def tangent(ode: ca.Function, dae: ca.Function, decay: ca.Function, seeds: ca.DM
     return ca.Function(
         "tangent",
         [t, x, u, p, dx],
-        list(at_z(t, x, u, p, ode(t, x, u, p)[3], dx)),
+        list(at_z(t, x, u, p, built.ode(t, x, u, p)[3], dx)),
         ["t", "x", "u", "p", "dx"],
         ["xdot", "y", "decay", "dxdot", "dy", "ddecay"],
         {"cse": True},
     )
-
-
-def tangent_for(
-    model: Model, shape: tuple[int, int], places: tuple[int, ...], values: tuple[float, ...]
-) -> ca.Function:
-    """`tangent` of a model, for seeds of this shape: places of the nonzeros (counted by columns) and their values."""
-    seeds = ca.DM(ca.Sparsity.nonzeros(*shape, list(places)), list(values))
-    return tangent(model.ode, model.dae, model.decay, seeds)

@@ -7,7 +7,7 @@ states. Plant, estimators and controllers use the extended model like any other.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import casadi as ca
@@ -157,12 +157,16 @@ class Effect:
             for c in self.terms
         )
 
-    def states(self) -> tuple[Quantity, ...]:
-        """Its own states, scaled by the setting `scale`."""
-        return tuple(
+    def states(self, late_driver: Quantity | None = None) -> tuple[Quantity, ...]:
+        """States of its form, and one that follows a driver which is known only after the site."""
+        own = tuple(
             Quantity(f"{self.label}.{n}", "-", f"{self.family.description} at {self.site}")
             for n in self.family.states(self.full_settings)
         )
+        if late_driver is None:
+            return own
+        description = f"{late_driver.name} as it reaches {self.site}"
+        return (*own, replace(late_driver, name=self.follower, description=description))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for YAML and JSON."""

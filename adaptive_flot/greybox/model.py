@@ -16,20 +16,21 @@ Every quantity in which physics may be missing passes through a named *site*. A 
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVarTuple
 
 import casadi as ca
-import numpy as np
 
-from adaptive_flot.errors import ModelError, RangeError, near_match
-from adaptive_flot.greybox.build import Built, build, tangent_for
-from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.extension import with_effects, without_effects
+from adaptive_flot.described import Described
+from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.build import Built, build, tangent
+from adaptive_flot.greybox.effects import Effect, check_distinct
 from adaptive_flot.greybox.function_cache import FunctionCache
-from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity, check_range
+from adaptive_flot.greybox.lookup import Lookup
+from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
 from adaptive_flot.greybox.scope import Scope, Site
 
 __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
@@ -37,8 +38,8 @@ __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Sc
 Arguments = TypeVarTuple("Arguments")
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(Lookup, Described):
     """Named quantities plus equations; building it compiles nothing and takes milliseconds.
 
     Properties `dae`, `ode` and `decay`, and what `tangent(seeds)` returns, are CasADi functions of `(t, x, u, p[, z])`:
@@ -109,50 +110,15 @@ class Model:
     def __post_init__(self) -> None:
         _ = self._built  # equations are checked when the model is made, not when it is first used
 
-    def names(self, kind: Kind) -> tuple[str, ...]:
-        """Names of one kind of quantity, in vector order."""
-        return tuple(q.name for q in getattr(self, kind))
-
-    def index(self, kind: Kind, name: str) -> int:
-        """Position of a quantity in its vector; parameters answer to name and symbol.
-
-        Raises
-        ------
-        ModelError
-            No such quantity; the message holds the nearest name.
-        """
-        for i, quantity in enumerate(getattr(self, kind)):
-            if name == quantity.name or (isinstance(quantity, Parameter) and name == quantity.symbol):
-                return i
-        symbols = (q.symbol for q in getattr(self, kind) if isinstance(q, Parameter) and q.symbol)
-        known = near_match(name, (*self.names(kind), *symbols))
-        raise ModelError(f"model '{self.name}' has no {name!r} among its {kind}; {known}")
-
-    def indices(self, kind: Kind, names: Iterable[str]) -> list[int]:
-        """Positions of several quantities."""
-        return [self.index(kind, name) for name in names]
-
-    def expand_parameters(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Full parameter names for names, symbols and group prefixes (`floatability` is all its minerals).
-
-        Raises
-        ------
-        ModelError
-            Unknown parameter, or one that is named twice.
-        """
-        full: list[str] = []
-        for name in names:
-            group = [p.name for p in self.parameters if p.name.startswith(name + ".")]
-            full += group or [self.parameters[self.index("parameters", name)].name]
-        twice = next((name for i, name in enumerate(full) if name in full[:i]), None)
-        if twice is not None:
-            raise ModelError(f"parameter {twice!r} is named twice, alone, by its symbol or in a group; name it once")
-        return tuple(full)
-
-    @property
-    def parameter_values(self) -> FloatArray:
-        """Parameter vector (np,), each in its unit."""
-        return np.array([p.value for p in self.parameters], dtype=float)
+    def described(self) -> Mapping[str, object]:
+        """What it is made of; see `Described`."""
+        kinds: tuple[Kind, ...] = ("states", "inputs", "outputs")
+        return {
+            "name": self.name,
+            **{kind: ", ".join(self.names(kind)) for kind in kinds},
+            "parameters": len(self.parameters),
+            "effects": ", ".join(e.label for e in self.effects) or "none",
+        }
 
     def with_parameters(self, values: Mapping[str, float]) -> Model:
         """Return the same model with other parameter values.
@@ -166,13 +132,8 @@ class Model:
         """
         new = list(self.parameters)
         for name, value in values.items():
-            p = new[i := self.index("parameters", name)]
-            if not (np.isfinite(value) and p.lower <= value <= p.upper):
-                raise RangeError(
-                    f"parameter {p.name!r} = {value:g} {p.unit} is outside its physical range "
-                    f"[{p.lower:g}, {p.upper:g}] {p.unit}; give a value inside it"
-                )
-            new[i] = replace(p, value=float(value))
+            i = self.index("parameters", name)
+            new[i] = new[i].with_value(value)
         other = copy.copy(self)  # parameter values are arguments of all functions: both models share these
         object.__setattr__(other, "parameters", tuple(new))
         return other
@@ -185,11 +146,39 @@ class Model:
         ModelError
             Unknown site or driver, a driver that is not known where the site is passed, or two effects of one name.
         """
-        return with_effects(self, tuple(effects))
+        added = tuple(effects)
+        check_distinct((*self.effects, *added))
+        return replace(
+            self,
+            states=self.states + self._effect_states(added),
+            parameters=self.parameters + tuple(p for e in added for p in e.parameters(self.effect_units(e))),
+            effects=self.effects + added,
+        )
 
     def without_effects(self) -> Model:
         """Return this model without its effects; its own parameters keep their present values."""
-        return without_effects(self)
+        states = len(self.states) - len(self._effect_states(self.effects))
+        parameters = len(self.parameters) - sum(len(e.terms) for e in self.effects)
+        return replace(self, states=self.states[:states], parameters=self.parameters[:parameters], effects=())
+
+    def _effect_states(self, effects: tuple[Effect, ...]) -> tuple[Quantity, ...]:
+        late = {name: self.signals[self.index("signals", name)] for name in self.late_drivers}
+        return tuple(state for e in effects for state in e.states(late.get(e.driver)))
+
+    def effect_units(self, effect: Effect) -> dict[str, str | None]:
+        """Unit of each coefficient and setting of an effect on this model; None where its site does not tell its unit.
+
+        Raises
+        ------
+        ModelError
+            Unknown site.
+        """
+        sites = {s.name: s for s in self.sites}
+        if effect.site not in sites:
+            raise ModelError(f"model '{self.name}' has no site {effect.site!r}; {near_match(effect.site, sites)}")
+        site = sites[effect.site]
+        units = {q.name: q.unit for q in (*self.inputs, *self.states, *self.signals)} | {"time": "s"}
+        return effect.units(site.unit, units.get(effect.driver), site.mode)
 
     def fitted_effects(self) -> tuple[Effect, ...]:
         """Effects with the present parameter values as their coefficients."""
@@ -197,18 +186,6 @@ class Model:
         return tuple(
             replace(e, coefficients={c.name: values[e.parameter(c.name)] for c in e.terms}) for e in self.effects
         )
-
-    def check_inputs(self, inputs: FloatArray, time: FloatArray | None = None, where: str = "inputs") -> None:
-        """Check an input table (N, nu) against the physical range of each input.
-
-        Raises
-        ------
-        RangeError
-            Names the first input that leaves its range, the row or time, the value and the range.
-        ModelError
-            Wrong number of columns.
-        """
-        check_range(self.inputs, np.atleast_2d(np.asarray(inputs, dtype=float)), time, where)
 
     @property
     def dae(self) -> ca.Function:
@@ -225,7 +202,12 @@ class Model:
 
         The directions are (dx, seeds): `seeds` (np, q) are those of the parameters, constants, most of them zero.
         """
-        return self.derived(tangent_for, seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros()))
+        key = tangent, seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros())
+        return self._functions.get(key, lambda: tangent(self._built, seeds))
+
+    def steps_in(self, dt: float) -> int:
+        """Steps of the fast integration in dt [s], as many as `max_step_s` asks for."""
+        return max(1, math.ceil(dt / self.max_step_s - 1e-9))
 
     def derived(self, builder: Callable[[Model, *Arguments], ca.Function], *arguments: *Arguments) -> ca.Function:
         """Return `builder(model, *arguments)`, made once for this model and those of other parameter values.

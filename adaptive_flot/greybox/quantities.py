@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -87,6 +87,21 @@ class Parameter:
     prior_std: float | None = None
     role: Literal["fixed", "estimated"] = "fixed"
     disturbance: bool = False
+
+    def with_value(self, value: float) -> Parameter:
+        """The same parameter with another value, in its unit.
+
+        Raises
+        ------
+        RangeError
+            A value outside the physical range.
+        """
+        if not (np.isfinite(value) and self.lower <= value <= self.upper):
+            raise RangeError(
+                f"parameter {self.name!r} = {value:g} {self.unit} is outside its physical range "
+                f"[{self.lower:g}, {self.upper:g}] {self.unit}; give a value inside it"
+            )
+        return replace(self, value=float(value))
 
     @property
     def label(self) -> str:

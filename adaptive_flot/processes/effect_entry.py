@@ -9,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from adaptive_flot.errors import ModelError, located
 from adaptive_flot.greybox.effects import Effect, Mode
-from adaptive_flot.greybox.extension import effect_units
 from adaptive_flot.greybox.model import Model
 
 
@@ -78,7 +77,7 @@ class EffectEntry(_Part):
             {name: entry.setting for name, entry in self.settings.items()},
             self.mode,
         )
-        units = effect_units(model, effect)
+        units = model.effect_units(effect)
         for kind, entries in (("coefficients", self.coefficients), ("settings", self.settings)):
             for name, entry in entries.items():
                 with located(f"{kind}.{name}"):
@@ -112,7 +111,7 @@ def attach(model: Model, entries: Sequence[EffectEntry], where: str = "effects")
 
 def as_entry(effect: Effect, model: Model) -> dict[str, Any]:
     """Plain values for YAML, which `EffectEntry` reads: a number with a unit carries it."""
-    units = effect_units(model, effect)
+    units = model.effect_units(effect)
 
     def number(name: str, value: float | Sequence[float]) -> Any:
         plain = [float(v) for v in value] if isinstance(value, Sequence) else float(value)

@@ -11,10 +11,10 @@ from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from estimators.ekf import Drift, drift_of
 from estimators.mhe.arrival import arrival_step
 from estimators.mhe.problem import SOLVERS, HorizonWindow, MovingHorizon
 from estimators.shared.coordinates import Coordinates
+from estimators.shared.drift import Drift, drift_of
 from estimators.shared.joint_filter import first_estimate, layout, parameters_of, process_noise
 from estimators.shared.measured import driving_outputs
 

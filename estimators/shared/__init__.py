@@ -3,8 +3,7 @@
 Map
 ---
 joint_filter.py      Extended Kalman filter of state and parameters together.
-smoother.py          Rauch-Tung-Striebel smoother of the same.
-drift.py             How fast parameters are believed to drift, by maximum likelihood.
+drift.py             How far parameters drift within an hour, as an option gives it.
 coordinates.py       Scaled parameters and their bounds.
 information.py       Directions of the parameters on which the last rows say too little.
 measured.py          Which outputs of a sample are there.

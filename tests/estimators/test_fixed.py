@@ -19,3 +19,10 @@ def test_predictions_are_the_free_run_and_nothing_is_adapted(cell_case: CellCase
         np.testing.assert_array_equal(e.parameters, cell_case.prior.parameters)
         np.testing.assert_array_equal(e.innovation, sample.outputs - e.prediction)
         assert not e.covariance.any() and e.status is Status.OK and e.time == sample.time
+
+
+def test_a_setup_prints_as_one_short_line(cell_case: CellCase) -> None:
+    """An estimator of one's own that fails shows what it was built for, not the whole model."""
+    assert repr(cell_case.setup) == (
+        "<Setup model: flotation; dt: 1 s; parameters: growth_exponent, coalescence_rate; outputs: concentrate_grade>"
+    )

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from adaptive_flot.errors import ModelError, RangeError
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Kind, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.fastcall import FastCall
@@ -242,3 +243,12 @@ def test_tangent_is_the_derivative_of_the_closed_equations(model: Model, seed: i
         fast(0.0, x + s * h * dx, u, p + s * h * dp, z[3])[0] for s, z in ((1, ahead), (-1, behind))
     )
     np.testing.assert_allclose(decay, (ahead_decay - behind_decay) / (2 * h), rtol=1e-5, atol=1e-8)
+
+
+def test_a_model_prints_as_one_short_line(model: Model) -> None:
+    """A notebook that ends a cell with a model shows what it is, not every parameter and its source."""
+    effect = Effect("grade_sensor", "constant", "shift")
+    text = repr(model.with_effects([effect]))
+    assert text.startswith("<Model name: flotation; states: tails_flow, level, ")
+    assert text.endswith("; effects: grade_sensor_by_constant>")
+    assert len(text) < 500

@@ -16,7 +16,6 @@ from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.greybox.data.columns import line, numeric_column, time_column
 from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.step_functions import steps_in
 
 TIME_COLUMN = "time_s"
 UNIFORMITY = 1e-3
@@ -224,7 +223,7 @@ def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
 
 
 def _check_steps(model: Model, dt: float, rows: int, file: Path) -> None:
-    steps = (rows - 1) * steps_in(model, dt)
+    steps = (rows - 1) * model.steps_in(dt)
     if steps > MOST_STEPS:
         raise DataError(
             f"{file}: {rows} rows, {dt:g} s apart, take {steps:.3g} steps of model {model.name!r}, whose longest is "

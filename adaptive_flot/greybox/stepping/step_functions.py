@@ -5,7 +5,6 @@ Each builder takes a model and hashable arguments, as `Model.derived` asks for.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import casadi as ca
@@ -64,17 +63,12 @@ def check_interval(model: Model, dt: float, substeps: int | None = None) -> None
     ModelError
         It takes more than MOST_AT_ONCE steps.
     """
-    count = substeps or steps_in(model, dt)
+    count = substeps or model.steps_in(dt)
     if count > MOST_AT_ONCE:
         raise ModelError(
             f"a sampling interval of {dt:g} s takes {count:g} steps of model {model.name!r}, whose longest is "
             f"{model.max_step_s:g} s; at most {MOST_AT_ONCE} can be taken at once: sample more often"
         )
-
-
-def steps_in(model: Model, dt: float) -> int:
-    """Steps of the fast method in dt [s], as many as the model's `max_step_s` asks for."""
-    return max(1, math.ceil(dt / model.max_step_s - 1e-9))
 
 
 def step(model: Model, interval: Interval) -> ca.Function:

@@ -95,7 +95,7 @@ class Stepper:
             raise ModelError(f"a stepper needs dt > 0 and substeps >= 1, got dt = {dt}, substeps = {substeps}")
         self.model = model
         self.dt = float(dt)
-        self.substeps = substeps or step_functions.steps_in(model, dt)
+        self.substeps = substeps or model.steps_in(dt)
         self.accurate = accurate
         self.interval = Interval(self.dt, self.substeps, accurate)
         self._calls: FunctionCache[FastCall] = FunctionCache()

@@ -8,7 +8,6 @@ import numpy as np
 
 from adaptive_flot.discovery.results import SURE, Alternative, Discovery
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.extension import effect_units
 from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.page import Table, number
 from adaptive_flot.report.kit.style import exponent, unit_text
@@ -50,7 +49,7 @@ def coefficient_table(discovery: Discovery) -> Table:
     """Coefficients of the effects that the verdict tells, with their intervals."""
     rows = []
     for named in discovery.verdict.effects:
-        units = effect_units(discovery.model, named.effect)
+        units = discovery.model.effect_units(named.effect)
         for name, value in named.effect.coefficients.items():
             low, high = named.interval95.get(name, (np.nan, np.nan))
             interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"

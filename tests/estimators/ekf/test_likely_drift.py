@@ -7,7 +7,7 @@ import pytest
 
 from adaptive_flot.contracts import Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray
-from estimators.shared.drift import SLOWEST, log_likelihood, most_likely_drift
+from estimators.ekf.likely_drift import SLOWEST, log_likelihood, most_likely_drift
 from tests.estimators import toys
 from tests.estimators.gaussian import affine_maps, linear_record
 

@@ -21,7 +21,7 @@ import numpy as np
 from adaptive_flot.contracts import Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from estimators.ekf import Ekf
+from estimators.ekf.estimator import Ekf
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import Layout, linearise_interval, parameters_of
 from estimators.shared.measured import driving_outputs

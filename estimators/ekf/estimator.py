@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
-
-import numpy as np
 
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.shared.coordinates import Coordinates
+from estimators.shared.drift import Drift, drift_of
 from estimators.shared.joint_filter import filter_step, first_estimate, layout, parameters_of, process_noise
 from estimators.shared.measured import driving_outputs
 
 Walk = Literal["random", "integrated"]
-Drift = float | Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -55,7 +52,7 @@ class Ekf:
         Model, sampling interval, adapted parameters (q) and driving outputs (m).
     drift_per_hour
         How far a parameter drifts within an hour, as a share of it: one standard deviation for all, or by parameter.
-        `estimators.drift.most_likely_drift` finds it in a record.
+        `estimators.ekf.likely_drift.most_likely_drift` finds it in a record.
     walk
         `random`: parameters do a random walk; `integrated`: their rate does.
     state_noise
@@ -127,25 +124,3 @@ class Ekf:
             status=status,
         )
         return EkfState(sample.time, z, P, state.noise_std), estimate
-
-
-def drift_of(setup: Setup, given: Drift, who: str) -> FloatArray:
-    """Drift of each adapted parameter (q,) from one number or a mapping by name or symbol.
-
-    Raises
-    ------
-    ModelError
-        A negative drift, an unknown parameter, or one that is not adapted.
-    """
-    values = np.full(len(setup.parameters), 0.0 if isinstance(given, Mapping) else float(given))
-    if isinstance(given, Mapping):
-        for name, value in given.items():
-            full = setup.model.parameters[setup.model.index("parameters", name)].name
-            if full not in setup.parameters:
-                raise ModelError(
-                    f"{who}: drift of {name!r}, which is not adapted; {near_match(name, setup.parameters)}"
-                )
-            values[setup.parameters.index(full)] = value
-    if not (np.isfinite(values).all() and (values >= 0).all()):
-        raise ModelError(f"{who}: drift_per_hour = {given}; give shares of 0 or more")
-    return values

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimators.ekf import Ekf
-from estimators.shared.smoother import smooth
+from estimators.ekf.smoother import smooth
 from tests.estimators.conftest import CellCase, replay
 from tests.estimators.gaussian import linear_record, posterior
 
