@@ -7,14 +7,12 @@ inputs (positive lags only, so feedback is no reason), that its size is that of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, norm
 from statsmodels.stats.diagnostic import acorr_ljungbox
-from statsmodels.stats.multitest import multipletests
 
+from adaptive_flot.discovery.assessment.holm import holm
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.discovery.record.problem import Problem
@@ -54,7 +52,7 @@ def detect(problem: Problem, base: Fit) -> Detection:
         p_values[output, "whiteness", ""] = white[output]
         p_values |= {(output, "past of", n): p for n, p in past[output].items()}
         p_values[output, "change", ""] = change[output][0]
-    rejected = _holm(p_values)
+    rejected = holm(p_values, LEVEL)
     symptoms = []
     for j, output in enumerate(outputs):
         follows = tuple(n for n in names if rejected[output, "past of", n])
@@ -63,19 +61,6 @@ def detect(problem: Problem, base: Fit) -> Detection:
         onset = change[output][1] if changed else None
         symptoms.append(Symptom(output, _size(residual[:, j]), white[output], past[output], follows, onset, shows))
     return Detection(tuple(symptoms))
-
-
-def _holm(p_values: Mapping[Test, float]) -> dict[Test, bool]:
-    """Which of m tests reject at LEVEL together; one that could not be made (NaN) does not.
-
-    The i-th smallest p value rejects when p_(i) <= LEVEL / (m + 1 - i), and all smaller ones do: Holm, *Scand. J.
-    Statist.* 6 (1979) 65.
-    """
-    if not p_values:
-        return {}
-    usable = [p if np.isfinite(p) else 1.0 for p in p_values.values()]
-    rejects = multipletests(usable, alpha=LEVEL, method="holm")[0]
-    return dict(zip(p_values, map(bool, rejects), strict=True))
 
 
 def _size(r: FloatArray) -> float:

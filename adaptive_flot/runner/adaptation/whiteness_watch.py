@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import ttest_1samp
 from statsmodels.stats.diagnostic import acorr_ljungbox
-from statsmodels.stats.multitest import multipletests
 
+from adaptive_flot.discovery.assessment.holm import holm
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.scenario.discovery_options import FEWEST
 
@@ -53,8 +53,6 @@ def watch(innovations: Mapping[str, FloatArray], false_alarm: float) -> Alarm | 
         if len(seen) >= FEWEST and np.ptp(seen) > 0:
             p_values[f"{output} correlation"] = float(acorr_ljungbox(seen, lags=[LAGS])["lb_pvalue"].iloc[0])
             p_values[f"{output} mean"] = float(ttest_1samp(seen, 0.0).pvalue)
-    if not p_values:
-        return None
-    rejected = multipletests(list(p_values.values()), alpha=false_alarm, method="holm")[0]
-    shown = {name: p for (name, p), bad in zip(p_values.items(), rejected, strict=True) if bad}
+    rejects = holm(p_values, false_alarm)
+    shown = {name: p for name, p in p_values.items() if rejects[name]}
     return Alarm(shown) if shown else None
