@@ -57,7 +57,7 @@ class Mhe:
     """Fits the last `window_s` seconds anew, with all that is older in an arrival cost.
 
     Where a Kalman filter linearises each interval once, before its measurement, the window is linearised where it turns
-    out to have been, and its parameters stay within their bounds (`mhe_problem.py`). Between two solutions a sample is
+    out to have been, and its parameters stay within their bounds (`problem.py`). Between two solutions a sample is
     taken in by one Kalman step, which on a linear model is the same.
 
     Parameters

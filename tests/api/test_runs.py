@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
@@ -16,19 +17,29 @@ from adaptive_flot.api.runs import Runs
 from adaptive_flot.errors import AdaptiveFlotError, PluginError, ResultError, ScenarioError
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.runs_table import read_runs
+from adaptive_flot.runner.scenario.scenario import Scenario
 from estimators.fixed import Fixed
 from estimators.rpem import Rpem
+from tests.runner.conftest import edited
 
 
 @pytest.fixture(scope="module")
-def runs() -> Runs:
+def short(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
+    """Two minutes of the cell, with the options of rpem that a class has unless told otherwise."""
+    file = tmp_path_factory.mktemp("scenario") / "short.yaml"
+    file.write_text(yaml.safe_dump(edited({"estimators.rpem.options": {"forgetting": 0.995}}), sort_keys=False))
+    return af.load_scenario(file)
+
+
+@pytest.fixture(scope="module")
+def runs(short: Scenario) -> Runs:
     """Five seeds, as many as a figure of the fits wants."""
-    return af.run("paper_scenario_1", estimators=["fixed", Rpem], seeds=range(1, 6))
+    return af.run(short, estimators=["fixed", Rpem], seeds=range(1, 6))
 
 
-def test_the_table_holds_the_fits_of_the_command(runs: Runs) -> None:
+def test_the_table_holds_the_fits_of_the_command(runs: Runs, short: Scenario) -> None:
     """A class run from Python gives to the bit what its name gives from the command line."""
-    plain = run_scenario(af.load_scenario("paper_scenario_1"), ["fixed", "rpem"], [1])
+    plain = run_scenario(short, ["fixed", "rpem"], [1])
     row = runs.table.set_index(["estimator", "seed"])
     for one, name in zip(plain, ("fixed", "Rpem"), strict=True):
         assert {key: row.loc[(name, 1), key] for key in one.fit} == one.fit
@@ -51,7 +62,7 @@ def test_text_and_html_are_short_and_hold_what_counts(runs: Runs) -> None:
     """A notebook prints a result that nobody asked to print: a few lines, not the whole scenario."""
     for shown in (repr(runs), runs._repr_html_()):
         assert len(shown) < 2000
-        for word in ("paper_scenario_1", "Rpem", "concentrate_grade", "5 seeds"):
+        for word in ("short", "Rpem", "concentrate_grade", "5 seeds"):
             assert word in shown
 
 
@@ -70,20 +81,20 @@ def test_report_and_files_are_those_of_the_command(runs: Runs, tmp_path: Path) -
     assert len(read_runs([folder])) == len(runs)
 
 
-def test_options_change_the_run_and_show_in_its_name() -> None:
+def test_options_change_the_run_and_show_in_its_name(short: Scenario) -> None:
     chosen = {"slow": ("rpem", {"forgetting": 0.999}), "as it is": "rpem"}
-    fits = af.run("paper_scenario_1", estimators=chosen, seeds=[1]).table.set_index("estimator")["n"].to_dict()
+    fits = af.run(short, estimators=chosen, seeds=[1]).table.set_index("estimator")["n"].to_dict()
     assert fits["slow"] != fits["as it is"]
-    bare = af.run("paper_scenario_1", estimators=("rpem", {"forgetting": 0.999}), seeds=[1]).table
+    bare = af.run(short, estimators=("rpem", {"forgetting": 0.999}), seeds=[1]).table
     assert bare["estimator"].tolist() == ["rpem (forgetting=0.999)"]
     assert bare["n"].tolist() == [fits["slow"]]
 
 
-def test_a_class_that_no_file_holds_runs() -> None:
+def test_a_class_that_no_file_holds_runs(short: Scenario) -> None:
     class Local(Fixed):
         """As written in a cell of a notebook."""
 
-    table = af.run("paper_scenario_1", estimators=Local, seeds=[1]).table
+    table = af.run(short, estimators=Local, seeds=[1]).table
     assert table["estimator"].tolist() == ["Local"]
 
 
@@ -108,7 +119,7 @@ def test_a_wrong_choice_is_one_line(given: dict[str, Any], error: type[AdaptiveF
     assert "\n" not in str(caught.value)
 
 
-def test_a_plot_that_is_not_there_says_which_are(runs: Runs) -> None:
+def test_a_plot_that_is_not_there_says_which_are(runs: Runs, short: Scenario) -> None:
     calls: Iterable[tuple[tuple[str, ...], str]] = [
         (("fit",), "did you mean 'fits'"),
         (("inputs", "pi"), "no run with the controller 'pi'"),
@@ -117,4 +128,4 @@ def test_a_plot_that_is_not_there_says_which_are(runs: Runs) -> None:
         with pytest.raises(ResultError, match=words):
             runs.plot(*arguments)
     with pytest.raises(ResultError, match="5 seeds or more"):
-        af.run("paper_scenario_1", estimators="fixed", seeds=[1]).plot("fits")
+        af.run(short, estimators="fixed", seeds=[1]).plot("fits")

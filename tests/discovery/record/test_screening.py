@@ -111,7 +111,7 @@ def test_an_input_that_hardly_moves_gives_no_driver(even: Dataset) -> None:
 
 def test_a_record_in_other_units_blames_nothing_but_the_sensor() -> None:
     """Degrees Celsius in a model of kelvin: a thermometer with a wrong zero is the one name that would be right."""
-    record = _record(lambda y: y - 273.15)
+    record = _record(lambda y: y - 273.15, rows=300)
     verdict = discover(heated_tank(), record).verdict
     assert all((e.effect.site, e.effect.driver) == ("thermometer", "constant") for e in verdict.effects), verdict
 
