@@ -50,6 +50,10 @@ class PluginError(AdaptiveFlotError):
     """An estimator, controller or model named in a file or on the command line can not be loaded."""
 
 
+class LinkError(AdaptiveFlotError):
+    """A link to a plant can not be used: wrong link file, certificate or password, no such tag, port in use."""
+
+
 @contextmanager
 def located(where: object) -> Iterator[None]:
     """Put the place (a file) in front of the message of every error raised inside, unless it is there already."""

@@ -109,6 +109,10 @@ class Pi:
         del time
         return PiState(0, float("nan"), None, np.empty(0) if self.feed_forward is None else self.feed_forward.start())
 
+    def tracked(self, state: PiState, inputs: FloatArray) -> PiState:
+        """Go on from what really acts; see `TracksInputs.tracked`. In velocity form that is bumpless."""
+        return replace(state, inputs=inputs.copy())
+
     def decide(self, state: PiState, sample: Sample | None, estimate: Estimate | None) -> tuple[PiState, Decision]:
         """Planned inputs until the estimator runs (as every controller here), then the PI law in velocity form."""
         planned = self.setup.schedule[min(state.row, len(self.setup.schedule) - 1)]

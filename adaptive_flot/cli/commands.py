@@ -6,12 +6,16 @@ from typing import Annotated
 
 import typer
 
+from adaptive_flot.cli.certificates import certificates
 from adaptive_flot.cli.compare import compare
 from adaptive_flot.cli.discover import discover
 from adaptive_flot.cli.estimate import estimate
+from adaptive_flot.cli.export import export
+from adaptive_flot.cli.live import live
 from adaptive_flot.cli.options import ignore_unknown_backend
 from adaptive_flot.cli.run import run
 from adaptive_flot.cli.scenarios import scenarios
+from adaptive_flot.cli.serve_plant import serve_plant
 from adaptive_flot.cli.simulate import simulate
 from adaptive_flot.cli.sweep import sweep
 
@@ -35,6 +39,10 @@ app.command(epilog="Example: adaptive-flot discover record.csv --json verdict.js
 app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift/run --out results/comparison")(compare)
 app.command(epilog="Example: adaptive-flot sweep paper_1000 --workers 2 --out results/paper_1000")(sweep)
 app.command(epilog="Example: adaptive-flot scenarios")(scenarios)
+app.command(epilog="Example: adaptive-flot certificates --out certificates")(certificates)
+app.command(epilog="Example: adaptive-flot serve-plant closed_loop_drift --speed 5 --write-link link.yaml")(serve_plant)
+app.command(epilog="Example: adaptive-flot live link.yaml")(live)
+app.command(epilog="Example: adaptive-flot export link.yaml --out record.csv --replay")(export)
 
 
 @app.callback()

@@ -28,6 +28,7 @@ from adaptive_flot.contracts.controller import (
     Limits,
     Plan,
     TakesOver,
+    TracksInputs,
 )
 from adaptive_flot.contracts.economics import Economics, OperatingPoint
 from adaptive_flot.contracts.estimator import AnyEstimator, Estimate, Estimator, Prior, Setup, full_parameters
@@ -56,5 +57,6 @@ __all__ = [
     "Setup",
     "Status",
     "TakesOver",
+    "TracksInputs",
     "full_parameters",
 ]

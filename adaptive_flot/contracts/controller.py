@@ -152,4 +152,17 @@ class TakesOver(Protocol):
         ...
 
 
+@runtime_checkable
+class TracksInputs(Protocol):
+    """A controller that can be told what really acts, while somebody else sets the inputs or a limit cuts its own.
+
+    Its next decision starts from there, without a bump. A controller without this method decides from its own state;
+    whoever writes its decisions then limits their rate alone.
+    """
+
+    def tracked(self, state: Any, inputs: FloatArray) -> Any:
+        """State as if these inputs (nu,) had been the last decision."""
+        ...
+
+
 AnyController = Controller[Any]

@@ -145,6 +145,10 @@ class EconomicMpc:
         plan = with_further_states(state.plan, before.layout, self.layout, again[-1].state)
         return replace(state, plan=plan, multipliers=None)
 
+    def tracked(self, state: MpcState, inputs: FloatArray) -> MpcState:
+        """Go on from what really acts; see `TracksInputs.tracked`."""
+        return replace(state, inputs=inputs.copy())
+
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
         """Inputs of the next interval: the planned ones until there is an estimate, then the optimiser's."""
         state = self._listen(replace(state, row=state.row + 1), estimate)

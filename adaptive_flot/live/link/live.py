@@ -1,0 +1,73 @@
+"""Run a link until somebody ends it, and say what happens."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from adaptive_flot.live.link.run import LinkRun, Progress
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.loop import quiet_libraries, until_stopped
+from adaptive_flot.live.store.memory import Memory, open_database
+
+
+def live(link: Link, say: Callable[[str], None] = print, cycles: int | None = None) -> None:
+    """Run a link.
+
+    Parameters
+    ----------
+    link
+        The link file and its scenario.
+    say
+        Told where the link starts from, and each change of mode and of what is wrong.
+    cycles
+        Number of cycles; default until it is ended.
+
+    Raises
+    ------
+    LinkError
+        A file, a tag or the database can not be used.
+    """
+    quiet_libraries()
+    memory = Memory(open_database(link.file.database, link.path.parent), link)
+    try:
+        say(_started(link, memory))
+        run = LinkRun(link, memory, Speaker(say))
+        asyncio.run(_run(run, cycles))
+        say(f"Session {memory.session}: ended after {run.state.number} cycles; control is with the plant")
+    finally:
+        memory.close()
+
+
+async def _run(run: LinkRun, cycles: int | None) -> None:
+    async with until_stopped() as stop:
+        await run.run(stop, cycles)
+
+
+def _started(link: Link, memory: Memory) -> str:
+    begin = f"Session {memory.session}: {link.file.estimator} and {link.file.controller} on {link.file.server.url}, "
+    if memory.resumed is None:
+        return begin + "in monitor, with no stored estimate"
+    where = f"session {memory.resumed.session}, cycle {memory.resumed.cycle}"
+    return begin + f"in monitor, from the estimate of {where}; turn the switch to monitor and up again to go further"
+
+
+class Speaker:
+    """Says what changes from cycle to cycle, one line each."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._faults: tuple[str, ...] = ()
+        self._estimating = False
+
+    def __call__(self, progress: Progress) -> None:
+        """Look at a cycle."""
+        outcome = progress.outcome
+        if outcome.reason:
+            self._say(f"{outcome.number}: {outcome.mode.name.lower()}: {outcome.reason}")
+        if outcome.estimate is not None and not self._estimating:
+            self._estimating = True
+            self._say(f"{outcome.number}: the estimator runs")
+        if outcome.faults != self._faults:
+            self._faults = outcome.faults
+            self._say(f"{outcome.number}: {'; '.join(outcome.faults) or 'all is well again'}")

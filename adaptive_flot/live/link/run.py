@@ -1,0 +1,160 @@
+"""The loop of the link: snapshot, cycle, storage, writes. It never waits longer than an interval for anything."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from adaptive_flot.errors import LinkError
+from adaptive_flot.live.link.client import LOST, PlantClient
+from adaptive_flot.live.link.cycle import Cycle, CycleState
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.outcome import Outcome, Written
+from adaptive_flot.live.safety.modes import Mode
+from adaptive_flot.live.snapshot import Snapshot
+from adaptive_flot.live.store.memory import Memory
+
+PATIENCE = 1.5
+"""Intervals without a new sample after which a cycle counts as one without."""
+LEAST_PATIENCE_S = 0.2
+"""The same in seconds of this machine, for plants that run faster than real time."""
+SILENT_INTERVALS = 5
+"""Cycles without a sample after which the connection is taken for lost and made anew."""
+RETRY_S = 0.5
+"""Time between two attempts to connect [s of this machine]."""
+NOTHING = Snapshot(float("nan"), False, {}, {}, {}, None, False)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a person may want to see of a cycle."""
+
+    snapshot: Snapshot
+    outcome: Outcome
+    seconds: float
+
+
+class LinkRun:
+    """Runs a link until it is told to stop.
+
+    Parameters
+    ----------
+    link
+        The link file and its scenario.
+    memory
+        Where everything is stored.
+    show
+        Called after each cycle.
+
+    Attributes
+    ----------
+    state
+        After the last cycle.
+    """
+
+    def __init__(self, link: Link, memory: Memory, show: Callable[[Progress], None] = lambda progress: None) -> None:
+        self.link, self.memory = link, memory
+        self.cycle = Cycle(link)
+        self.state: CycleState = self.cycle.start(None if memory.resumed is None else memory.resumed.prior)
+        self._show = show
+        self._interval = link.scenario.dt / link.file.cycle.speed  # of this machine
+        self._client: PlantClient | None = None
+        self._connecting: asyncio.Task[PlantClient] | None = None
+        self._silent = 0
+
+    async def run(self, stop: asyncio.Event, cycles: int | None = None) -> None:
+        """Cycle until `stop` is set, or so many times; then give control back.
+
+        Raises
+        ------
+        LinkError
+            The database fails, or the first connection shows that a file or a tag is wrong.
+        """
+        in_time = True
+        written: dict[str, Written] = {}
+        try:
+            while not stop.is_set() and (cycles is None or self.state.number < cycles):
+                in_time, written = await self._one(in_time, written)
+        finally:
+            await self._leave()
+
+    async def _one(self, in_time: bool, before: Mapping[str, Written]) -> tuple[bool, dict[str, Written]]:
+        """One cycle; whether it was in time, and what came of its writes."""
+        client = await self._connected()
+        alive = await self._wait(client)
+        loop = asyncio.get_running_loop()
+        begin = loop.time()
+        well = all(not result.problem for result in before.values())
+        snapshot = NOTHING if client is None else client.snapshot(alive, in_time, well)
+        self.state, outcome = await asyncio.to_thread(self.cycle.step, self.state, snapshot)
+        await asyncio.to_thread(self.memory.store, snapshot, outcome, self.state.estimation.noise_std, before)
+        seconds = loop.time() - begin
+        in_time = seconds <= self.link.file.cycle.deadline * self._interval
+        written = await self._tell(client, outcome, in_time)
+        self._show(Progress(snapshot, outcome, seconds))
+        return in_time, written
+
+    async def _tell(self, client: PlantClient | None, outcome: Outcome, in_time: bool) -> dict[str, Written]:
+        """Heartbeat, request and mode; then the set-points, unless the cycle took too long."""
+        if client is None:
+            return _not_written(outcome, "not connected")
+        words = outcome.mode.name.lower() + (f": {outcome.reason}" if outcome.reason else "")
+        try:
+            await client.tell(outcome.number, outcome.asks_control, words)
+        except LOST as error:
+            self._silent = SILENT_INTERVALS
+            return _not_written(outcome, f"no heartbeat ({type(error).__name__})")
+        if not in_time:
+            return _not_written(outcome, "the cycle took too long")
+        return await client.write(outcome.writes) if outcome.writes else {}
+
+    async def _wait(self, client: PlantClient | None) -> bool:
+        patience = max(PATIENCE * self._interval, LEAST_PATIENCE_S)
+        if client is None:
+            await asyncio.sleep(patience)
+            return False
+        alive = await client.new_sample(patience)
+        self._silent = 0 if alive else self._silent + 1
+        return alive
+
+    async def _connected(self) -> PlantClient | None:
+        """The client; None while there is none. It is made beside the cycles, which go on without it."""
+        if self._client is not None and self._silent >= SILENT_INTERVALS:
+            lost, self._client = self._client, None
+            await lost.close()
+        if self._client is None:
+            if self._connecting is None:
+                self._connecting = asyncio.create_task(self._connect())
+            if self._connecting.done():
+                self._client, self._connecting, self._silent = self._connecting.result(), None, 0
+        return self._client
+
+    async def _connect(self) -> PlantClient:
+        while True:
+            client = PlantClient(self.link, min(self.link.file.server.timeout_s, max(self._interval, LEAST_PATIENCE_S)))
+            try:
+                await client.connect()
+                return client
+            except LinkError:
+                raise
+            except LOST:
+                await asyncio.sleep(RETRY_S)
+
+    async def _leave(self) -> None:
+        """Give control back: the plant's own loop takes over at once, not after its watchdog."""
+        if self._connecting is not None:
+            self._connecting.cancel()
+            with contextlib.suppress(asyncio.CancelledError, LinkError, *LOST):
+                late = await self._connecting
+                await late.close()
+        if self._client is not None:
+            with contextlib.suppress(*LOST):
+                await self._client.tell(self.state.number + 1, False, f"{Mode.OFF.name.lower()}: the link has stopped")
+            await self._client.close()
+            self._client = None
+
+
+def _not_written(outcome: Outcome, why: str) -> dict[str, Written]:
+    return {name: Written(value, float("nan"), why) for name, value in outcome.writes.items()}

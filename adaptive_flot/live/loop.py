@@ -1,0 +1,32 @@
+"""What test plant and link have in common as programs: an orderly end, and libraries that keep quiet."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def quiet_libraries() -> None:
+    """The log of asyncua repeats what this program says in its own words."""
+    logging.getLogger("asyncua").setLevel(logging.CRITICAL)
+
+
+@asynccontextmanager
+async def until_stopped() -> AsyncIterator[asyncio.Event]:
+    """Yield an event that Ctrl-C and the signals that ask for the end set, so that control is given back first."""
+    stop, loop = asyncio.Event(), asyncio.get_running_loop()
+    taken = [number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN]
+    former = {number: signal.getsignal(number) for number in taken}
+    for number in taken:
+        loop.add_signal_handler(number, stop.set)
+    try:
+        yield stop
+    finally:
+        for number in taken:
+            loop.remove_signal_handler(number)
+            signal.signal(number, former[number])

@@ -1,0 +1,9 @@
+"""The memory of the link: everything as it happens, one transaction a cycle.
+
+Map
+---
+schema.py    The tables.
+memory.py    Open a database, store cycles, find where to go on.
+numbers.py   Arrays as text that comes back to the bit.
+record.py    What was stored as a record that `discover`, `estimate` and `run` read, and as snapshots to replay.
+"""

@@ -1,0 +1,278 @@
+"""Open a database, store cycles, find where to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Connection, Engine, Table, create_engine, event, func, insert, make_url, select
+from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+
+from adaptive_flot.contracts import DelayedValue, Prior
+from adaptive_flot.errors import LinkError
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.outcome import Outcome, Written
+from adaptive_flot.live.safety.checks import Check
+from adaptive_flot.live.snapshot import Snapshot
+from adaptive_flot.live.store import schema
+from adaptive_flot.live.store.numbers import as_array, as_column, as_text
+
+Rows = dict[Table, list[dict[str, Any]]]
+ACTING = "acting "
+ESTIMATED = ("parameters", "covariance", "state", "prediction", "innovation")
+"""Arrays of an estimate that are stored."""
+
+
+@dataclass(frozen=True)
+class Resumed:
+    """Where a link goes on: the last stored estimate."""
+
+    session: int
+    cycle: int
+    prior: Prior
+
+
+def open_database(url: str, folder: Path) -> Engine:
+    """Open a database, and make its tables where it has none.
+
+    Parameters
+    ----------
+    url
+        As SQLAlchemy reads it; `sqlite:///live.sqlite` is a file in the folder.
+    folder
+        For relative paths of SQLite files.
+
+    Raises
+    ------
+    LinkError
+        The URL is none, the database can not be reached, or its tables are of another version.
+    """
+    try:
+        parsed = make_url(url)
+        if parsed.get_backend_name() == "sqlite" and parsed.database and parsed.database != ":memory:":
+            parsed = parsed.set(database=str(folder / parsed.database))
+        engine = create_engine(parsed)
+        if parsed.get_backend_name() == "sqlite":
+            event.listen(engine, "connect", _prepare_sqlite)
+        schema.metadata.create_all(engine)
+        with engine.connect() as connection:
+            known = connection.execute(select(func.max(schema.sessions.c.version))).scalar()
+    except ModuleNotFoundError as error:
+        raise LinkError(f"database {url!r}: needs the package {error.name!r}; install it") from error
+    except (ArgumentError, SQLAlchemyError) as error:
+        words = str(getattr(error, "orig", None) or error).splitlines()[0]
+        raise LinkError(f"database: can not be used ({words}); correct the key 'database'") from error
+    if known is not None and known != schema.VERSION:
+        raise LinkError(f"database: has tables of version {known}, this program has {schema.VERSION}; give another one")
+    return engine
+
+
+def _prepare_sqlite(connection: Any, record: object) -> None:
+    """A commit is on the disk before it returns, readers do not stop the writer, and foreign keys count."""
+    del record
+    for words in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
+        connection.execute(f"PRAGMA {words}")
+
+
+class Memory:
+    """One session of a link: everything between its start and its end.
+
+    Parameters
+    ----------
+    engine
+        The database.
+    link
+        The link file and its scenario.
+
+    Attributes
+    ----------
+    session
+        Number of the session, from 1.
+    resumed
+        The last stored estimate of an earlier session with the same scenario and estimator; None where there is none.
+    """
+
+    def __init__(self, engine: Engine, link: Link) -> None:
+        self._engine = engine
+        self._switch: int | None = None
+        self._limits: dict[str, tuple[float, float]] = {}
+        with self._transaction() as connection:
+            self.resumed = _last_estimate(connection, link)
+            last = connection.execute(select(func.max(schema.sessions.c.session))).scalar()
+            self.session = (last or 0) + 1
+            connection.execute(
+                insert(schema.sessions),
+                {
+                    "session": self.session,
+                    "version": schema.VERSION,
+                    "started": datetime.now(UTC).isoformat(),
+                    "scenario": link.scenario.name,
+                    "link_file": link.file.model_dump_json(),
+                    "sampling_s": link.scenario.dt,
+                    "resumed_session": None if self.resumed is None else self.resumed.session,
+                    "resumed_cycle": None if self.resumed is None else self.resumed.cycle,
+                },
+            )
+
+    def store(
+        self,
+        snapshot: Snapshot,
+        outcome: Outcome,
+        noise_std: Sequence[float],
+        before: Mapping[str, Written],
+    ) -> None:
+        """Store a cycle whole or not at all, before anything of it is written to the plant.
+
+        Parameters
+        ----------
+        snapshot, outcome
+            What the plant told, and what the cycle came to.
+        noise_std
+            Noise that the estimator counts with (m,).
+        before
+            What came of the writes of the cycle before.
+
+        Raises
+        ------
+        LinkError
+            The database can not be written.
+        """
+        rows: Rows = {schema.cycles: [_cycle(snapshot, outcome)]}
+        rows[schema.tags] = _tags(snapshot, outcome)
+        rows[schema.events] = self._events(snapshot, outcome)
+        rows[schema.limits] = self._changed_limits(snapshot)
+        if outcome.sample is not None:
+            rows[schema.samples] = [_sample(outcome)]
+        if outcome.estimate is not None:
+            rows[schema.estimates] = [_estimate(outcome, noise_std)]
+        if outcome.decision is not None:
+            rows[schema.decisions] = [_decision(outcome)]
+        rows[schema.writes] = [{"input": name, "value": value} for name, value in outcome.writes.items()]
+        key = {"session": self.session, "cycle": outcome.number}
+        with self._transaction() as connection:
+            for table, of_table in rows.items():
+                if of_table:
+                    connection.execute(insert(table), [{**key, **row} for row in of_table])
+            if before:
+                earlier = {"session": self.session, "cycle": outcome.number - 1}
+                connection.execute(insert(schema.results), [{**earlier, **_result(n, w)} for n, w in before.items()])
+        if snapshot.switch is not None:
+            self._switch = int(snapshot.switch)
+        self._limits.update(snapshot.operator)
+
+    def close(self) -> None:
+        """Let the database go."""
+        self._engine.dispose()
+
+    def _events(self, snapshot: Snapshot, outcome: Outcome) -> list[dict[str, Any]]:
+        found = []
+        if outcome.reason:
+            found.append({"kind": "mode", "text": f"{outcome.mode.name.lower()}: {outcome.reason}"})
+        if snapshot.switch is not None and int(snapshot.switch) != self._switch:
+            found.append({"kind": "operator switch", "text": f"switch at {snapshot.switch.name.lower()}"})
+        return found
+
+    def _changed_limits(self, snapshot: Snapshot) -> list[dict[str, Any]]:
+        """The operator's limits where they differ from those stored last."""
+        return [
+            {"input": name, "low": as_column(low), "high": as_column(high)}
+            for name, (low, high) in snapshot.operator.items()
+            if not np.array_equal((low, high), self._limits.get(name, ()), equal_nan=True)
+        ]
+
+    @contextmanager
+    def _transaction(self) -> Iterator[Connection]:
+        try:
+            with self._engine.begin() as connection:
+                yield connection
+        except SQLAlchemyError as error:
+            words = str(getattr(error, "orig", None) or error).splitlines()[0]
+            raise LinkError(f"database: can not be written ({words})") from error
+
+
+def _cycle(snapshot: Snapshot, outcome: Outcome) -> dict[str, Any]:
+    return {
+        "plant_time": as_column(snapshot.time),
+        "record_time": None if outcome.sample is None else outcome.sample.time,
+        "alive": snapshot.alive,
+        "switch": None if snapshot.switch is None else int(snapshot.switch),
+        "granted": snapshot.granted,
+        "in_time": snapshot.in_time,
+        "written": snapshot.written,
+        "mode": outcome.mode.name.lower(),
+        "asks_control": outcome.asks_control,
+        "faults": "; ".join(outcome.faults),
+    }
+
+
+def _tags(snapshot: Snapshot, outcome: Outcome) -> list[dict[str, Any]]:
+    acting = {f"{ACTING}{name}": tag for name, tag in snapshot.acting.items()}
+    return [
+        {
+            "tag": name,
+            "value": as_column(tag.value),
+            "quality": tag.quality.value,
+            "source_time": as_column(tag.source_time),
+            "result": outcome.checks.get(name, Check.ABSENT).name.lower() if name in snapshot.tags else "",
+        }
+        for name, tag in {**snapshot.tags, **acting}.items()
+    ]
+
+
+def _sample(outcome: Outcome) -> dict[str, Any]:
+    assert outcome.sample is not None
+    late: list[DelayedValue] = list(outcome.sample.delayed)
+    return {
+        "inputs": as_text(outcome.sample.inputs),
+        "outputs": as_text(outcome.sample.outputs),
+        "delayed": "; ".join(f"{v.output} {v.time!r} {v.value!r}" for v in late),
+    }
+
+
+def _estimate(outcome: Outcome, noise_std: Sequence[float]) -> dict[str, Any]:
+    estimate = outcome.estimate
+    assert estimate is not None
+    arrays = {name: as_text(getattr(estimate, name)) for name in ESTIMATED}
+    return {**arrays, "status": estimate.status.name, "noise_std": as_text(np.array(noise_std))}
+
+
+def _decision(outcome: Outcome) -> dict[str, Any]:
+    decision = outcome.decision
+    assert decision is not None
+    return {
+        "inputs": as_text(decision.inputs),
+        "status": decision.status.name,
+        "decided_by": decision.decided_by,
+        "message": decision.message,
+    }
+
+
+def _result(name: str, written: Written) -> dict[str, Any]:
+    back = as_column(written.read_back)
+    return {"input": name, "value": written.value, "read_back": back, "problem": written.problem}
+
+
+def _last_estimate(connection: Connection, link: Link) -> Resumed | None:
+    """The last estimate stored for the same scenario and estimator."""
+    e, s = schema.estimates.c, schema.sessions.c
+    rows = connection.execute(
+        select(schema.estimates, s.link_file)
+        .join(schema.sessions, s.session == e.session)
+        .where(s.scenario == link.scenario.name)
+        .order_by(e.session.desc(), e.cycle.desc())
+        .limit(1)
+    ).mappings()
+    row = rows.first()
+    if row is None or f'"estimator":"{link.file.estimator}"' not in row["link_file"]:
+        return None
+    parameters, state = as_array(row["parameters"]), as_array(row["state"])
+    setup = link.scenario.setup
+    if parameters.shape != (len(setup.parameters),) or state.shape != (len(setup.model.states),):
+        return None
+    prior = Prior(0.0, state, parameters, as_array(row["covariance"]), as_array(row["noise_std"]))
+    return Resumed(row["session"], row["cycle"], prior)
