@@ -118,6 +118,8 @@ def print_estimate(result: RecordEstimate) -> None:
             p = f"{e.ljung_box_p:.2g}"
             table.add_row(replay.estimator, e.block, e.output, f"{e.one_step:.4g}", f"{e.free_run:.4g}", e.unit, p)
     console = _console()
+    for note in result.blocks.fit.notes:
+        console.print(f"- {note}", highlight=False)
     console.print(table)
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)

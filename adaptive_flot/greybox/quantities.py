@@ -31,6 +31,9 @@ class Quantity:
         Physical range, in the unit.
     scale
         Typical size, in the unit: conditions solvers, and is the standard deviation of an unknown initial state.
+    usual
+        Lowest and highest value of ordinary operation, in the unit: tells a wrong unit where the physical range can
+        not. None where nobody knows.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Quantity:
     lower: float = -np.inf
     upper: float = np.inf
     scale: float = 1.0
+    usual: tuple[float, float] | None = None
 
     @property
     def column(self) -> str:

@@ -27,7 +27,8 @@ from adaptive_flot.yaml_problems import first_problem
 
 SECTIONS = ("file", "time", "grid")
 """Keys of the outermost level that are no quantities."""
-FORMATS = ("iso", "day-first", "month-first", "epoch s", "epoch ms", "excel", "seconds")
+FORMATS = ("iso", "day-first", "month-first", "epoch s", "epoch ms", "excel", "seconds", "minutes", "hours")
+"""Forms of a time; the last three count from the start of the record."""
 
 
 def _duration(text: object) -> object:
@@ -129,6 +130,8 @@ class TagKeys(_Part):
         Texts and numbers that stand for no value.
     delay
         How much later than the process the tag shows a value: the analyser's sample line, for example.
+    hold_at_most
+        For how long an input is held, where that of the grid does not suit it: a set-point that is logged as it changes.
     average
         `interval`: the mean over each interval of the grid (of an input: over the time it acted). `sample`: the value
         at the time of the row (of an input: at the start of the interval). Default: interval for an input, else sample.
@@ -146,6 +149,7 @@ class TagKeys(_Part):
     unit: Annotated[str, AfterValidator(_unit)] | None = None
     bad: Codes = ()
     delay: Duration | None = None
+    hold_at_most: Duration | None = None
     average: Literal["interval", "sample"] | None = None
     repeats: Literal["keep", "drop"] = "keep"
     frozen: Duration | None = None
@@ -156,6 +160,11 @@ class TagKeys(_Part):
     def delay_s(self) -> float:
         """The delay [s]."""
         return 0.0 if self.delay is None else seconds(self.delay)
+
+    @property
+    def hold_s(self) -> float | None:
+        """For how long the input is held [s]; None where the grid says it."""
+        return None if self.hold_at_most is None else seconds(self.hold_at_most)
 
     @property
     def frozen_s(self) -> float | None:
@@ -179,6 +188,16 @@ class TagMap(_Part):
             return content
         sections = {k: v for k, v in content.items() if k in SECTIONS}
         return {**sections, "quantities": {k: v for k, v in content.items() if k not in SECTIONS}}
+
+    def with_keys(self, section: str, keys: Mapping[str, object]) -> TagMap:
+        """This map with further keys in a section or at a quantity."""
+        content = self.model_dump(mode="json", exclude_defaults=True)
+        place = content.setdefault(section, {}) if section in SECTIONS else content.setdefault("quantities", {})
+        if section in SECTIONS:
+            place.update(keys)
+        else:
+            place.setdefault(section, {}).update(keys)
+        return TagMap.model_validate({"quantities": {}, **content})
 
     def check_names(self, known: tuple[str, ...], model: str) -> None:
         """Check that every quantity is one of the model's.

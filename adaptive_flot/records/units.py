@@ -62,7 +62,7 @@ def read_unit(text: str) -> pint.Unit:
         )
     form = PLAIN.get(plain.lower()) or _for_pint(plain)
     try:
-        return _registry().parse_units(form)
+        return _registry().parse_units(form)  # type: ignore[no-any-return]
     except Exception as error:  # pint has a dozen kinds, some of them those of Python's tokenizer
         raise DataError(f"{text!r} is no unit; write one as L/min, m3/h, mm, % or -") from error
 

@@ -53,7 +53,7 @@ class Screening:
 def screen(record: Dataset, model: Model) -> Screening:
     """Check a record: length, gaps, frozen and clipped sensors, outliers, inputs that move."""
     outputs = record.outputs.copy()
-    notes: list[str] = []
+    notes: list[str] = [*record.notes]
     reasons: list[str] = []
     for j, q in enumerate(model.outputs):
         if np.isfinite(outputs[:, j]).any():

@@ -14,8 +14,10 @@ import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.greybox.data.columns import line, numeric_column, time_column
+from adaptive_flot.greybox.data.stretches import longest_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
-from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.data.wrong_unit import check_unit
+from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
 TIME_COLUMN = "time_s"
 UNIFORMITY = 1e-3
@@ -44,6 +46,8 @@ class Dataset:
         Parameter values a row (N,) by full parameter name, where the table has them.
     initial_state
         State at the first row (nx,), where the table has all states in it.
+    notes
+        What of the table was left out, in words.
     """
 
     name: str
@@ -53,6 +57,7 @@ class Dataset:
     outputs: FloatArray
     parameters: Mapping[str, FloatArray] = field(default_factory=dict)
     initial_state: FloatArray | None = None
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.time)
@@ -80,7 +85,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     Parameters
     ----------
     path
-        CSV or Parquet file, or a table with these columns.
+        CSV or Parquet file, or a table with these columns; of one in stretches the longest is read, with a note.
     model
         Names, units and ranges. Inputs are needed; outputs and parameters are used where present. Its longest step
         bounds how long the record may be.
@@ -93,20 +98,22 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
         Missing column, wrong unit suffix, text in a number, NaN in an input, time that does not increase uniformly,
         more integration steps than MOST_STEPS.
     RangeError
-        An input outside the model's physical range.
+        An input outside the model's physical range, or a column in another unit than its name says (`check_unit`).
     """
-    file, table = named(path), read_table(path)
+    file = named(path)
+    table, notes = longest_stretch(read_table(path), file)
     columns = [str(c) for c in table.columns]
     time = time_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
     dt = _interval(table, time, file)
     _check_steps(model, dt, len(time), file)
 
-    inputs = np.column_stack([_input(table, columns, q.name, q.column, q.unit, file) for q in model.inputs])
+    inputs = np.column_stack([_input(table, columns, q, file) for q in model.inputs])
     model.check_inputs(inputs, time, where=str(file))
     outputs = np.full((len(table), len(model.outputs)), np.nan)
     for j, q in enumerate(model.outputs):
         if q.column in columns:
             outputs[:, j] = numeric_column(table, q.column, file)
+            check_unit(q, outputs[:, j], str(file))
         elif q.name in required_outputs or _other_unit(columns, q.name, q.column) is not None:
             _find(columns, q.name, q.column, q.unit, file)
 
@@ -120,7 +127,8 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
         if np.isnan(values).any():
             empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
             raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
-    return Dataset(file.stem, time, dt, inputs, outputs, parameters, _first_state(table, columns, model, file))
+    first = _first_state(table, columns, model, file)
+    return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, notes)
 
 
 def check_record(record: Dataset, model: Model, table: pd.DataFrame, file: Path) -> Dataset:
@@ -176,9 +184,10 @@ def _looks_like_unit(suffix: str) -> bool:
     return bool(suffix) and all(part in units for part in suffix.split("_"))
 
 
-def _input(table: pd.DataFrame, columns: Sequence[str], name: str, column: str, unit: str, file: Path) -> FloatArray:
-    values = numeric_column(table, _find(columns, name, column, unit, file), file)
-    _check_input(table, column, values, file)
+def _input(table: pd.DataFrame, columns: Sequence[str], q: Quantity, file: Path) -> FloatArray:
+    values = numeric_column(table, _find(columns, q.name, q.column, q.unit, file), file)
+    _check_input(table, q.column, values, file)
+    check_unit(q, values, str(file))
     return values
 
 

@@ -10,6 +10,7 @@ Two of its printed equations are read in the only way that is consistent:
 from __future__ import annotations
 
 import casadi as ca
+import numpy as np
 
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.processes.flotation import froth, pulp
@@ -39,6 +40,7 @@ def make_model(cell: Cell | None = None) -> Model:
     ratios = [f"gas_ratio_{k + 1}" for k in range(cell.bubble_classes)]
     flow = cell.value("cross_section_area") * 0.01  # 1 cm/s of superficial velocity: a large flow of pulp
     air_low, air_high = cell.operation["air_flow_valid"]
+    fed = cell.operation["feed_flow"][0]
 
     states = [
         Quantity("tails_flow", "m3/s", "tails flow asked for by the level loop", -flow, flow, 1e-4),
@@ -51,17 +53,29 @@ def make_model(cell: Cell | None = None) -> Model:
         states=tuple(states),
         inputs=(
             Quantity("air_flow", "m3/s", "air flow", air_low, air_high, 1e-3),
-            Quantity("feed_flow", "m3/s", "feed flow", 0.0, flow, 1e-4),
-            Quantity("level_setpoint", "m", "pulp height set-point", 1e-3 * height, height * (1 - 1e-3), 0.1),
+            Quantity("feed_flow", "m3/s", "feed flow", 0.0, flow, 1e-4, usual=(0.2 * fed, 5 * fed)),
+            Quantity(
+                "level_setpoint",
+                "m",
+                "pulp height set-point",
+                1e-3 * height,
+                height * (1 - 1e-3),
+                0.1,
+                usual=(0.3 * height, height),
+            ),
         ),
         parameters=cell.parameters,
         outputs=(
-            Quantity("concentrate_grade", "-", "valuable mineral in the concentrate by mass", 0.0, 1.0, 0.1),
-            Quantity("recovery", "-", "valuable mineral to concentrate over valuable fed", 0.0, scale=0.1),
-            Quantity("tails_flow", "m3/s", "tails flow", -flow, flow, 1e-5),
-            Quantity("level", "m", "pulp height", 0.0, height, 0.01),
-            Quantity("concentrate_flow", "m3/s", "concentrate flow", 0.0, flow, 1e-6),
-            Quantity("air_recovery", "-", "air that overflows over air fed", 0.0, 1.0, 0.01),
+            Quantity(
+                "concentrate_grade", "-", "valuable mineral in the concentrate by mass", 0.0, 1.0, 0.1, (0.01, 1.0)
+            ),
+            Quantity(
+                "recovery", "-", "valuable mineral to concentrate over valuable fed", 0.0, np.inf, 0.1, (0.1, 1.5)
+            ),
+            Quantity("tails_flow", "m3/s", "tails flow", -flow, flow, 1e-5, (0.1 * fed, 5 * fed)),
+            Quantity("level", "m", "pulp height", 0.0, height, 0.01, (0.3 * height, height)),
+            Quantity("concentrate_flow", "m3/s", "concentrate flow", 0.0, flow, 1e-6, (1e-3 * fed, fed)),
+            Quantity("air_recovery", "-", "air that overflows over air fed", 0.0, 1.0, 0.01, (0.01, 1.0)),
         ),
         signals=(
             Quantity("alpha_star", "-", "air recovery from the bursting rate", 0.0, 1.0, 0.1),

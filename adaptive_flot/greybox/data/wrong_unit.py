@@ -1,0 +1,69 @@
+"""Values that are in another unit than their column says: percent for a fraction, millimetres for metres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.quantities import FloatArray, Quantity
+
+OTHER_UNITS = {
+    "-": {"%": 1e-2, "ppm": 1e-6},
+    "m": {"mm": 1e-3, "cm": 1e-2},
+    "m3/s": {"L/min": 1e-3 / 60, "m3/h": 1 / 3600, "L/s": 1e-3, "mL/s": 1e-6},
+    "kg": {"t": 1e3, "g": 1e-3},
+    "kg/s": {"t/h": 1e3 / 3600, "kg/h": 1 / 3600, "g/s": 1e-3},
+    "Pa": {"kPa": 1e3, "bar": 1e5},
+    "s": {"min": 60.0, "h": 3600.0},
+}
+"""Units that plants use instead of a model's, and what one of them is in it."""
+FAR = 20.0
+"""A median so many times as large as what is usual is of another unit."""
+
+
+def units_that_fit(quantity: Quantity, value: float) -> dict[str, float]:
+    """Units of plants in which a value would be one of ordinary operation, with that value in the quantity's unit.
+
+    Examples
+    --------
+    >>> level = Quantity("level", "m", "pulp height", 0.0, 0.48, usual=(0.15, 0.48))
+    >>> units_that_fit(level, 380.0)
+    {'mm': 0.38}
+    """
+    low, high = quantity.usual or (quantity.lower, quantity.upper)
+    found = {unit: value * factor for unit, factor in OTHER_UNITS.get(quantity.unit, {}).items()}
+    return {unit: inside for unit, inside in found.items() if low <= inside <= high}
+
+
+def is_far_outside(quantity: Quantity, values: FloatArray) -> bool:
+    """Whether the median of values (N,) leaves the physical range, or what is usual by a factor of FAR."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return False
+    middle = float(np.median(finite))
+    usual = FAR * abs(quantity.usual[1]) if quantity.usual else np.inf
+    return not quantity.lower <= middle <= quantity.upper or abs(middle) > usual
+
+
+def check_unit(quantity: Quantity, values: FloatArray, where: str) -> None:
+    """Refuse values (N,) that are far outside, where another unit would put them right.
+
+    What is outside for another reason passes: one wrong value, a sensor with an offset.
+
+    Raises
+    ------
+    RangeError
+        The median is outside the physical range (or FAR times what is usual), and a unit of plants would fit.
+    """
+    if not is_far_outside(quantity, values):
+        return
+    middle = float(np.median(values[np.isfinite(values)]))
+    fitting = units_that_fit(quantity, middle)
+    if fitting:
+        unit, inside = next(iter(fitting.items()))
+        factor = OTHER_UNITS[quantity.unit][unit]
+        said = "is a fraction" if quantity.unit == "-" else f"is in {quantity.unit}"
+        raise RangeError(
+            f"{where}: {quantity.name} {said}, and the median of its values is {middle:g}; in {unit} that would be "
+            f"{inside:g}: multiply the column by {factor:g}, or import it with 'unit: \"{unit}\"'"
+        )

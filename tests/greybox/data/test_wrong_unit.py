@@ -1,0 +1,61 @@
+"""A column in another unit than its name says is refused with the unit that fits; what is merely odd passes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from adaptive_flot.errors import RangeError
+from adaptive_flot.greybox.data.dataset import read_dataset
+from adaptive_flot.greybox.model import Model
+
+VALUES = {
+    "air_flow_m3_s": 1.5e-3,
+    "feed_flow_m3_s": 1.67e-4,
+    "level_setpoint_m": 0.38,
+    "concentrate_grade": 0.23,
+    "recovery": 0.85,
+    "level_m": 0.38,
+    "concentrate_flow_m3_s": 2e-6,
+}
+"""A sound row of the cell."""
+
+
+def record(**factors: float) -> pd.DataFrame:
+    columns = {c: np.full(50, v * factors.get(c, 1.0)) for c, v in VALUES.items()}
+    return pd.DataFrame({"time_s": 1.0 * np.arange(50), **columns})
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "unit"),
+    [
+        ("concentrate_grade", 100.0, "%"),
+        ("recovery", 100.0, "%"),
+        ("level_m", 1000.0, "mm"),
+        ("level_m", 100.0, "cm"),
+        ("level_setpoint_m", 1000.0, "mm"),
+        ("air_flow_m3_s", 60_000.0, "L/min"),
+        ("feed_flow_m3_s", 60_000.0, "L/min"),
+        ("feed_flow_m3_s", 3600.0, "m3/h"),
+        ("concentrate_flow_m3_s", 60_000.0, "L/min"),
+    ],
+)
+def test_another_unit_is_named(model: Model, column: str, factor: float, unit: str) -> None:
+    with pytest.raises(RangeError) as caught:
+        read_dataset(record(**{column: factor}), model)
+    message = str(caught.value)
+    assert message.startswith("DataFrame: ") and f"in {unit} that would be" in message
+    assert column.startswith(message.split(": ")[1].split(" ")[0])
+
+
+def test_a_sound_record_and_one_with_some_wrong_values_pass(model: Model) -> None:
+    """One spike, one sensor with an offset, noise about zero: no matter of units."""
+    odd = record()
+    odd.loc[3, "concentrate_grade"] = 23.0
+    odd["level_m"] += 0.11
+    assert read_dataset(odd, model).outputs[3, 0] == 23.0
+
+
+def test_a_record_without_any_measurement_of_an_output_passes(model: Model) -> None:
+    assert "recovery" not in read_dataset(record(recovery=np.nan), model).measured(model)
