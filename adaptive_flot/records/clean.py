@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -118,8 +119,17 @@ def clean(signal: Signal, quantity: Quantity, keys: TagKeys, file: Path) -> Clea
     if keys.repeats == "drop":
         good = np.flatnonzero(fates == 0)
         fresh[good[1:][np.diff(signal.values[good]) == 0]] = False
-    kept = [a[fresh] for a in (time, values, fates, signal.values)]
-    return Cleaned(quantity, keys, unit, *kept, int((~fresh).sum()), signal.repeated)
+    return Cleaned(
+        quantity,
+        keys,
+        unit,
+        time[fresh],
+        values[fresh],
+        fates[fresh],
+        signal.values[fresh],
+        int((~fresh).sum()),
+        signal.repeated,
+    )
 
 
 def _is_number(code: str) -> bool:
@@ -175,11 +185,13 @@ def runs_of_equal(values: FloatArray) -> list[tuple[int, int]]:
     [(0, 2), (3, 6)]
     """
     edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0) + 1, [len(values)]])
-    return [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a > 1]
+    return [(int(a), int(b)) for a, b in pairwise(edges) if b - a > 1]
 
 
 def spikes(values: FloatArray) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Mask of values (n,) far from the median m of their neighbours (Hampel's filter)::
+    """Mask of values (n,) far from the median m of their neighbours (Hampel's filter).
+
+    ::
 
         |y - m| > 8 s,    s = quantile 0.25 of |y - m| / 0.3186
 

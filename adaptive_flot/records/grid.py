@@ -166,7 +166,7 @@ def _check(
     if gaps == "refuse" and len(whole) > 1:
         at = _shown(anchor + step * whole[0][1])
         raise DataError(
-            f"{file}: a gap: from {at} on an input has no value for longer than {hold_s:g} s ({len(whole) - 1} in all); "
+            f"{file}: a gap: from {at} on an input has no value for over {hold_s:g} s ({len(whole) - 1} in all); "
             "write 'gaps: split' in the map, or export a span without one"
         )
 

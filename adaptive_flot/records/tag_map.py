@@ -131,7 +131,7 @@ class TagKeys(_Part):
     delay
         How much later than the process the tag shows a value: the analyser's sample line, for example.
     hold_at_most
-        For how long an input is held, where that of the grid does not suit it: a set-point that is logged as it changes.
+        For how long an input is held, where that of the grid does not suit: a set-point logged as it changes.
     average
         `interval`: the mean over each interval of the grid (of an input: over the time it acted). `sample`: the value
         at the time of the row (of an input: at the start of the interval). Default: interval for an input, else sample.
@@ -190,7 +190,7 @@ class TagMap(_Part):
         return {**sections, "quantities": {k: v for k, v in content.items() if k not in SECTIONS}}
 
     def with_keys(self, section: str, keys: Mapping[str, object]) -> TagMap:
-        """This map with further keys in a section or at a quantity."""
+        """Return this map with further keys in a section or at a quantity."""
         content = self.model_dump(mode="json", exclude_defaults=True)
         place = content.setdefault(section, {}) if section in SECTIONS else content.setdefault("quantities", {})
         if section in SECTIONS:

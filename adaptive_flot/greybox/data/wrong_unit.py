@@ -10,7 +10,7 @@ from adaptive_flot.greybox.quantities import FloatArray, Quantity
 OTHER_UNITS = {
     "-": {"%": 1e-2, "ppm": 1e-6},
     "m": {"mm": 1e-3, "cm": 1e-2},
-    "m3/s": {"L/min": 1e-3 / 60, "m3/h": 1 / 3600, "L/s": 1e-3, "mL/s": 1e-6},
+    "m3/s": {"L/min": 1e-3 / 60, "m3/h": 1 / 3600, "L/s": 1e-3},
     "kg": {"t": 1e3, "g": 1e-3},
     "kg/s": {"t/h": 1e3 / 3600, "kg/h": 1 / 3600, "g/s": 1e-3},
     "Pa": {"kPa": 1e3, "bar": 1e5},

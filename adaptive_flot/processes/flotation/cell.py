@@ -40,7 +40,7 @@ def make_model(cell: Cell | None = None) -> Model:
     ratios = [f"gas_ratio_{k + 1}" for k in range(cell.bubble_classes)]
     flow = cell.value("cross_section_area") * 0.01  # 1 cm/s of superficial velocity: a large flow of pulp
     air_low, air_high = cell.operation["air_flow_valid"]
-    fed = cell.operation["feed_flow"][0]
+    (run_low, run_high), fed = cell.operation["air_flow_limits"], cell.operation["feed_flow"][0]
 
     states = [
         Quantity("tails_flow", "m3/s", "tails flow asked for by the level loop", -flow, flow, 1e-4),
@@ -52,7 +52,7 @@ def make_model(cell: Cell | None = None) -> Model:
         name="flotation",
         states=tuple(states),
         inputs=(
-            Quantity("air_flow", "m3/s", "air flow", air_low, air_high, 1e-3),
+            Quantity("air_flow", "m3/s", "air flow", air_low, air_high, 1e-3, (run_low, run_high)),
             Quantity("feed_flow", "m3/s", "feed flow", 0.0, flow, 1e-4, usual=(0.2 * fed, 5 * fed)),
             Quantity(
                 "level_setpoint",

@@ -66,7 +66,7 @@ def find_layout(raw: RawTable, keys: TimeKeys) -> Layout:
         No header, no column of times, or not the one that the map names.
     """
     head = raw.cells.head(LOOKED_AT)
-    texts = [raw.texts(c).head(LOOKED_AT) for c in raw.cells.columns]
+    texts = [raw.texts(j).head(LOOKED_AT) for j in range(raw.cells.shape[1])]
     if raw.names:
         parts = [split_unit(name) for name in raw.names]
         names, units = tuple(p[0] for p in parts), tuple(p[1] for p in parts)
@@ -159,7 +159,7 @@ def _header_with(raw: RawTable, texts: list[pd.Series], keys: TimeKeys) -> tuple
 
 def _place(cells: list[str], wanted: str) -> int | None:
     exact = [j for j, c in enumerate(cells) if c == wanted]
-    return (exact or [j for j, c in enumerate(cells) if split_unit(c)[0] == wanted] or [None])[0]
+    return next(iter(exact or [j for j, c in enumerate(cells) if split_unit(c)[0] == wanted]), None)
 
 
 def _named(raw: RawTable, names: tuple[str, ...], keys: TimeKeys) -> tuple[int, ...]:

@@ -1,0 +1,157 @@
+"""Import an export: read it, complete the map, clean the values, put them on a grid, and make the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from adaptive_flot.errors import DataError
+from adaptive_flot.greybox.data.dataset import TIME_COLUMN
+from adaptive_flot.greybox.data.stretches import STRETCH
+from adaptive_flot.greybox.data.tables import Source
+from adaptive_flot.greybox.model import Model, Quantity
+from adaptive_flot.records.clean import Cleaned, clean
+from adaptive_flot.records.grid import STATUSES, Rows, make_rows
+from adaptive_flot.records.guess import guess_tags
+from adaptive_flot.records.habits import complete_habits
+from adaptive_flot.records.reading.export import Export
+from adaptive_flot.records.reading.signals import read_export
+from adaptive_flot.records.tag_map import TagMap
+from adaptive_flot.records.units import seconds
+
+CLOCK_COLUMN = "time_utc"
+
+
+@dataclass(frozen=True)
+class Imported:
+    """An export on its way to a record.
+
+    Attributes
+    ----------
+    export
+        What was read.
+    model
+        The model whose quantities are looked for.
+    tag_map
+        The whole map: what was given, and what was found out.
+    guessed
+        What the map that was given did not say: sections, and quantities.
+    cleaned
+        Values of each quantity at their own times, and what became of them.
+    rows
+        The values on the grid.
+    """
+
+    export: Export
+    model: Model
+    tag_map: TagMap
+    guessed: tuple[str, ...]
+    cleaned: tuple[Cleaned, ...]
+    rows: Rows
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Inputs, then outputs, that the record has."""
+        return tuple(c.quantity for c in self.cleaned)
+
+    def is_input(self, name: str) -> bool:
+        """Whether a quantity is an input."""
+        return name in self.model.names("inputs")
+
+    def table(self) -> pd.DataFrame:
+        """The record, with the columns that `read_dataset` reads.
+
+        Time [s] from the first row; `stretch`, where there are several; a column a quantity, named with its unit; a
+        status a quantity (`air_flow_status`): measured, held, averaged, missing or bad; and the time in UTC, where the
+        export is dated.
+        """
+        rows = self.rows
+        columns: dict[str, object] = {TIME_COLUMN: ((rows.time - rows.time[0]) // rows.step) * (rows.step / 1e9)}
+        if rows.stretch[-1] > 1:
+            columns[STRETCH] = rows.stretch
+        columns |= {q.column: rows.values[q.name] for q in self.quantities}
+        for q in self.quantities:
+            columns[f"{q.name}_status"] = np.array(STATUSES, dtype=object)[rows.statuses[q.name]]
+        if self.dated:
+            columns[CLOCK_COLUMN] = pd.DatetimeIndex(rows.time.astype("datetime64[ns]")).tz_localize("UTC")
+        return pd.DataFrame(columns)
+
+    @property
+    def dated(self) -> bool:
+        """Whether the times of the export are dates."""
+        return self.tag_map.time.format not in ("seconds", "minutes", "hours")
+
+
+def import_table(source: Source, model: Model, given: TagMap, *, outputs: bool | None = None) -> Imported:
+    """Import an export for a model.
+
+    Parameters
+    ----------
+    source
+        CSV, Parquet or xlsx file, or a table at hand. It is only read.
+    model
+        The model: its inputs are needed, its outputs used where they are found.
+    given
+        The map, or part of one, or an empty one; what it does not say is guessed.
+    outputs
+        Whether to look for outputs that the map does not name; default where it does not name all inputs either.
+
+    Raises
+    ------
+    UnclearError
+        Several readings are equally good: the user must choose.
+    DataError, RangeError
+        The export can not be used.
+    """
+    export = read_export(source, given)
+    whole = all(q.name in given.quantities for q in model.inputs)
+    full = given.model_copy(update={"file": export.file_keys, "time": export.time_keys})
+    full = guess_tags(export, model, full, outputs=not whole if outputs is None else outputs)
+    full = complete_habits(export, model, full)
+    cleaned = tuple(
+        clean(export.signals[full.quantities[q.name].tag], q, full.quantities[q.name], export.file)
+        for q in (*model.inputs, *model.outputs)
+        if q.name in full.quantities
+    )
+    count = len(model.inputs)
+    grid = full.grid
+    rows = make_rows(
+        cleaned[:count],
+        cleaned[count:],
+        seconds(grid.step or ""),
+        seconds(grid.hold_at_most or ""),
+        grid.gaps,
+        export.file,
+    )
+    return Imported(export, model, full, _guessed(given, full), cleaned, rows)
+
+
+def _guessed(given: TagMap, full: TagMap) -> tuple[str, ...]:
+    """What decides the numbers of a record and was not given."""
+    found = ["time"] if given.time.column is None else []
+    found += ["grid"] if given.grid.step is None or given.grid.hold_at_most is None else []
+    for name in full.quantities:
+        own = given.quantities.get(name)
+        found += [name] if own is None or own.unit is None else []
+    return tuple(found)
+
+
+def read_with_map(source: Source, model: Model, tag_map: TagMap) -> pd.DataFrame:
+    """Record of an export whose map says everything that decides its numbers.
+
+    Raises
+    ------
+    DataError
+        The map leaves something open, or the export can not be used.
+    RangeError
+        Values in another unit than the map says.
+    """
+    imported = import_table(source, model, tag_map, outputs=False)
+    if imported.guessed:
+        raise DataError(
+            f"{imported.export.file}: the map does not say {', '.join(imported.guessed)}; complete it, or let "
+            "'adaptive-flot import' write one"
+        )
+    return imported.table()
