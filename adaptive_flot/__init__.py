@@ -7,6 +7,7 @@ The front door, usually imported as ``import adaptive_flot as af``:
 `estimate`         Fit a model to a measured record, and replay the record through estimators.
 `discover`         Find what physical effect a model lacks, from a measured record.
 `simulate`         Simulate a table of inputs.
+`import_record`    Bring a historian's export into the shape of a record.
 `load_scenario`    Read and check a scenario file.
 `read_dataset`     Read and check a measured table for a model.
 `Model`            A model: its `Quantity` and `Parameter` tuples, and equations written into a `Scope`.
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from adaptive_flot.api.estimation import estimate
     from adaptive_flot.api.finding import discover
+    from adaptive_flot.api.importing import import_record
     from adaptive_flot.api.runs import run
     from adaptive_flot.api.simulation import simulate
     from adaptive_flot.errors import AdaptiveFlotError
@@ -45,6 +47,7 @@ __all__ = [
     "__version__",
     "discover",
     "estimate",
+    "import_record",
     "load_scenario",
     "read_dataset",
     "run",
@@ -61,6 +64,7 @@ _HOMES = {
     "Scope": "greybox.scope",
     "discover": "api.finding",
     "estimate": "api.estimation",
+    "import_record": "api.importing",
     "load_scenario": "runner.scenario.loading",
     "read_dataset": "greybox.data.dataset",
     "run": "api.runs",

@@ -13,7 +13,7 @@ import pandas as pd
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.plugins import Choices, plugins
 from adaptive_flot.api.progress import counted
-from adaptive_flot.api.records import AnyRecord, record_name
+from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -176,6 +176,7 @@ def estimate(
     parameters: Sequence[str] = (),
     outputs: Sequence[str] = (),
     fit_share: float = 0.6,
+    tag_map: AnyMap | None = None,
     compiled: bool = False,
     progress: bool = False,
 ) -> Estimation:
@@ -196,6 +197,8 @@ def estimate(
         Names of the outputs that drive the estimation; default all that are measured.
     fit_share
         Part of the record to fit on, from its beginning: a number between 0 and 1.
+    tag_map
+        Map file (or `TagMap`) of an export: from its tags to the model's quantities.
     compiled
         Run step and estimators as machine code, by the C compiler of this system.
     progress
@@ -230,7 +233,10 @@ def estimate(
     chosen = plugins(estimators, shipped_plugin, "estimator")
     if not 0.0 < fit_share < 1.0:
         raise ModelError(f"fit_share = {fit_share:g}; give a number between 0 and 1, as 0.6")
-    blocks = cut(data, fit_share, data.name) if isinstance(data, Dataset) else read_blocks(data, made, fit_share)
+    if isinstance(data, Dataset):
+        blocks = cut(data, fit_share, data.name)
+    else:
+        blocks = read_blocks(data, made, fit_share, read_map(tag_map))
     with counted(progress, record_name(data), 1 + len(chosen)) as advance:
         result = estimate_record(
             blocks, made, estimators=chosen, fit=parameters, outputs=outputs, folder=Path.cwd(), progress=advance

@@ -12,7 +12,7 @@ import pandas as pd
 
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.progress import staged
-from adaptive_flot.api.records import AnyRecord, record_name
+from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
@@ -187,6 +187,7 @@ def discover(
     data: AnyRecord,
     *,
     limits: Mapping[str, tuple[float, float]] | None = None,
+    tag_map: AnyMap | None = None,
     processes: int | None = None,
     progress: bool = False,
 ) -> Finding:
@@ -201,6 +202,8 @@ def discover(
     limits
         Lowest and highest value of inputs by name, in the input's unit, for the test that is proposed. Default: the
         test stays where the record has been.
+    tag_map
+        Map file (or `TagMap`) of an export: from its tags to the model's quantities.
     processes
         Fits that run at once; default as many as there are cores.
     progress
@@ -224,5 +227,7 @@ def discover(
         if isinstance(data, Dataset):
             found = search_record(made, data, limits=limits, processes=workers, progress=advance)
         else:
-            found = discover_file(data, made, limits=limits, processes=workers, progress=advance)
+            found = discover_file(
+                data, made, limits=limits, tag_map=read_map(tag_map), processes=workers, progress=advance
+            )
     return Finding(name, found, origin)

@@ -1,4 +1,4 @@
-"""A record from a file, a table, or a record at hand."""
+"""A record from a file, a table, or a record at hand; a map from a file, or one at hand."""
 
 from __future__ import annotations
 
@@ -9,9 +9,23 @@ import pandas as pd
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import named
+from adaptive_flot.records.tag_map import TagMap, load_tag_map
 
 AnyRecord: TypeAlias = Path | str | pd.DataFrame | Dataset
 """A CSV or Parquet file, a table with the model's columns, or a record from `read_dataset`."""
+AnyMap: TypeAlias = Path | str | TagMap
+"""A map file, or a map at hand."""
+
+
+def read_map(given: AnyMap | None) -> TagMap | None:
+    """Map behind what the user gave.
+
+    Raises
+    ------
+    DataError
+        The file can not be used.
+    """
+    return load_tag_map(given) if isinstance(given, (str, Path)) else given
 
 
 def record_name(data: AnyRecord) -> str:

@@ -5,6 +5,7 @@
 `commands`            the list of commands, and the options before a command
 `run` ... `scenarios` one file a command: its options, and what it calls
 `options`             options that several commands share
+`import_preview`      what `import` shows and asks before it writes
 `targets`             what a command will write, checked before any work
 ===================== =================================================================
 

@@ -11,6 +11,7 @@ from adaptive_flot.cli.compare import compare
 from adaptive_flot.cli.discover import discover
 from adaptive_flot.cli.estimate import estimate
 from adaptive_flot.cli.export import export
+from adaptive_flot.cli.import_ import import_
 from adaptive_flot.cli.live import live
 from adaptive_flot.cli.options import ignore_unknown_backend
 from adaptive_flot.cli.run import run
@@ -30,6 +31,9 @@ app.command(epilog="Example: adaptive-flot run paper_scenario_1 --estimator rpem
     run
 )
 app.command(epilog="Example: adaptive-flot simulate inputs.csv --out simulated.csv --accurate")(simulate)
+app.command(
+    name="import", epilog="Example: adaptive-flot import export.csv --map my_map.yaml --out record.parquet --yes"
+)(import_)
 app.command(
     epilog="Example: adaptive-flot estimate record.csv --fit n --fit C --fit floatability --save-cell fitted.yaml"
 )(estimate)

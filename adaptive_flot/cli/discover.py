@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.options import CellOption, ModelOption, Out, command_line, results_folder
+from adaptive_flot.cli.options import CellOption, MapOption, ModelOption, Out, command_line, results_folder
 from adaptive_flot.cli.targets import check_targets, in_folder, model_inputs
 
 
 def discover(
-    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
+    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet; with --map an export.")],
     model: ModelOption = "flotation",
     cell: CellOption = None,
+    map_: MapOption = None,
     json: Annotated[Path | None, typer.Option("--json", help="Write the verdict here too.")] = None,
     out: Out = None,
     save_model: Annotated[Path | None, typer.Option(help="Write the extended model as a model file (YAML).")] = None,
@@ -34,20 +35,27 @@ def discover(
     from adaptive_flot.console import print_discovery, stage_bar
     from adaptive_flot.discovery.fitting.parallel import available_processes
     from adaptive_flot.processes.registry import make_model
+    from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.discover import check_model_path, discover_file, read_limits, save_discovered
     from adaptive_flot.runner.commands.run_files import write_json
 
     check_model_path(save_model)
     folder = results_folder(out, data.stem, "discover")
     check_targets(
-        [data, *model_inputs(model, cell, data.parent)],
+        [data, map_, *model_inputs(model, cell, data.parent)],
         [*in_folder(folder, "verdict.json", "report.html"), ("--json", json), ("--save-model", save_model)],
     )
     limits = read_limits(limit or ())
+    tag_map = None if map_ is None else load_tag_map(map_)
     made = make_model(model, cell=cell, folder=data.parent)
     with stage_bar(data.stem) as progress:
         found = discover_file(
-            data, made, limits=limits, processes=processes or available_processes(), progress=progress
+            data,
+            made,
+            limits=limits,
+            tag_map=tag_map,
+            processes=processes or available_processes(),
+            progress=progress,
         )
     for target in filter(None, (folder / "verdict.json", json)):
         write_json(target, found.verdict.as_dict())

@@ -12,6 +12,7 @@ from adaptive_flot.cli.options import (
     CellOption,
     Compile,
     Json,
+    MapOption,
     ModelOption,
     Out,
     can_compile,
@@ -23,9 +24,10 @@ from adaptive_flot.cli.targets import check_targets, in_folder, model_inputs
 
 
 def estimate(
-    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet.")],
+    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet; with --map an export.")],
     model: ModelOption = "flotation",
     cell: CellOption = None,
+    map_: MapOption = None,
     estimator: Annotated[
         list[str] | None, typer.Option(help="Estimator (repeatable); default fixed, rpem and pem.")
     ] = None,
@@ -46,6 +48,7 @@ def estimate(
     from adaptive_flot.console import print_estimate, progress_bar
     from adaptive_flot.errors import CellError
     from adaptive_flot.processes.registry import find_cell, make_model
+    from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.estimate import estimate_record
     from adaptive_flot.runner.commands.estimate_files import (
         estimate_summary,
@@ -63,11 +66,11 @@ def estimate(
     folder = results_folder(out, data.stem, "estimate")
     files = [*map(replay_file, names), "summary.json", "report.html"]
     check_targets(
-        [data, *model_inputs(model, cell, data.parent, names)],
+        [data, map_, *model_inputs(model, cell, data.parent, names)],
         [*in_folder(folder, *files), ("--json", json), ("--save-cell", save_cell), ("--save-model", save_model)],
     )
     made = replace(make_model(model, cell=cell, folder=data.parent), compiled=can_compile(compile_))
-    blocks = read_blocks(data, made, fit_share)
+    blocks = read_blocks(data, made, fit_share, None if map_ is None else load_tag_map(map_))
     with progress_bar(data.stem, 1 + len(names)) as advance:
         result = estimate_record(
             blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent, progress=advance

@@ -30,6 +30,10 @@ ModelOption = Annotated[
     ),
 ]
 CellOption = Annotated[str | None, typer.Option("--cell", help="Cell file (YAML), or the name of a shipped one.")]
+MapOption = Annotated[
+    Path | None,
+    typer.Option("--map", help="From the tags of an export to the model's quantities (YAML); see `import`."),
+]
 Compile = Annotated[
     bool, typer.Option("--compile", help="Step and estimators as machine code, by the C compiler of this system.")
 ]

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from adaptive_flot.errors import CellError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, read_dataset
-from adaptive_flot.greybox.data.tables import Source, read_table
+from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.plugins import construct, load, module_file
 from adaptive_flot.processes import cascaded_tanks, flotation, iron_columns, zinc_level
 from adaptive_flot.processes.model_file import find_model_file, is_model_file, load_model_file
 from adaptive_flot.processes.process import Measurements
+from adaptive_flot.records.importing import is_record, read_with_map
+from adaptive_flot.records.tag_map import TagMap
 from adaptive_flot.resources import cell_file
 
 WITHOUT_CELL = {p.name: p for p in (cascaded_tanks.PROCESS, zinc_level.PROCESS, iron_columns.PROCESS)}
@@ -61,8 +64,10 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     return model
 
 
-def read_measurements(source: Source, model: Model, *, required_outputs: Sequence[str] = ()) -> Measurements:
-    """Read a measured record: a table with the model's columns, or the published file of a shipped process.
+def read_measurements(
+    source: Source, model: Model, *, required_outputs: Sequence[str] = (), tag_map: TagMap | None = None
+) -> Measurements:
+    """Read a measured record: a table with the model's columns, a published file of a shipped process, or an export.
 
     Parameters
     ----------
@@ -72,12 +77,18 @@ def read_measurements(source: Source, model: Model, *, required_outputs: Sequenc
         The model.
     required_outputs
         Outputs that a table with the model's columns must have.
+    tag_map
+        From the tags of an export to the model's quantities; a table that is a record already needs none.
 
     Raises
     ------
     DataError, RangeError
         The table can not be used.
     """
+    if tag_map is not None and not is_record(source, model):
+        with located(named(source)):
+            record = read_dataset(read_with_map(source, model, tag_map), model, required_outputs=required_outputs)
+        return Measurements(replace(record, name=named(source).stem))
     if model.name in WITHOUT_CELL and TIME_COLUMN not in read_table(source).columns:
         return WITHOUT_CELL[model.name].read_published(source)
     return Measurements(read_dataset(source, model, required_outputs=required_outputs))

@@ -189,18 +189,20 @@ def runs_of_equal(values: FloatArray) -> list[tuple[int, int]]:
 
 
 def spikes(values: FloatArray) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Mask of values (n,) far from the median m of their neighbours (Hampel's filter).
+    """Mask of values (n,) far from the median m of their neighbours (Hampel's filter), as in discovery's screening.
 
     ::
 
-        |y - m| > 8 s,    s = quantile 0.25 of |y - m| / 0.3186
+        |y - m| > max(8 s, quantile 0.95 of m - quantile 0.05 of m),    s = quantile 0.25 of |y - m| / 0.3186
 
-    Five or more in a row are a step, and no spikes. Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782.
+    Far is more than eight times the noise, and more than what the signal itself does. Five or more in a row are a step.
+    Davies & Gather, *J. Am. Statist. Assoc.* 88 (1993) 782.
     """
-    if len(values) < NEIGHBOURS:
+    if len(values) < NEIGHBOURS or np.ptp(values) == 0:
         return np.zeros(len(values), bool)
-    away = np.abs(values - median_filter(values, NEIGHBOURS, mode="nearest"))
+    middle = median_filter(values, NEIGHBOURS, mode="nearest")
+    away = np.abs(values - middle)
     noise = float(np.quantile(away, 0.25)) / QUARTER
-    noise = noise or float(np.mean(away))
-    far: np.ndarray[Any, np.dtype[np.bool_]] = (away > SPIKE * noise) & (away > 0)
+    own = float(np.quantile(middle, 0.95) - np.quantile(middle, 0.05))
+    far: np.ndarray[Any, np.dtype[np.bool_]] = (away > max(SPIKE * noise, own)) & (away > 0)
     return far

@@ -88,9 +88,9 @@ def guess_tags(export: Export, model: Model, known: TagMap, *, outputs: bool = T
     for q, signal in _assigned(wanted, signals, model, export):
         known = known.with_keys(q.name, {"tag": signal.tag})
     for q in (*model.inputs, *model.outputs):
-        keys = known.quantities.get(q.name)
-        if keys is not None and keys.unit is None:
-            known = known.with_keys(q.name, {"unit": _one_unit(q, keys, export)})
+        own = known.quantities.get(q.name)
+        if own is not None and own.unit is None:
+            known = known.with_keys(q.name, {"unit": _one_unit(q, own, export)})
     return known
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN
 from adaptive_flot.greybox.data.stretches import STRETCH
-from adaptive_flot.greybox.data.tables import Source
+from adaptive_flot.greybox.data.tables import Source, read_table
 from adaptive_flot.greybox.model import Model, Quantity
 from adaptive_flot.records.clean import Cleaned, clean
 from adaptive_flot.records.grid import STATUSES, Rows, make_rows
@@ -155,3 +155,12 @@ def read_with_map(source: Source, model: Model, tag_map: TagMap) -> pd.DataFrame
             "'adaptive-flot import' write one"
         )
     return imported.table()
+
+
+def is_record(source: Source, model: Model) -> bool:
+    """Whether a table is a record of the model already, and no export."""
+    try:
+        columns = set(read_table(source).columns)
+    except DataError:  # of a form that only the importer reads
+        return False
+    return {TIME_COLUMN, *(q.column for q in model.inputs)} <= columns

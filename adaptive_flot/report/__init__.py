@@ -7,5 +7,6 @@ run/        The report of scenario runs.
 compare/    Runs side by side.
 discovery/  What a model lacks.
 estimate/   A measured record replayed through estimators.
+quality/    An imported record.
 templates/  The pages (jinja2).
 """

@@ -12,12 +12,12 @@ from adaptive_flot.cli import app
 from adaptive_flot.runner.scenario.loading import shipped_scenarios
 from tests.cli.conftest import Call
 
-COMMANDS = [c.callback.__name__.replace("_", "-") for c in app.registered_commands if c.callback is not None]
+COMMANDS = [c.name or c.callback.__name__.replace("_", "-") for c in app.registered_commands if c.callback is not None]
 PROGRAM = Path(sys.executable).with_name("adaptive-flot")
 
 
 def test_the_agreed_commands_are_there() -> None:
-    assert {"run", "simulate", "estimate", "compare", "scenarios"} <= set(COMMANDS)
+    assert {"run", "simulate", "import", "estimate", "compare", "scenarios"} <= set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

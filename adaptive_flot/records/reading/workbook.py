@@ -8,7 +8,6 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-import openpyxl
 import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
@@ -61,6 +60,8 @@ def _typed(table: pd.DataFrame, file: Path) -> RawTable:
 
 
 def _book(file: Path, sheet: str | None) -> RawTable:
+    import openpyxl  # loaded where a spreadsheet is read, and nowhere else
+
     if not file.is_file():
         raise DataError(f"{file}: no such file; give the path of an export (CSV, Parquet or xlsx)")
     try:

@@ -13,6 +13,7 @@ from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.processes.registry import read_measurements
+from adaptive_flot.records.tag_map import TagMap
 
 
 def discover_file(
@@ -20,6 +21,7 @@ def discover_file(
     model: Model,
     *,
     limits: Mapping[str, tuple[float, float]] | None = None,
+    tag_map: TagMap | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
@@ -33,6 +35,8 @@ def discover_file(
         The model, with sites.
     limits
         Ranges of inputs by name for the test that is proposed.
+    tag_map
+        From the tags of an export to the model's quantities.
     processes
         Fits that run at once.
     progress
@@ -43,7 +47,7 @@ def discover_file(
     DataError, RangeError, ModelError
         The table or the model can not be used.
     """
-    measured = read_measurements(path, model)
+    measured = read_measurements(path, model, tag_map=tag_map)
     return discover(
         model, measured.record, report_record=measured.validation, limits=limits, processes=processes, progress=progress
     )

@@ -10,6 +10,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import Source, named
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.registry import read_measurements
+from adaptive_flot.records.tag_map import TagMap
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,8 +30,8 @@ class Blocks(Described):
         return {"record": self.name, "rows to fit": len(self.fit), "rows to test": len(self.test)}
 
 
-def read_blocks(path: Source, model: Model, fit_share: float) -> Blocks:
-    """Read a record and cut it into fit and test block.
+def read_blocks(path: Source, model: Model, fit_share: float, tag_map: TagMap | None = None) -> Blocks:
+    """Read a record (with a map: an export) and cut it into fit and test block.
 
     A published file with a record for validation has both blocks; any other record is cut in time at `fit_share`.
 
@@ -39,7 +40,7 @@ def read_blocks(path: Source, model: Model, fit_share: float) -> Blocks:
     DataError, RangeError
         The table can not be used.
     """
-    measured = read_measurements(path, model, required_outputs=(model.outputs[0].name,))
+    measured = read_measurements(path, model, required_outputs=(model.outputs[0].name,), tag_map=tag_map)
     record, validation = measured.record, measured.validation
     if validation is None:
         return cut(record, fit_share, str(named(path)))

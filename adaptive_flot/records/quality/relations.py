@@ -1,0 +1,118 @@
+"""Pairs of signals: correlation, and whether an input is set from an output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import statsmodels.api as sm
+
+from adaptive_flot.greybox.quantities import FloatArray
+
+MOST_LAGS = 60
+FEWEST = 50
+"""Rows from which a relation can be judged."""
+FEEDBACK_LAGS = 5
+LEAST_SHARE = 0.05
+"""Share of an input's one-step variance that an output must explain to count as feedback."""
+SIGNIFICANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Largest correlation coefficient of two signals over the lags, and that lag [rows] (`one` leads)."""
+
+    one: str
+    other: str
+    r: float
+    lag: int
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """How much of the moves of an input past values of an output explain.
+
+    Attributes
+    ----------
+    input, output
+        The two.
+    share
+        Share of the variance that is left after the input's own past.
+    p_value
+        Probability of as large a share by chance.
+    """
+
+    input: str
+    output: str
+    share: float
+    p_value: float
+
+    @property
+    def closed(self) -> bool:
+        """Whether the input counts as set from the output."""
+        return self.share > LEAST_SHARE and self.p_value < SIGNIFICANCE
+
+
+def correlation(one: str, other: str, a: FloatArray, b: FloatArray, lags: int = MOST_LAGS) -> Correlation | None:
+    """Largest correlation of a[k - lag] with b[k] over lags 0 to `lags`; None where a signal does not move."""
+    best: Correlation | None = None
+    for lag in range(min(lags, len(a) // 5) + 1):
+        x, y = a[: len(a) - lag], b[lag:]
+        both = np.isfinite(x) & np.isfinite(y)
+        if both.sum() < FEWEST:
+            continue
+        x, y = x[both] - x[both].mean(), y[both] - y[both].mean()
+        size = float(np.sqrt((x @ x) * (y @ y)))
+        if size <= 0 or _still(a) or _still(b):
+            return None
+        r = float(x @ y) / size
+        if best is None or abs(r) > abs(best.r) + 1e-3:
+            best = Correlation(one, other, r, lag)
+    return best
+
+
+def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback | None:
+    """Whether past outputs predict an input (N,) beyond its own past; None where it can not be told.
+
+    Two regressions on p lags, with and without the output; the output is held where it is missing::
+
+        u[k] = sum_i a_i u[k-i] + c + e0,      u[k] = sum_i a_i u[k-i] + sum_i b_i y[k-i] + c + e1
+        share = 1 - RSS1 / RSS0,               F = (RSS0 - RSS1) / p / (RSS1 / (n - 2 p - 1))
+
+    Granger, *Econometrica* 37 (1969) 424; as a test of feedback Caines & Chan, *IEEE Trans. Autom. Control* 20 (1975)
+    498. A feedback that acts at once within a row is not seen.
+    """
+    held = _held(y)
+    first = int(np.argmax(np.isfinite(held))) if np.isfinite(held).any() else len(held)
+    u, held = u[first:], held[first:]
+    p = FEEDBACK_LAGS
+    n = len(u) - p
+    if n < FEWEST or _still(u) or _still(held):
+        return None
+    own = np.column_stack([u[p - i : len(u) - i] for i in range(1, p + 1)])
+    other = np.column_stack([held[p - i : len(u) - i] for i in range(1, p + 1)])
+    own, other, target = (_scaled(a) for a in (own, other, u[p:]))
+    short = sm.OLS(target, sm.add_constant(own, has_constant="add")).fit()
+    long = sm.OLS(target, sm.add_constant(np.column_stack([own, other]), has_constant="add")).fit()
+    if short.ssr <= 1e-20 * n:
+        return None
+    share = max(0.0, 1 - long.ssr / short.ssr)
+    p_value = 0.0 if long.ssr <= 1e-14 * short.ssr else float(long.compare_f_test(short)[1])
+    return Feedback(name, output, float(share), p_value)
+
+
+def _still(values: FloatArray) -> bool:
+    seen = values[np.isfinite(values)]
+    return len(seen) == 0 or float(np.ptp(seen)) <= 1e-9 * max(float(np.max(np.abs(seen))), 1e-300)
+
+
+def _scaled(values: FloatArray) -> FloatArray:
+    centred = values - values.mean(axis=0)
+    found: FloatArray = centred / np.maximum(np.std(values, axis=0), 1e-300)
+    return found
+
+
+def _held(values: FloatArray) -> FloatArray:
+    """Values with each missing one replaced by the last one before it."""
+    place = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), -1))
+    return np.where(place >= 0, values[np.maximum(place, 0)], np.nan)

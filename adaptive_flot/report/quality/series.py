@@ -1,0 +1,82 @@
+"""From an imported record to what the figures draw."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.greybox.quantities import FloatArray
+from adaptive_flot.records.grid import MEASURED, STATUSES, Codes
+from adaptive_flot.records.importing import Imported
+from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
+from adaptive_flot.report.kit.strips import Strip
+
+MOST_POINTS = 4000
+"""Points of a line; of more, the lowest and highest of each group are drawn."""
+MOST_SPELLS = 600
+"""Parts of a strip, beyond which the most frequent status of each part is drawn."""
+
+
+def panels(imported: Imported) -> list[Panel]:
+    """A panel a quantity: the values of the record, a break at each gap."""
+    rows = imported.rows
+    time = (rows.time - rows.time[0]) / 1e9
+    found = []
+    for c in imported.cleaned:
+        name = c.quantity.name
+        t, values = _broken(time, rows.values[name], rows.stretch)
+        t, values = thinned(t, values)
+        trace = Trace("record", t, values, Role.ESTIMATE, held=imported.is_input(name))
+        found.append(Panel(name.replace("_", " "), c.quantity.unit, (trace,), height=0.6))
+    return found
+
+
+def strips(imported: Imported) -> list[Strip]:
+    """A strip a quantity: how each row came about."""
+    rows = imported.rows
+    time = (rows.time - rows.time[0]) / 1e9
+    groups = max(1, -(-len(time) // MOST_SPELLS))
+    found = []
+    for c in imported.cleaned:
+        status = _most_frequent(rows.statuses[c.quantity.name], groups)
+        words = [STATUSES[k] for k in status]
+        found.append(Strip(c.quantity.name.replace("_", " "), time[::groups], words, STATUSES[MEASURED]))
+    return found
+
+
+def _broken(
+    time: FloatArray, values: FloatArray, stretch: np.ndarray[tuple[int], np.dtype[np.int64]]
+) -> tuple[FloatArray, FloatArray]:
+    """Times and values with an empty value at each gap, so that no line crosses it."""
+    gaps = np.flatnonzero(np.diff(stretch)) + 1
+    return np.insert(time, gaps, (time[gaps - 1] + time[gaps]) / 2), np.insert(values, gaps, np.nan)
+
+
+def thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """At most MOST_POINTS points that show the same line: of each group the lowest and the highest, in their order.
+
+    >>> t, y = thinned(np.arange(100_000.0), np.sin(np.arange(100_000.0)))
+    >>> len(t) <= 4000, bool(y.max() > 0.999)
+    (True, True)
+    """
+    if len(time) <= MOST_POINTS:
+        return time, values
+    edges = np.linspace(0, len(time), MOST_POINTS // 2 + 1).astype(int)
+    chosen: list[int] = []
+    for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        part = values[a:b]
+        if np.isfinite(part).any():
+            chosen += sorted({a + int(np.nanargmin(part)), a + int(np.nanargmax(part))})
+        else:
+            chosen.append(a)
+    return time[chosen], values[chosen]
+
+
+def _most_frequent(status: Codes, size: int) -> list[int]:
+    """Of each group of rows the status that most deserves to be seen: the rarest of those that make up a fifth."""
+    if size == 1:
+        return status.tolist()
+    found = []
+    for start in range(0, len(status), size):
+        counts = np.bincount(status[start : start + size], minlength=len(STATUSES))
+        found.append(int(np.flatnonzero(counts >= 0.2 * counts.sum())[-1]))
+    return found
