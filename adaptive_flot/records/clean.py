@@ -16,7 +16,7 @@ from adaptive_flot.greybox.data.wrong_unit import is_far_outside, units_that_fit
 from adaptive_flot.greybox.quantities import FloatArray, Quantity
 from adaptive_flot.records.reading.export import Instants, Signal
 from adaptive_flot.records.tag_map import TagKeys
-from adaptive_flot.records.units import convert, read_unit
+from adaptive_flot.records.units import convert, is_unit, read_unit
 
 FATES = ("good", "code", "quality", "range", "frozen", "spike")
 """What became of a value: good, or why it counts as bad."""
@@ -143,7 +143,7 @@ def _is_number(code: str) -> bool:
 def _unit(signal: Signal, quantity: Quantity, keys: TagKeys, where: str) -> str:
     if keys.unit is None:
         raise DataError(f"{where} has no unit; add it to the map, as 'unit: {quantity.unit}'")
-    if signal.unit and read_unit(signal.unit) != read_unit(keys.unit):
+    if signal.unit and is_unit(signal.unit) and read_unit(signal.unit) != read_unit(keys.unit):
         raise DataError(
             f"{where} is in {signal.unit} by the file and in {keys.unit} by the map; correct the map, or the export"
         )

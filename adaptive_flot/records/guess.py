@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from adaptive_flot.errors import DataError, near_match
+from adaptive_flot.errors import DataError, located, near_match
 from adaptive_flot.greybox.data.wrong_unit import OTHER_UNITS
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.records.reading.export import Export, Signal
 from adaptive_flot.records.reading.raw import UnclearError
 from adaptive_flot.records.tag_map import TagKeys, TagMap
-from adaptive_flot.records.units import convert, fits
+from adaptive_flot.records.units import convert, fits, is_unit, read_unit
 
 WORDS: Mapping[str, tuple[str, ...]] = {
     "air": ("air", "luft", "aire", "gas", "blower"),
@@ -99,6 +99,8 @@ def candidate(q: Quantity, signal: Signal) -> Candidate | None:
     score = name_score(q, f"{signal.tag} {signal.description}")
     if signal.tag in (q.name, q.column):
         score = 1.5
+    if signal.unit and not is_unit(signal.unit):
+        return Candidate(score) if score >= NAMED else None  # refused where it is converted, with the reason
     if signal.unit and not fits(signal.unit, q.unit):
         return None
     units, usual = _units(q, signal)
@@ -213,6 +215,8 @@ def _nothing_found(q: Quantity, export: Export) -> str:
 def _one_unit(q: Quantity, keys: TagKeys, export: Export) -> str:
     signal = export.signals[keys.tag]
     if signal.unit:
+        with located(f"{export.file}: {q.name}: tag {keys.tag!r}"):
+            read_unit(signal.unit)
         return signal.unit
     units, _ = _units(q, signal)
     middle = float(np.nanmedian(signal.values))

@@ -74,7 +74,7 @@ def check_clock(clock: Instants, lines: Instants, file: Path) -> None:
     Raises
     ------
     UnclearError
-        The clock goes back by up to an hour once, or a whole hour is missing, in a month of such changes.
+        The clock goes back by an hour once, or a whole hour is missing, in a month of such changes.
     """
     if len(clock) < 3:
         return
@@ -82,7 +82,8 @@ def check_clock(clock: Instants, lines: Instants, file: Path) -> None:
     usual = float(np.median(steps))
     back = np.flatnonzero(steps < 0)
     hole = np.flatnonzero(np.abs(steps - usual - HOUR) <= 0.5 * usual) if usual < HOUR / 4 else np.array([], int)
-    at = int(back[0]) if len(back) == 1 and steps[back[0]] >= -HOUR else None
+    hour_back = len(back) == 1 and abs(steps[back[0]] + HOUR - usual) <= 3 * usual
+    at = int(back[0]) if hour_back else None
     word = "back"
     if at is None and not len(back):
         night = [int(k) for k in hole if pd.Timestamp(int(clock[k])).hour <= 3]

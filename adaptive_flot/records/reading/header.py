@@ -13,7 +13,7 @@ from adaptive_flot.records.reading.numbers import read_numbers
 from adaptive_flot.records.reading.raw import RawTable, UnclearError
 from adaptive_flot.records.reading.stamps import looks_like_time, looks_like_time_of_day
 from adaptive_flot.records.tag_map import TimeKeys
-from adaptive_flot.records.units import is_unit
+from adaptive_flot.records.units import NORMAL, is_unit
 
 LOOKED_AT = 200
 """Rows from which the layout is judged."""
@@ -49,10 +49,15 @@ def split_unit(text: str) -> tuple[str, str]:
     (('Air flow', 'L/min'), ('FIC_101.PV', ''))
     """
     found = _BRACKETS.match(text)
-    inside = (found["a"] or found["b"] or found["c"] or "") if found else ""
-    if not found or not found["name"] or not inside.strip() or not is_unit(inside.strip()):
+    inside = ((found["a"] or found["b"] or found["c"] or "") if found else "").strip()
+    if not found or not found["name"] or not inside or not (is_unit(inside) or _meant_as_unit(inside)):
         return text, ""
-    return found["name"].strip(), inside.strip()
+    return found["name"].strip(), inside
+
+
+def _meant_as_unit(text: str) -> bool:
+    """Whether a text that is no unit was meant as one; it is then refused, and not passed over."""
+    return " " not in text and ("/" in text or NORMAL.match(text) is not None)
 
 
 def find_layout(raw: RawTable, keys: TimeKeys) -> Layout:
@@ -74,7 +79,7 @@ def find_layout(raw: RawTable, keys: TimeKeys) -> Layout:
         return Layout(names, units, ("",) * len(names), 0, time)
     if keys.column:
         row, time = _header_with(raw, texts, keys)
-        first = _first_data(texts, time, row + 1)
+        first = _first_data(texts, time, row + 1, keys.format)
     else:
         first = _first_row(raw, texts)
         row = _header_above(raw, texts, first)
@@ -82,9 +87,22 @@ def find_layout(raw: RawTable, keys: TimeKeys) -> Layout:
     if first >= len(head):
         raise DataError(f"{raw.file}: a header but no rows; give an export with values")
     names, units, descriptions = _columns(texts, row, first)
+    _check_width(raw, names, first)
     if not time:
         time = _time(raw, texts, names, first)
     return Layout(names, units, descriptions, first, time)
+
+
+def _check_width(raw: RawTable, names: tuple[str, ...], first: int) -> None:
+    """Refuse rows with more cells than the header: nobody knows which value belongs to which tag."""
+    for column in range(max(j for j, name in enumerate(names) if name) + 1, len(names)):
+        beyond = raw.texts(column).iloc[first:]
+        if (beyond != "").any():
+            line = beyond.index[int(np.argmax((beyond != "").to_numpy()))]
+            raise DataError(
+                f"{raw.file}: line {line} has more cells than the header (a decimal comma, or a comma in a text?); "
+                "correct it, or export with another separator"
+            )
 
 
 def _values(texts: pd.Series) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -139,7 +157,7 @@ def _columns(texts: list[pd.Series], row: int, first: int) -> tuple[tuple[str, .
         if k == row or sum(c != "" for c in cells) < max(2.0, wide):
             continue
         if _mostly_units(cells) and k > row:
-            units = [u or (c if c and is_unit(c) else "") for u, c in zip(units, cells, strict=True)]
+            units = [u or c for u, c in zip(units, cells, strict=True)]
         else:
             descriptions = [f"{d} {c}".strip() for d, c in zip(descriptions, cells, strict=True)]
     return tuple(p[0] for p in parts), tuple(units), tuple(descriptions)
@@ -170,9 +188,11 @@ def _named(raw: RawTable, names: tuple[str, ...], keys: TimeKeys) -> tuple[int, 
     return tuple(j for j in (_place(list(names), w) for w in wanted) if j is not None)
 
 
-def _first_data(texts: list[pd.Series], time: tuple[int, ...], start: int) -> int:
+def _first_data(texts: list[pd.Series], time: tuple[int, ...], start: int, form: str | None) -> int:
     column = texts[time[0]].iloc[start:]
     timed = _values(column) | looks_like_time_of_day(column).to_numpy()
+    if form is not None and "%" in form:
+        timed |= pd.to_datetime(column, format=form.split(" ")[0] if len(time) > 1 else form, errors="coerce").notna()
     return start + (int(np.argmax(timed)) if timed.any() else len(column))
 
 

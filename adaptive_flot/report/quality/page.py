@@ -118,8 +118,8 @@ def _behaviour_table(quality: Quality) -> Table:
     rows = tuple(_behaviour(s) for s in quality.signals)
     caption = (
         "Spread: between the quantiles 0.05 and 0.95. Noise: standard deviation from row to row (von Neumann 1941, "
-        "with the median). Drift: slope of Theil and Sen (1968) times the duration. Frozen: longest time of 30 and more "
-        "equal values where the signal else changes. Spikes: Hampel's filter, 9 neighbours."
+        "with the median). Drift: slope of Theil and Sen (1968) times the duration. Frozen: longest time of 30 and "
+        "more equal values where the signal else changes. Spikes: Hampel's filter, 9 neighbours."
     )
     header = ("Quantity", "Unit", "Median", "Spread", "Noise", "Drift", "Frozen [s]", "Spikes")
     return Table(caption, header, rows, words=2)

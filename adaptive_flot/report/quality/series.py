@@ -74,7 +74,7 @@ def thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
 def _most_frequent(status: Codes, size: int) -> list[int]:
     """Of each group of rows the status that most deserves to be seen: the rarest of those that make up a fifth."""
     if size == 1:
-        return status.tolist()
+        return [int(k) for k in status]
     found = []
     for start in range(0, len(status), size):
         counts = np.bincount(status[start : start + size], minlength=len(STATUSES))
