@@ -168,7 +168,7 @@ def test_a_sound_export_comes_through_with_the_right_numbers(name: str, tmp_path
         np.testing.assert_allclose(table[column], truth[column], rtol=1e-8, err_msg=column)
     np.testing.assert_allclose(table["concentrate_grade"], grade, rtol=1e-8)
     shift = pd.Timedelta(hours=sound.zone_h)
-    assert list(table["time_utc"].dt.tz_localize(None)) == list(truth.index + shift)
+    assert list(table["time_utc"].dt.tz_localize(None) - shift) == list(truth.index)
 
 
 @dataclass(frozen=True)
