@@ -13,7 +13,7 @@ import pandas as pd
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.plugins import Choices, plugins
 from adaptive_flot.api.progress import counted
-from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_name
+from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_files, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -22,6 +22,7 @@ from adaptive_flot.processes.registry import find_cell
 from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record, shipped_plugin
 from adaptive_flot.runner.commands.estimate_files import save_fitted_cell
 from adaptive_flot.runner.commands.record_blocks import cut, read_blocks
+from adaptive_flot.targets import check_targets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,10 +40,13 @@ class Estimation:
         Everything behind it: the two blocks of the record, the batch fit, and each estimator's replay.
     origin
         Where the model came from.
+    sources
+        Files of the record and of the model: no result is written over them.
     """
 
     result: RecordEstimate
     origin: Origin
+    sources: tuple[Path, ...] = ()
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -109,6 +113,7 @@ class Estimation:
         """
         from adaptive_flot.report.estimate.page import write_estimate_report
 
+        check_targets(self.sources, [("report", Path(path))])
         write_estimate_report(self.result, path)
         return Path(path)
 
@@ -130,6 +135,7 @@ class Estimation:
         OutputError
             The file can not be written.
         """
+        check_targets(self.sources, [("save", Path(path))])
         return self.origin.save(self.model, path, f"calibrated on {self.result.blocks.name}", base)
 
     def save_cell(self, path: Path | str) -> Path:
@@ -144,6 +150,7 @@ class Estimation:
         """
         if self.origin.base != "flotation":
             raise ModelError(f"{path}: model {self.result.setup.model.name!r} has no cell file; use save")
+        check_targets(self.sources, [("save_cell", Path(path))])
         save_fitted_cell(self.result, find_cell(self.origin.cell), Path(path))
         return Path(path)
 
@@ -229,6 +236,7 @@ def estimate(
     ['C']
     """
     made, origin = read_model(model)
+    sources = (*record_files(data, tag_map), *origin.files)
     made = replace(made, compiled=compiled)
     chosen = plugins(estimators, shipped_plugin, "estimator")
     if not 0.0 < fit_share < 1.0:
@@ -241,4 +249,4 @@ def estimate(
         result = estimate_record(
             blocks, made, estimators=chosen, fit=parameters, outputs=outputs, folder=Path.cwd(), progress=advance
         )
-    return Estimation(result, origin)
+    return Estimation(result, origin, sources)

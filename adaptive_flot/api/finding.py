@@ -12,7 +12,7 @@ import pandas as pd
 
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.progress import staged
-from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_name
+from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_files, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
@@ -22,6 +22,7 @@ from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.runner.commands.discover import discover_file
+from adaptive_flot.targets import check_targets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,11 +40,14 @@ class Finding:
         Everything behind the verdict: data checks, search, alternatives, fits.
     origin
         Where the model came from.
+    sources
+        Files of the record and of the model: no result is written over them.
     """
 
     name: str
     discovery: Discovery
     origin: Origin
+    sources: tuple[Path, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -137,6 +141,7 @@ class Finding:
         """
         from adaptive_flot.report.discovery.page import write_discovery_report
 
+        check_targets(self.sources, [("report", Path(path))])
         write_discovery_report(self.discovery, Path(self.name).stem, path)
         return Path(path)
 
@@ -162,6 +167,7 @@ class Finding:
         """
         if self.discovery.before is None:
             raise ResultError(f"{path}: nothing was fitted, so there is no model to write: {self.verdict.reason}")
+        check_targets(self.sources, [("save", Path(path))])
         return self.origin.save(self.model, path, f"discovered in {self.name}: {self.verdict.word}", base)
 
     def __repr__(self) -> str:
@@ -222,6 +228,7 @@ def discover(
         The model can not be used, or it has no sites.
     """
     made, origin = read_model(model)
+    sources = (*record_files(data, tag_map), *origin.files)
     name, workers = record_name(data), processes or available_processes()
     with staged(progress, name) as advance:
         if isinstance(data, Dataset):
@@ -230,4 +237,4 @@ def discover(
             found = discover_file(
                 data, made, limits=limits, tag_map=read_map(tag_map), processes=workers, progress=advance
             )
-    return Finding(name, found, origin)
+    return Finding(name, found, origin, sources)

@@ -13,6 +13,7 @@ from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.processes.registry import PROCESSES, make_model
 from adaptive_flot.resources import cell_file
+from adaptive_flot.targets import model_inputs
 
 AnyModel: TypeAlias = Model | str | Path
 """A model at hand, or what names one; see `read_model`."""
@@ -34,6 +35,13 @@ class Origin:
 
     base: str | None
     cell: str | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files from which the model was read, which no result may overwrite."""
+        if self.base is None:
+            return ()
+        return tuple(path.absolute() for path in model_inputs(self.base, self.cell, Path.cwd()))
 
     def save(self, model: Model, path: Path | str, note: str, base: str | None = None) -> Path:
         """Write a model made from this origin as a model file.

@@ -28,6 +28,15 @@ def read_map(given: AnyMap | None) -> TagMap | None:
     return load_tag_map(given) if isinstance(given, (str, Path)) else given
 
 
+def record_files(data: AnyRecord, tag_map: AnyMap | None = None) -> tuple[Path, ...]:
+    """Files of a record and its map, which no result may overwrite; none of what is at hand.
+
+    >>> record_files(pd.DataFrame())
+    ()
+    """
+    return tuple(Path(given).absolute() for given in (data, tag_map) if isinstance(given, str | Path))
+
+
 def record_name(data: AnyRecord) -> str:
     """What reports and notes call a record.
 

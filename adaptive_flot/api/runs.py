@@ -17,11 +17,12 @@ from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ResultError, ScenarioError, near_match
 from adaptive_flot.report.kit.page import seed_list
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
+from adaptive_flot.runner.commands.run_files import run_files, run_summary, write_json, write_runs
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
+from adaptive_flot.targets import check_targets, scenario_inputs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -115,6 +116,7 @@ class Runs:
         """
         from adaptive_flot.report.run.page import write_run_report
 
+        check_targets(scenario_inputs(self.scenario), [("report", Path(path))])
         write_run_report([(self.scenario, self.runs)], path)
         return Path(path)
 
@@ -126,6 +128,8 @@ class Runs:
         OutputError
             A file can not be written.
         """
+        files = [*run_files(self.runs, Path(folder)), Path(folder) / "summary.json"]
+        check_targets(scenario_inputs(self.scenario), [("save", file) for file in files])
         write_runs(self.runs, Path(folder))
         write_json(Path(folder) / "summary.json", run_summary(self.scenario, self.runs))
         return Path(folder)

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from adaptive_flot.api.models import AnyModel, read_model
-from adaptive_flot.api.records import AnyRecord, record_name
+from adaptive_flot.api.records import AnyRecord, record_files, record_name
 from adaptive_flot.api.shown import html_of, text_of
 from adaptive_flot.errors import ResultError, near_match
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.greybox.model import Model, Quantity
 from adaptive_flot.runner.commands.simulate import simulate_record
+from adaptive_flot.targets import check_targets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,11 +38,14 @@ class Simulation:
         The model.
     table
         `time_s`, inputs, parameters that move, outputs, signals and states: a row an instant, units in the names.
+    sources
+        Files of the record and of the model: no result is written over them.
     """
 
     name: str
     model: Model
     table: pd.DataFrame
+    sources: tuple[Path, ...] = ()
 
     def plot(self, columns: Sequence[str] = ()) -> Figure:
         """Draw columns over time.
@@ -88,6 +92,7 @@ class Simulation:
         OutputError
             The file can not be written.
         """
+        check_targets(self.sources, [("save", Path(path))])
         write_table(self.table, Path(path))
         return Path(path)
 
@@ -149,6 +154,7 @@ def simulate(model: AnyModel, inputs: AnyRecord, *, accurate: bool = False) -> S
     >>> af.simulate("cascaded-tanks", inputs).table["level_V"].round(3).tolist()
     [9.0, 9.0, 9.521]
     """
-    made, _ = read_model(model)
+    made, origin = read_model(model)
+    sources = (*record_files(inputs), *origin.files)
     record = inputs if isinstance(inputs, Dataset) else read_dataset(inputs, made)
-    return Simulation(record_name(inputs), made, simulate_record(record, made, accurate=accurate))
+    return Simulation(record_name(inputs), made, simulate_record(record, made, accurate=accurate), sources)

@@ -6,7 +6,6 @@
 `run` ... `scenarios` one file a command: its options, and what it calls
 `options`             options that several commands share
 `import_preview`      what `import` shows and asks before it writes
-`targets`             what a command will write, checked before any work
 ===================== =================================================================
 
 Heavy libraries are imported by the command that needs them, so that help is quick.

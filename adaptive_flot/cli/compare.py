@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import command_line
-from adaptive_flot.cli.targets import check_targets, in_folder
+from adaptive_flot.targets import check_targets, in_folder
 
 
 def compare(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import CellOption, MapOption, ModelOption, Out, command_line, results_folder
-from adaptive_flot.cli.targets import check_targets, in_folder, model_inputs
+from adaptive_flot.targets import check_targets, in_folder, model_inputs
 
 
 def discover(

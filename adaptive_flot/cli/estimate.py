@@ -20,7 +20,7 @@ from adaptive_flot.cli.options import (
     once,
     results_folder,
 )
-from adaptive_flot.cli.targets import check_targets, in_folder, model_inputs
+from adaptive_flot.targets import check_targets, in_folder, model_inputs
 
 
 def estimate(

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.targets import check_targets
+from adaptive_flot.targets import check_targets
 
 
 def export(

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import CellOption, ModelOption, command_line
-from adaptive_flot.cli.targets import check_targets, model_inputs
+from adaptive_flot.targets import check_targets, model_inputs
 
 
 def import_(

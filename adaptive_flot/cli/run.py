@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import Compile, Json, Out, can_compile, command_line, once, results_folder
-from adaptive_flot.cli.targets import check_targets, in_folder, scenario_inputs
+from adaptive_flot.targets import check_targets, in_folder, scenario_inputs
 
 
 def run(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.targets import check_targets
+from adaptive_flot.targets import check_targets
 
 
 def serve_plant(

@@ -9,7 +9,7 @@ import typer
 
 from adaptive_flot.child_processes import Terminated
 from adaptive_flot.cli.options import Compile, Out, can_compile, results_folder
-from adaptive_flot.cli.targets import check_targets, in_folder, scenario_inputs
+from adaptive_flot.targets import check_targets, in_folder, scenario_inputs
 
 INTERRUPTED = 130
 
@@ -49,4 +49,4 @@ def sweep(
         sys.stderr.write(f"adaptive-flot: interrupted; results so far are in {folder}, the same command goes on\n")
         sys.exit(end.exit_code if isinstance(end, Terminated) else INTERRUPTED)
     print_study(outcome.table)
-    typer.echo(f"{len(outcome.table)} runs, {outcome.found} of them from before: {folder / 'runs.parquet'}")
+    typer.echo(f"{len(outcome.table)} runs, {outcome.from_before} of them from before: {folder / 'runs.parquet'}")

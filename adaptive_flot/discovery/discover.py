@@ -182,7 +182,7 @@ def fit_without_report(state: State) -> State:
 
 
 def heed_report(state: State) -> State:
-    """Take a name back where the rows that chose nothing contradict it."""
+    """Take a name back where the held-out rows contradict it."""
     problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
     error = report_errors(problem, before, after, state.report_record)
     record = problem.record if state.report_record is None else state.report_record

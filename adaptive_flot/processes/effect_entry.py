@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from adaptive_flot.errors import ModelError, located
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.yaml_part import Part
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class _Entry(_Part):
+class _Entry(Part):
     """A number and its unit; a bare number is one without a unit."""
 
     unit: str | None = None
@@ -51,7 +48,7 @@ class SettingEntry(_Entry):
         return self.value[0] if len(self.value) == 1 else tuple(self.value)
 
 
-class EffectEntry(_Part):
+class EffectEntry(Part):
     """One effect of a model file or a scenario; names as in `Effect`."""
 
     site: str

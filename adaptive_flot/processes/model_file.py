@@ -21,22 +21,19 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from adaptive_flot.errors import ModelError, located
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.effect_entry import EffectEntry, attach
 from adaptive_flot.yaml_files import read_yaml
+from adaptive_flot.yaml_part import Part
 from adaptive_flot.yaml_problems import first_problem
 
 SUFFIXES = (".yaml", ".yml")
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class ParameterEntry(_Part):
+class ParameterEntry(Part):
     """A parameter that differs from the process's own."""
 
     value: float
@@ -44,7 +41,7 @@ class ParameterEntry(_Part):
     source: str
 
 
-class ModelFile(_Part):
+class ModelFile(Part):
     """Keys of a model file."""
 
     note: str | None = None

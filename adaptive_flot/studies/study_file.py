@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from adaptive_flot.errors import StudyError, located, near_match
 from adaptive_flot.plugins import module_file
@@ -17,17 +17,14 @@ from adaptive_flot.runner.scenario.keys import LARGEST_SEED, Plugin, Seed
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.yaml_files import read_yaml
+from adaptive_flot.yaml_part import Part
 from adaptive_flot.yaml_problems import first_problem
 
 MOST_SEEDS = 1_000_000
 """Largest study: its list of runs still fits into memory."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Seeds(_Part):
+class Seeds(Part):
     """`{first: 1, count: 1000}`, or a plain list of numbers."""
 
     first: Seed = 1
@@ -61,7 +58,7 @@ Plugins = Annotated[dict[str, Plugin | None], BeforeValidator(_names_alone)]
 """A list of names, or names with `use` and `options`; a name alone stands for the one of the scenario."""
 
 
-class StudyFile(_Part):
+class StudyFile(Part):
     """Keys of a study file."""
 
     description: str

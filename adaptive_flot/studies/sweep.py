@@ -51,7 +51,7 @@ class Outcome:
 
     table: pd.DataFrame
     timings: pd.DataFrame
-    found: int
+    from_before: int
 
 
 def sweep(
@@ -164,11 +164,11 @@ def _results(client: Client, groups: Sequence[_Group]) -> Iterator[list[worker.R
 
     top_up()
     for batch in finished.batches():
-        found = [_result(what, heads.pop(str(future.key))) for future, what in batch]
-        good = [r for r in found if isinstance(r, worker.Result)]
+        results = [_result(what, heads.pop(str(future.key))) for future, what in batch]
+        good = [r for r in results if isinstance(r, worker.Result)]
         if good:
             yield good
-        for error in (e for e in found if isinstance(e, BaseException)):  # after the good ones of the batch are safe
+        for error in (e for e in results if isinstance(e, BaseException)):  # after the good ones of the batch are safe
             raise error
         top_up()
 
@@ -188,11 +188,11 @@ def _submit(client: Client, group: _Group, token: str) -> Iterator[tuple[AnyFutu
         yield future, {**names, "controller": controller, "estimator": case.estimator, "seed": seed}
 
 
-def _result(found: Any, head: dict[str, Any]) -> worker.Result | BaseException:
+def _result(returned: Any, head: dict[str, Any]) -> worker.Result | BaseException:
     """Result of a run, or the error that ends the study."""
-    if isinstance(found, worker.Result):
-        return found
-    error: BaseException = found[1] if isinstance(found, tuple) else found
+    if isinstance(returned, worker.Result):
+        return returned
+    error: BaseException = returned[1] if isinstance(returned, tuple) else returned
     if isinstance(error, KilledWorker):
         message = f"the worker process died {error.allowed_failures + 1} times with this run (too little memory?)"
         return worker.Result({**head, "outcome": "failed", "message": message}, {"run": head["run"]})

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import adaptive_flot as af
 from adaptive_flot.api.finding import Finding
-from adaptive_flot.errors import ModelError, ResultError
+from adaptive_flot.errors import ModelError, OutputError, ResultError
 from tests.discovery.heated import EXPONENT, Truth, heated_tank, tank_record
 
 ROOT = Path(__file__).parents[2]
@@ -65,6 +65,8 @@ def test_the_extended_model_is_saved_and_simulates_to_the_bit(
     monkeypatch.chdir(ROOT)
     with pytest.raises(ModelError, match="base='my_file:make_model'"):
         finding.save(tmp_path / "extended.yaml")
+    with pytest.raises(OutputError, match="is a folder"):
+        finding.save(tmp_path, base="tests/discovery/heated:heated_tank")
     path = finding.save(tmp_path / "extended.yaml", base="tests/discovery/heated:heated_tank")
     inputs = tank_table(50).drop(columns="temperature_K")
     before, after = (af.simulate(model, inputs).table["temperature_K"] for model in (finding.model, path))

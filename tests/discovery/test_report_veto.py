@@ -1,4 +1,4 @@
-"""Protects: what rows that chose nothing contradict is never told as a name."""
+"""Protects: what held-out rows contradict is never told as a name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verification on rows that chose nothing, and the word that ranked alternatives amount to: made by hand."""
+"""Verification on held-out rows, and the word that ranked alternatives amount to: made by hand."""
 
 from __future__ import annotations
 

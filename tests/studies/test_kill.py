@@ -136,7 +136,7 @@ def test_killed_scheduler(slow: Path, undisturbed: pd.DataFrame) -> None:
     kept = lost.done()
     assert 3 <= len(kept) < SEEDS
     found = sweep(load_study(slow / "study.yaml"), slow / "out")
-    assert found.found == len(kept)
+    assert found.from_before == len(kept)
     assert_frame_equal(found.table, undisturbed)
 
 

@@ -57,14 +57,14 @@ def test_a_finished_study_runs_nothing_and_a_grown_one_only_what_is_new(
 ) -> None:
     first = run(write_study({"seeds.count": 2}))
     grown = run(write_study())
-    assert (first.found, grown.found, len(grown.table)) == (0, 4, 6)
+    assert (first.from_before, grown.from_before, len(grown.table)) == (0, 4, 6)
     assert grown.table["seed"].tolist() == [1, 1, 2, 2, 3, 3]
     whole = run(write_study(), "whole")
     out = write_study().parent
     assert (out / "out" / "runs.parquet").read_bytes() == (out / "whole" / "runs.parquet").read_bytes()
     monkeypatch.setattr(worker, "run", None)  # nothing may run now
     again = run(write_study())
-    assert again.found == 6
+    assert again.from_before == 6
     assert_frame_equal(again.table, whole.table)
 
 
@@ -96,7 +96,7 @@ def test_a_run_that_fails_is_a_row_and_can_be_tried_again(write_study: WriteStud
     (tmp_path / "broken").unlink()
     assert (run(study).table["outcome"] == "failed").sum() == 3
     retried = sweep(load_study(study), tmp_path / "out", retry_failed=True)
-    assert retried.found == 3 and (retried.table["outcome"] == "ok").all()
+    assert retried.from_before == 3 and (retried.table["outcome"] == "ok").all()
     assert retried.table["run"].tolist() == first.table["run"].tolist()
 
 
@@ -149,7 +149,7 @@ def test_changed_content_is_refused_with_what_changed(write_study: WriteStudy) -
     run(write_study())
     with pytest.raises(StudyError, match=r"scenario 'short' .* has changed"):
         run(write_study(scenario={"measurements.level.noise_std": 5.0e-3}))
-    assert run(write_study()).found == 6
+    assert run(write_study()).from_before == 6
 
 
 def test_compiled_runs_have_the_fits_of_plain_ones_and_do_not_mix_with_them(
@@ -174,7 +174,7 @@ def test_two_sweeps_do_not_write_to_one_folder(write_study: WriteStudy) -> None:
     file = write_study()
     with locked(file.parent / "out"), pytest.raises(StudyError, match="another sweep"):
         run(file)
-    assert run(file).found == 0
+    assert run(file).from_before == 0
 
 
 def test_compare_reads_a_study_finished_or_not(write_study: WriteStudy, tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ class Verdict:
     members
         (site, driver) of each member of a class.
     error
-        Free-run error of each output on the split that chose nothing.
+        Free-run error of each output on the held-out split.
     report_times
         First and last time [s] of each part of the record in that split; empty when another record reported.
     tests

@@ -1,4 +1,4 @@
-"""The report split has a veto: what rows that chose nothing contradict is not told as a name.
+"""The report split has a veto: what held-out rows contradict is not told as a name.
 
 A name is contradicted where an output gets worse on these rows, or where no output surely gets better. A free curve in
 time at a sensor must also hold on the last of these rows, which lie beyond all that it was fitted to: such a curve can
@@ -45,10 +45,10 @@ def contradiction(judgement: Judgement, changes: Sequence[OutputChange], noise: 
     worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
-        return f"on rows that chose nothing it makes the error larger ({said})"
+        return f"on held-out rows it makes the error larger ({said})"
     if not any(c.reduction95[0] > 0 for c in changes):
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
-        return f"on rows that chose nothing no output surely gets better ({said})"
+        return f"on held-out rows no output surely gets better ({said})"
     return ""
 
 

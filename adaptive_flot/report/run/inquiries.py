@@ -62,7 +62,8 @@ def _sentence(case: CaseRuns, i: Inquiry) -> str:
         f"{style.amount(before, units[name])} to {style.amount(after, units[name])}"
         for name, (before, after) in i.errors.items()
     ]
-    judged = f"; on the rows from {ended} to {number(i.judged_s, 'g')} s, which chose nothing, {', '.join(changes)}"
+    held_out = f"the held-out rows from {ended} to {number(i.judged_s, 'g')} s"
+    judged = f"; on {held_out} {', '.join(changes)}"
     return (
         f"at {number(i.alarm_s, 'g')} s the innovations were no longer white: {tests}. The record from {began} to "
         f"{ended} s was searched; verdict at {number(i.judged_s, 'g')} s: {_told(i)}. The model in use was "

@@ -58,11 +58,18 @@ def write_runs(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[
     list of Path
         The time series.
     """
-    paths = []
     for run in runs:
-        name = f"{run.estimator}_{run.controller}_seed{run.seed}".replace(":", "-").replace("/", "-")
-        paths.append(folder / f"{name}{suffix}")
-        write_table(run.table, paths[-1])
+        write_table(run.table, folder / f"{_stem(run)}{suffix}")
         if not run.plans.empty:
-            write_table(run.plans, folder / f"{name}_plans{suffix}")
-    return paths
+            write_table(run.plans, folder / f"{_stem(run)}_plans{suffix}")
+    return [folder / f"{_stem(run)}{suffix}" for run in runs]
+
+
+def run_files(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[Path]:
+    """All files that `write_runs` will write."""
+    plans = [folder / f"{_stem(run)}_plans{suffix}" for run in runs if not run.plans.empty]
+    return [*(folder / f"{_stem(run)}{suffix}" for run in runs), *plans]
+
+
+def _stem(run: Run) -> str:
+    return f"{run.estimator}_{run.controller}_seed{run.seed}".replace(":", "-").replace("/", "-")

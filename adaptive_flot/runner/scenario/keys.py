@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
+from pydantic import Field, PrivateAttr
 
 from adaptive_flot.plugins import ESTIMATORS, construct, load
 from adaptive_flot.processes.effect_entry import EffectEntry
@@ -14,17 +14,14 @@ from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.faults import Fault
 from adaptive_flot.runner.scenario.profiles import InputProfile, ParameterProfile
+from adaptive_flot.yaml_part import Part
 
 LARGEST_SEED = 2**63 - 1
 """Seeds are a column of 64-bit integers in the table of runs."""
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Measurement(_Part):
+class Measurement(Part):
     """One measured output: noise in the output's unit, how often it is measured, and when the value is known."""
 
     noise_std: float = Field(ge=0)
@@ -36,7 +33,7 @@ class Measurement(_Part):
     """A value that repeats itself to the bit for so long counts as missing; default it is believed."""
 
 
-class DisturbancePart(_Part):
+class DisturbancePart(Part):
     """What is known of an input or plant parameter that the controller does not choose.
 
     A measurement is averaged over the interval that ends at its sample, repeated every `every_s` (default every sample)
@@ -50,7 +47,7 @@ class DisturbancePart(_Part):
     dead_time_s: float = Field(default=0.0, ge=0)
 
 
-class PlantPart(_Part):
+class PlantPart(Part):
     """How the plant is simulated (`fast` is the Runge-Kutta step, `accurate` IDAS on the DAE), and its effects."""
 
     integrator: Literal["fast", "accurate"] = "fast"
@@ -58,14 +55,14 @@ class PlantPart(_Part):
     """All effects of the plant, instead of those of the model; default the plant has the effects of the model."""
 
 
-class Adapt(_Part):
+class Adapt(Part):
     """Adapted parameters and the outputs that drive the adaptation."""
 
     parameters: list[str] = Field(min_length=1)
     outputs: list[str] = Field(min_length=1)
 
 
-class InitialEstimate(_Part):
+class InitialEstimate(Part):
     """First estimate: batch fit of the record up to a time, from a guess that is not the truth."""
 
     method: str = "pem"
@@ -74,7 +71,7 @@ class InitialEstimate(_Part):
     options: dict[str, Any] = Field(default_factory=dict)
 
 
-class Plugin(_Part):
+class Plugin(Part):
     """An estimator or controller: shipped name or `my_file:MyClass`, and its options."""
 
     use: str
@@ -125,7 +122,7 @@ class Plugin(_Part):
         return factory
 
 
-class LimitsPart(_Part):
+class LimitsPart(Part):
     """Limits of the closed loop; columns carry the units."""
 
     concentrate_grade: float = Field(ge=0, le=1)
@@ -134,7 +131,7 @@ class LimitsPart(_Part):
     largest_move: dict[str, Annotated[float, Field(gt=0)]]
 
 
-class EconomicsPart(_Part):
+class EconomicsPart(Part):
     """Prices in currency units: per kg of valuable mineral, per kg of concentrate, per m3 of air, per m3 of feed."""
 
     metal_per_kg: float = Prices().metal
@@ -143,21 +140,21 @@ class EconomicsPart(_Part):
     reagent_per_m3: float = Prices().reagent
 
 
-class CaseEntry(_Part):
+class CaseEntry(Part):
     """One combination to run."""
 
     estimator: str
     controller: str
 
 
-class Published(_Part):
+class Published(Part):
     """Published fits by estimator name, and their source, for the report."""
 
     source: str
     fits: dict[str, dict[str, float]]
 
 
-class ScenarioFile(_Part):
+class ScenarioFile(Part):
     """Keys of a scenario file."""
 
     description: str

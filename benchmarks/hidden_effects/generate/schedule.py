@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.hidden_effects.cell.sites import SENSOR_SITES
 from benchmarks.hidden_effects.effects.beyond import KINDS as BEYOND
 from benchmarks.hidden_effects.effects.catalogue import CATALOGUE, Entry
 
@@ -50,7 +51,7 @@ def pair_entries(seed: int, k: int) -> tuple[Entry, Entry]:
     first = CATALOGUE[order[at % len(CATALOGUE)]]
     for step in range(1, len(CATALOGUE)):
         second = CATALOGUE[order[(at + step) % len(CATALOGUE)]]
-        sensors = sum(e.site.endswith("_sensor") for e in (first, second))
+        sensors = sum(e.site in SENSOR_SITES for e in (first, second))
         froth = {first.site, second.site} == {"coalescence", "growth_exponent"}
         if second.site != first.site and sensors < 2 and not froth:
             return first, second

@@ -1,4 +1,7 @@
-"""What a command will write, checked before any work: nothing that it reads is overwritten, and all can be written."""
+"""What a command or a result will write, checked before any work.
+
+Nothing that was read is overwritten, and all can be written.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +22,14 @@ Identity = tuple[int, int] | str
 
 
 def check_targets(inputs: Iterable[Path | None], targets: Iterable[tuple[str, Path | None]]) -> None:
-    """Check what a command will write. Nothing is made or changed.
+    """Check what will be written. Nothing is made or changed.
 
     Parameters
     ----------
     inputs
-        Files that the command reads; None and what does not exist count for nothing.
+        Files that are or were read; None and what does not exist count for nothing.
     targets
-        Option and file for each file that it will write; None where the option was not given.
+        Option or function, and file, for each file that will be written; None where the option was not given.
 
     Raises
     ------
