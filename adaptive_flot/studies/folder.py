@@ -2,12 +2,13 @@
 
 ==================== =========================================================================================
 `study.json`         the grid: cases with their hashes, seeds, options
-`parts/*.parquet`    results as they come in: `<number>-runs.parquet` and, apart, what depends on the machine and the
-                     hour, `<number>-timings.parquet`; both carry the column `run`
-`runs.parquet`       all results in the order of the grid, once the study is complete: the same bytes whatever the
-                     number of workers and interruptions
+`parts/*.parquet`    results as they come in, `<number>-runs.parquet`, and times, `<number>-timings.parquet`
+`runs.parquet`       all results in the order of the grid, once the study is complete
 `timings.parquet`    times of the runs
 ==================== =========================================================================================
+
+Both kinds of parts carry the column `run`. What depends on the machine and the hour is in the timings only, so
+`runs.parquet` has the same bytes whatever the number of workers and interruptions.
 
 Every file is written whole under another name and then renamed. Files are merged before the merged ones go, so a kill
 at any moment leaves each run at least once; readers take the first row of each run.
