@@ -35,7 +35,8 @@ from adaptive_flot.greybox.scope import Site
 from adaptive_flot.greybox.sensors import without_sensor_effects
 from adaptive_flot.greybox.steady_state import SteadyState, steady_state, steady_state_gradient
 from adaptive_flot.greybox.stepping.record import RecordSimulator
-from adaptive_flot.greybox.stepping.stepper import Sensitivities, Stepper, Trajectory
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
 
 __all__ = [
     "Dataset",

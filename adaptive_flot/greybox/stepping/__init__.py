@@ -4,6 +4,7 @@ Map
 ---
 step_functions.py  The compiled functions of one interval: the step, its derivatives, many in a row.
 stepper.py    Simulation of a record, with or without sensitivities.
+trajectory.py What a simulation returns.
 fast_step.py  The same in fewer operations, where the model allows.
 compiled.py   Machine code with the system's C compiler, and its cache.
 fastcall.py   Calls of a compiled function without copies.

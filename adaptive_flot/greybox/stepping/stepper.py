@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
@@ -25,48 +25,13 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping import step_functions
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.step_functions import Interval
+from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
 
 MOST_UNROLLED = 4
 """Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
 ten of them, with derivatives, takes longer to make than a record takes to simulate."""
 CHUNK = 64
 """Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """A simulated record of N rows, each at the end of an interval.
-
-    Attributes
-    ----------
-    time
-        Time of each row [s] (N,).
-    states, outputs, signals
-        Their values (N, nx), (N, ny) and (N, ns), in the model's units.
-    """
-
-    time: FloatArray
-    states: FloatArray
-    outputs: FloatArray
-    signals: FloatArray
-
-
-@dataclass(frozen=True)
-class Sensitivities:
-    """A simulated record of N rows and its derivatives for q unknowns.
-
-    Attributes
-    ----------
-    outputs, gradient
-        Outputs (N, ny) and their derivatives (N, ny, q).
-    last_state, last_state_gradient
-        State at the end (nx,) and its derivatives (nx, q).
-    """
-
-    outputs: FloatArray
-    gradient: FloatArray
-    last_state: FloatArray
-    last_state_gradient: FloatArray
 
 
 class Stepper:
