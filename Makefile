@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check format docs bench bench-discovery bench-discovery-quick bench-measured lock clean
+.PHONY: help install demo live-demo test check format docs bench bench-discovery bench-discovery-quick bench-live bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -43,6 +43,9 @@ docs: $(READY) ## Build the documentation site in build/docs
 	$(BIN)/python -m sphinx -q -W --keep-going -j auto -b html docs build/docs
 	@echo "Built: build/docs/index.html"
 
+live-demo: $(READY) ## Run a test plant and a live link beside it until Ctrl-C
+	@$(BIN)/python -m adaptive_flot.live.demo
+
 bench: $(READY) ## Run the benchmarks
 	@$(BIN)/python -m benchmarks
 
@@ -51,6 +54,9 @@ bench-discovery: $(READY) ## Judge 300 records with a hidden effect, rivals besi
 
 bench-discovery-quick: $(READY) ## The same on the first 30 records, one rival (minutes)
 	@$(BIN)/python -m benchmarks.hidden_effects full --count 30 --method drift --out results/hidden-effects-quick $(BENCH_ARGS)
+
+bench-live: $(READY) ## The live link under faults: unsafe writes, lost rows, times (minutes)
+	@$(BIN)/python -m benchmarks.live $(BENCH_ARGS)
 
 bench-measured: $(READY) ## Discovery on measured records and shared examples in ../shared (minutes)
 	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)

@@ -23,6 +23,9 @@ def serve_plant(
     switch: Annotated[str, typer.Option(help="Operator's switch at the start: off, monitor, advisory, closed.")] = (
         "monitor"
     ),
+    auto_operator: Annotated[
+        bool, typer.Option("--auto-operator", help="Simulate an operator who lets the link go to closed.")
+    ] = False,
     write_link: Annotated[Path | None, typer.Option("--write-link", help="Write a link file for this plant.")] = None,
 ) -> None:
     """Play a scenario as a plant with an OPC UA server: a test plant for `live`."""
@@ -38,4 +41,13 @@ def serve_plant(
         check_targets([loaded.path], [("--write-link", write_link)])
         write_text(write_link, link_text(loaded, place.url, certificates.absolute(), speed=speed))
         typer.echo(f"Link file: {write_link}")
-    serve(loaded, place, seed=seed, speed=speed, hours=hours, switch=switch, say=typer.echo)
+    serve(
+        loaded,
+        place,
+        seed=seed,
+        speed=speed,
+        hours=hours,
+        switch=switch,
+        auto_operator=auto_operator,
+        say=typer.echo,
+    )

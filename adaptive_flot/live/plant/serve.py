@@ -9,6 +9,7 @@ from dataclasses import replace
 from adaptive_flot.errors import LinkError, near_match
 from adaptive_flot.live.link_file import MODES
 from adaptive_flot.live.loop import quiet_libraries, until_stopped
+from adaptive_flot.live.plant.operator import Operator
 from adaptive_flot.live.plant.process import TestPlant
 from adaptive_flot.live.plant.server import PlantServer, ServerPlace
 from adaptive_flot.runner.scenario.checks import check_scenario
@@ -24,6 +25,7 @@ def serve(
     speed: float = 1.0,
     hours: float | None = None,
     switch: str = "monitor",
+    auto_operator: bool = False,
     say: Callable[[str], None] = print,
 ) -> None:
     """Play a scenario behind a server.
@@ -42,6 +44,8 @@ def serve(
         Length of the run [h]; default the scenario's. Longer than it, inputs and parameters stay where they end.
     switch
         The operator's switch at the start.
+    auto_operator
+        A simulated operator lets the link go to closed, and again after it has shed.
     say
         Told once where the server listens, and once when the scenario is over.
 
@@ -58,7 +62,9 @@ def serve(
         check_scenario(scenario)
     plant = TestPlant(Realisation(scenario, seed))
     quiet_libraries()
-    asyncio.run(_serve(PlantServer(plant, place), speed, switch, say))
+    server = PlantServer(plant, place)
+    server.operator = Operator() if auto_operator else None
+    asyncio.run(_serve(server, speed, switch, say))
 
 
 async def _serve(server: PlantServer, speed: float, switch: str, say: Callable[[str], None]) -> None:

@@ -17,6 +17,7 @@ from asyncua.common.utils import ServiceError
 from adaptive_flot.contracts import PlantRecord
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.certificates import LINK, OPERATOR, PLANT, USERS, identity, password_file, read_password
+from adaptive_flot.live.plant.operator import Operator
 from adaptive_flot.live.plant.process import ProcessState, TestPlant
 from adaptive_flot.live.plant.tags import (
     LINK_ASKS,
@@ -77,12 +78,18 @@ class PlantServer:
     ----------
     state
         Plant and panel after the last interval.
+    link_mode
+        What the link last told of its mode.
+    operator
+        Turns the mode switch after each interval; None: nobody but a client does.
     """
 
     def __init__(self, plant: TestPlant, place: ServerPlace, distort: Distort = as_told) -> None:
         self.plant, self.place = plant, place
         self.state: ProcessState = plant.init()
         self.started = float(round(datetime.now(UTC).timestamp()))
+        self.link_mode = ""
+        self.operator: Operator | None = None
         self._distort = distort
         self._tags = {tag.name: tag for tag in plant_tags(plant.scenario)}
         self._by_id: dict[ua.NodeId, Tag] = {}
@@ -121,6 +128,10 @@ class PlantServer:
     async def interval(self) -> PlantRecord:
         """One sampling interval of the plant, published; the heartbeat comes last."""
         self.state, record = self.plant.interval(self.state)
+        if self.operator is not None:
+            self.operator, switch = self.operator.next(self.link_mode)
+            panel, _ = self.plant.panel.operated(self.state.panel, "switch", switch)
+            self.state = replace(self.state, panel=panel)
         sample = record.sample
         model = self.plant.scenario.model
         for j, q in enumerate(model.inputs):
@@ -214,6 +225,8 @@ class PlantServer:
                 or tag.writer != event.user.name
             ):
                 raise ServiceError(ua.StatusCodes.BadUserAccessDenied)
+            if item.Value is not None and item.Value.StatusCode is not None and not item.Value.StatusCode.is_good():
+                raise ServiceError(ua.StatusCodes.BadWriteNotSupported)
             value = item.Value.Value.Value if item.Value is not None and item.Value.Value is not None else None
             kind = TYPES.get(tag.kind, ua.VariantType.Double)
             if value is None or item.Value.Value.VariantType is not kind or isinstance(value, list):
@@ -224,7 +237,9 @@ class PlantServer:
                 panel = self.plant.panel.beat(panel, int(value))
             elif tag.name == LINK_ASKS:
                 panel = self.plant.panel.asked(panel, bool(value))
-            elif tag.name != LINK_MODE:
+            elif tag.name == LINK_MODE:
+                self.link_mode = str(value)
+            else:
                 panel, why = self.plant.panel.operated(panel, tag.name.removeprefix("plant."), float(value))
                 if why:
                     raise ServiceError(ua.StatusCodes.BadOutOfRange)

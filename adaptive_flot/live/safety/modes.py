@@ -102,7 +102,7 @@ class CycleFacts:
         checks = (
             (self.alive, "no new sample from the plant"),
             (self.measured or not self.alive, "a value that a move needs is missing"),
-            (self.solved or not (self.alive and self.measured), "no valid decision"),
+            (self.solved or not (self.alive and self.measured), "no estimate, or no valid decision"),
             (self.in_time, "the cycle before took too long"),
             (self.written, "a write was refused or read back differently"),
             (self.switch is not None or not self.alive, "the operator's switch can not be read"),
