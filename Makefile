@@ -61,6 +61,7 @@ bench-live: $(READY) ## The live link under faults: unsafe writes, lost rows, ti
 bench-measured: $(READY) ## Discovery on measured records and shared examples in ../shared (minutes)
 	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)
 	@$(BIN)/python -m benchmarks.mining_plant
+	@$(BIN)/python -m benchmarks.real_records
 
 lock: ## Pin the dependencies again in requirements.lock (uv, in a throw-away environment)
 	@$(require_python)

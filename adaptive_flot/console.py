@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from adaptive_flot.discovery.results import Discovery
+from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.kit import page as report
@@ -57,15 +57,15 @@ def stage_bar(label: str) -> Iterator[Callable[[str], None]]:
         yield lambda stage: progress.update(task, advance=1, description=f"{label}: {stage}")
 
 
-def print_discovery(found: Discovery) -> None:
+def print_verdict(verdict: Verdict) -> None:
     """Print the verdict in words and the error of each output before and after."""
     console = _console()
-    verdict = found.verdict
     console.print(Text.assemble((verdict.word, "bold"), f": {verdict.reason}"), highlight=False)
     for note in verdict.notes:
         console.print(f"- {note}", highlight=False)
     if verdict.error:
-        title = f"Free-run root mean square error, {verdict.split} split of the record"
+        where = verdict.split if " " in verdict.split else f"{verdict.split} split of the record"
+        title = f"Free-run root mean square error, {where}"
         table = Table(title=title, title_justify="left")
         for heading in ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval"):
             table.add_column(heading, justify="left" if heading in ("output", "unit") else "right")

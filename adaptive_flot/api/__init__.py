@@ -8,6 +8,7 @@ Map
 runs.py         `run`, and its result `Runs`.
 estimation.py   `estimate`, and its result `Estimation`.
 finding.py      `discover`, and its result `Finding`.
+changes.py      The result of `discover` with references or several records, `Change`.
 simulation.py   `simulate`, and its result `Simulation`.
 importing.py    `import_record`, and its result `ImportedRecord`.
 models.py       A model from what the user gave: a `Model`, a name, or the address of a file.

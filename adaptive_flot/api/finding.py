@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import pandas as pd
 
+from adaptive_flot.api.changes import Change
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.progress import staged
-from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_files, record_name
+from adaptive_flot.api.records import AnyMap, AnyRecord, SeveralRecords, read_map, record_files, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery, Verdict
 from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
-from adaptive_flot.errors import ResultError
+from adaptive_flot.errors import DataError, ModelError, ResultError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.runner.commands.discover import discover_file
+from adaptive_flot.runner.commands.discover_records import discover_records
 from adaptive_flot.targets import check_targets
 
 if TYPE_CHECKING:
@@ -188,6 +190,7 @@ class Finding:
         return effect_curves(d.problem, d.after, len(d.judgement.best.names))
 
 
+@overload
 def discover(
     model: AnyModel,
     data: AnyRecord,
@@ -196,20 +199,58 @@ def discover(
     tag_map: AnyMap | None = None,
     processes: int | None = None,
     progress: bool = False,
-) -> Finding:
-    """Find what physical effect a model lacks, from a measured record.
+) -> Finding: ...
+
+
+@overload
+def discover(
+    model: AnyModel,
+    data: AnyRecord,
+    *,
+    references: Sequence[AnyRecord],
+    tag_map: AnyMap | None = None,
+    processes: int | None = None,
+    progress: bool = False,
+) -> Change: ...
+
+
+@overload
+def discover(
+    model: AnyModel,
+    data: SeveralRecords,
+    *,
+    references: Sequence[AnyRecord] = (),
+    tag_map: AnyMap | None = None,
+    processes: int | None = None,
+    progress: bool = False,
+) -> Change: ...
+
+
+def discover(
+    model: AnyModel,
+    data: AnyRecord | SeveralRecords,
+    *,
+    references: Sequence[AnyRecord] = (),
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    tag_map: AnyMap | None = None,
+    processes: int | None = None,
+    progress: bool = False,
+) -> Finding | Change:
+    """Find what physical effect a model lacks, from a measured record; or what has changed since a reference.
 
     Parameters
     ----------
     model
         A `Model` with sites, the name of a process or cell, a YAML file, or "my_file:make_model".
     data
-        CSV or Parquet file, a DataFrame, or what `read_dataset` returned.
+        CSV or Parquet file, a DataFrame, or what `read_dataset` returned; or several of one process.
+    references
+        Records on which the model was right: constants and usual errors come from them.
     limits
         Lowest and highest value of inputs by name, in the input's unit, for the test that is proposed. Default: the
         test stays where the record has been.
     tag_map
-        Map file (or `TagMap`) of an export: from its tags to the model's quantities.
+        Map file (or `TagMap`) of exports: from their tags to the model's quantities.
     processes
         Fits that run at once; default as many as there are cores.
     progress
@@ -217,24 +258,35 @@ def discover(
 
     Returns
     -------
-    Finding
-        The verdict, the extended model, and the error before and after.
+    Finding or Change
+        The verdict, the extended model, and the error before and after: a `Change` with several records or references.
 
     Raises
     ------
     DataError, RangeError
-        The record can not be used.
+        A record can not be used.
     ModelError, CellError, PluginError
-        The model can not be used, or it has no sites.
+        The model can not be used, or it has no sites; limits with several records.
     """
+    records: list[AnyRecord] = list(data) if isinstance(data, (list, tuple)) else [data]
+    if not records:
+        raise DataError("discover: no record; give at least one")
+    name, workers = ", ".join(record_name(r) for r in records), processes or available_processes()
+    several = len(records) > 1 or bool(references)
+    if several and limits:
+        raise ModelError("limits: no test is proposed for several records; leave them out")
     made, origin = read_model(model)
-    sources = (*record_files(data, tag_map), *origin.files)
-    name, workers = record_name(data), processes or available_processes()
+    sources = (*(file for r in (*records, *references) for file in record_files(r, tag_map)), *origin.files)
+    tags = read_map(tag_map)
     with staged(progress, name) as advance:
-        if isinstance(data, Dataset):
-            found = search_record(made, data, limits=limits, processes=workers, progress=advance)
-        else:
-            found = discover_file(
-                data, made, limits=limits, tag_map=read_map(tag_map), processes=workers, progress=advance
+        if several:
+            compared = discover_records(
+                records, made, list(references), tag_map=tags, processes=workers, progress=advance
             )
-    return Finding(name, found, origin, sources)
+            return Change(name, compared, origin, sources)
+        one = records[0]
+        if isinstance(one, Dataset):
+            searched = search_record(made, one, limits=limits, processes=workers, progress=advance)
+        else:
+            searched = discover_file(one, made, limits=limits, tag_map=tags, processes=workers, progress=advance)
+    return Finding(name, searched, origin, sources)

@@ -13,6 +13,8 @@ from adaptive_flot.records.tag_map import TagMap, load_tag_map
 
 AnyRecord: TypeAlias = Path | str | pd.DataFrame | Dataset
 """A CSV or Parquet file, a table with the model's columns, or a record from `read_dataset`."""
+SeveralRecords: TypeAlias = list[AnyRecord] | tuple[AnyRecord, ...]
+"""Several records of one process."""
 AnyMap: TypeAlias = Path | str | TagMap
 """A map file, or a map at hand."""
 

@@ -1,4 +1,4 @@
-"""`adaptive-flot discover`: what physical effect a model lacks."""
+"""`adaptive-flot discover`: what physical effect a model lacks, or what has changed since a reference record."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from adaptive_flot.targets import check_targets, in_folder, model_inputs
 
 
 def discover(
-    data: Annotated[Path, typer.Argument(help="Measured record, CSV or Parquet; with --map an export.")],
+    data: Annotated[
+        list[Path],
+        typer.Argument(help="Measured record, CSV or Parquet, with --map an export; several are judged together."),
+    ],
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(help="Record on which the model was right (repeatable): tell what has changed since."),
+    ] = None,
     model: ModelOption = "flotation",
     cell: CellOption = None,
     map_: MapOption = None,
@@ -31,43 +38,57 @@ def discover(
     ] = None,
     report: Annotated[bool, typer.Option(help="Draw the report page too; a batch of records may do without.")] = True,
 ) -> None:
-    """Find what physical effect a model lacks, from a measured record, and show the error before and after."""
-    from adaptive_flot.console import print_discovery, stage_bar
+    """Find what physical effect a model lacks, from a measured record, and show the error before and after.
+
+    With a reference, or with several records, it tells what has changed, or what the model lacks in all of them.
+    """
+    from adaptive_flot.console import print_verdict, stage_bar
     from adaptive_flot.discovery.fitting.parallel import available_processes
+    from adaptive_flot.errors import ModelError
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.discover import check_model_path, discover_file, read_limits, save_discovered
+    from adaptive_flot.runner.commands.discover_records import discover_records, save_extended
     from adaptive_flot.runner.commands.run_files import write_json
 
     check_model_path(save_model)
-    folder = results_folder(out, data.stem, "discover")
+    references, first = list(reference or ()), data[0]
+    folder = results_folder(out, first.stem, "discover")
     check_targets(
-        [data, map_, *model_inputs(model, cell, data.parent)],
+        [*data, *references, map_, *model_inputs(model, cell, first.parent)],
         [*in_folder(folder, "verdict.json", "report.html"), ("--json", json), ("--save-model", save_model)],
     )
-    limits = read_limits(limit or ())
+    limits, several = read_limits(limit or ()), bool(references) or len(data) > 1
+    if several and limits:
+        raise ModelError("--limit: no test is proposed for several records; leave it out")
     tag_map = None if map_ is None else load_tag_map(map_)
-    made = make_model(model, cell=cell, folder=data.parent)
-    with stage_bar(data.stem) as progress:
-        found = discover_file(
-            data,
-            made,
-            limits=limits,
-            tag_map=tag_map,
-            processes=processes or available_processes(),
-            progress=progress,
-        )
+    made = make_model(model, cell=cell, folder=first.parent)
+    workers, page = processes or available_processes(), folder / "report.html"
+    name = ", ".join(path.stem for path in data)
+    with stage_bar(name) as progress:
+        if several:
+            compared = discover_records(data, made, references, tag_map=tag_map, processes=workers, progress=progress)
+            verdict = compared.verdict
+        else:
+            searched = discover_file(first, made, limits=limits, tag_map=tag_map, processes=workers, progress=progress)
+            verdict = searched.verdict
     for target in filter(None, (folder / "verdict.json", json)):
-        write_json(target, found.verdict.as_dict())
-    print_discovery(found)
+        write_json(target, verdict.as_dict())
+    print_verdict(verdict)
     if save_model is not None:
-        saved = save_discovered(found, data, save_model, base=model, cell=cell, folder=data.parent)
+        if several:
+            saved = save_extended(compared, name, save_model, base=model, cell=cell, folder=first.parent)
+        else:
+            saved = save_discovered(searched, first, save_model, base=model, cell=cell, folder=first.parent)
         typer.echo(f"Model: {save_model}" if saved else f"Model: {save_model} not written, nothing was fitted")
-    page = folder / "report.html"
     if not report:
         page.unlink(missing_ok=True)  # that of an earlier verdict
         return
     from adaptive_flot.report.discovery.page import write_discovery_report
+    from adaptive_flot.report.discovery.records import write_records_report
 
-    write_discovery_report(found, data.stem, page, command=command_line())
+    if several:
+        write_records_report(compared, name, page, command=command_line())
+    else:
+        write_discovery_report(searched, name, page, command=command_line())
     typer.echo(f"Report: {page}")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.console import print_discovery
+from adaptive_flot.console import print_verdict
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.test_design.experiment import plan_experiment
@@ -148,6 +148,6 @@ def test_page_and_command_line_tell_the_test(open_question: Discovery, capsys: p
     page = discovery_report(open_question, "tank")
     assert "Which input moves would tell" in page and planned.name in page
     assert all(f'<th scope="row" class="words">{t:g}</th>' in page for t, _ in planned.moves())
-    print_discovery(open_question)
+    print_verdict(open_question.verdict)
     said = " ".join(capsys.readouterr().out.split())
     assert planned.name in said and "heating by fan_speed" in said

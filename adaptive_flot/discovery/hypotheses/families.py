@@ -1,0 +1,232 @@
+"""What can be the matter at a site, by its role: one hypothesis is an effect with few coefficients and their starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.joint_fit import JointFit
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.scope import Site
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+Kind = Literal["stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "depends", "store"]
+STRUCTURE = ("depends", "store", "sign")
+"""What a plant has or has not: it does not come between a reference record and another one."""
+LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Levels at which a part may be stuck or leak, as shares of the range that its signal has been seen in."""
+GAINS = (-2.0, -0.7, -0.2, 0.2, 0.7)
+"""Starts of a constant factor, in its logarithm."""
+LAGS = (2.0, 10.0, 50.0)
+"""Starts of a time constant, in sampling intervals. A slower sensor would show next to nothing of what happens."""
+SLOPES = (-0.3, 0.3)
+"""Starts of the logarithm of a factor from the lowest to the highest value of a driver."""
+ENDS = (0.05, 0.95)
+"""Quantiles of a driver between which a dependence is drawn as a straight line."""
+WIDEST_SPAN = 0.3
+"""Largest error of a sensor's span: one that hardly answers at all is stuck, not wrongly calibrated."""
+WIDEST_OFFSET = 0.5
+"""Largest constant error of a sensor or actuator, as a share of the range it has been seen in: one that is further off
+has failed, which reads otherwise."""
+LONGEST_LAG = 0.1
+"""Longest time constant of a sensor, as a share of a record."""
+LEAST_MOVE = 1e-3
+"""A driver that moves by a smaller share of its size can not be told from a constant."""
+ROUNDING = 1e-3
+"""Rounding of corners, as a share of the range of the value."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One thing that may be the matter.
+
+    Attributes
+    ----------
+    site, driver, kind
+        Where it acts, what it depends on ("constant" where on nothing), and what it is.
+    effect
+        The effect, its amplitude at 1 where it is all or nothing.
+    free
+        Coefficients that are fitted.
+    starts
+        Values of these to start from; the best few are refined.
+    limits
+        Range of coefficients that is narrower than their form's.
+    """
+
+    site: str
+    driver: str
+    kind: Kind
+    effect: Effect
+    free: tuple[str, ...]
+    starts: tuple[Mapping[str, float], ...]
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Full names of the fitted coefficients."""
+        return tuple(self.effect.parameter(c) for c in self.free)
+
+    @property
+    def label(self) -> str:
+        """Name in tables: ``heating_valve leaks``."""
+        by = f" by {self.driver}" if self.kind in ("depends", "store") else ""
+        return f"{self.site} {self.kind}{by}"
+
+
+def hypotheses(
+    model: Model, seen: Mapping[str, FloatArray], drivers: Mapping[str, FloatArray], dt: float, duration: float
+) -> tuple[Hypothesis, ...]:
+    """Everything that the sites of a model allow, by their roles.
+
+    Parameters
+    ----------
+    model
+        The model, with sites.
+    seen, drivers
+        Values at each site and of each driver (N,), see `seen_values`. They are those of all records, so that a part
+        that does not move in one of them has the range of the others.
+    dt, duration
+        Sampling interval and length of the shortest record [s].
+    """
+    there = {e.label for e in model.effects}
+    each = [
+        _at_site(model, site, seen[site.name], drivers, dt, duration)
+        for site in model.sites
+        if np.isfinite(seen[site.name]).all()
+    ]
+    return tuple(h for some in each for h in some if h.effect.label not in there)
+
+
+def _at_site(
+    model: Model, site: Site, v: FloatArray, drivers: Mapping[str, FloatArray], dt: float, duration: float
+) -> Iterator[Hypothesis]:
+    low, high = float(v.min()), float(v.max())
+    spread, size = high - low, float(np.median(np.abs(v)))
+    moves = spread > LEAST_MOVE * max(size, 1e-300)
+    if site.role == "actuator" and moves:
+        yield from _stuck_or_leaking(site, low, spread)
+        yield _limited(site, low, spread)
+    if site.role == "sensor" and moves:
+        if low < 0 < high or low >= 0:
+            yield _sign(site, spread)
+        lag = _lag(site, size, dt, LONGEST_LAG * duration)
+        shortest = next(c.lower for c in lag.effect.terms if c.name == "time_constant")
+        if shortest < LONGEST_LAG * duration:
+            yield lag
+        yield _span(site, float(np.median(v)), spread)
+    if size > 0 and site.role != "sensor":
+        yield _gain(site)
+    if site.role in ("sensor", "actuator") and (spread > 0 or size > 0):
+        yield _offset(site, spread or size)
+    if site.role in ("process", "flow", "feed"):
+        for name, d in drivers.items():
+            if np.quantile(d, ENDS[1]) - np.quantile(d, ENDS[0]) > LEAST_MOVE * float(np.median(np.abs(d))):
+                yield _depends(site, name, d)
+    if site.role == "flow":
+        for state in model.states:
+            if state.name in drivers:
+                moved = float(np.ptp(drivers[state.name])) or 1.0
+                yield _store(site, state.name, moved, spread or size, dt)
+
+
+def _stuck_or_leaking(site: Site, low: float, spread: float) -> Iterator[Hypothesis]:
+    levels = tuple({"level": low + share * spread} for share in LEVELS)
+    yield Hypothesis(
+        site.name, "own_value", "stuck", Effect(site.name, "own_value", "stuck", {"amplitude": 1.0}), ("level",), levels
+    )
+    effect = Effect(
+        site.name, "own_value", "leak", {"amplitude": 1.0, "level": low}, {"width": ROUNDING * spread}
+    )  # fmt: skip
+    yield Hypothesis(site.name, "own_value", "leaks", effect, ("level",), levels[1:])
+
+
+def _limited(site: Site, low: float, spread: float) -> Hypothesis:
+    effect = Effect(
+        site.name, "saturation", "saturation", {"amplitude": 1.0, "limit": low + spread}, {"width": ROUNDING * spread}
+    )
+    return Hypothesis(
+        site.name,
+        "saturation",
+        "range",
+        effect,
+        ("limit",),
+        tuple({"limit": low + s * spread} for s in (0.3, 0.6, 0.9)),
+    )
+
+
+def _sign(site: Site, spread: float) -> Hypothesis:
+    effect = Effect(site.name, "own_value", "rectified", {}, {"width": ROUNDING * spread})
+    return Hypothesis(site.name, "own_value", "sign", effect, ("amplitude",), ({"amplitude": 1.0},))
+
+
+def _lag(site: Site, size: float, dt: float, longest: float) -> Hypothesis:
+    effect = Effect(site.name, "lag", "lag", {"amplitude": 1.0}, {"scale": size or 1.0})
+    starts = tuple({"time_constant": n * dt} for n in LAGS)
+    limits = {"time_constant": (0.0, longest)}
+    return Hypothesis(site.name, "lag", "lag", effect, ("time_constant",), starts, limits)
+
+
+def _span(site: Site, middle: float, spread: float) -> Hypothesis:
+    effect = Effect(site.name, "own_value", "span", settings={"middle": middle})
+    starts = tuple({"offset": o * spread, "slope": s} for o in (-0.3, 0.3) for s in (-0.2, 0.2))
+    limits = {"slope": (-WIDEST_SPAN, WIDEST_SPAN), "offset": (-WIDEST_OFFSET * spread, WIDEST_OFFSET * spread)}
+    return Hypothesis(site.name, "own_value", "span", effect, ("offset", "slope"), starts, limits)
+
+
+def _gain(site: Site) -> Hypothesis:
+    effect = Effect(site.name, "constant", "shift", mode="factor")
+    return Hypothesis(site.name, "constant", "gain", effect, ("amplitude",), tuple({"amplitude": g} for g in GAINS))
+
+
+def _offset(site: Site, spread: float) -> Hypothesis:
+    effect = Effect(site.name, "constant", "shift", mode="offset")
+    starts = tuple({"amplitude": s * spread} for s in (-0.3, 0.3))
+    limits = {"amplitude": (-WIDEST_OFFSET * spread, WIDEST_OFFSET * spread)}
+    return Hypothesis(site.name, "constant", "offset", effect, ("amplitude",), starts, limits)
+
+
+def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:
+    low, high = (float(np.quantile(d, q)) for q in ENDS)
+    effect = Effect(site.name, driver, "curve", settings={"knots": (low, high)}, mode="factor")
+    starts = tuple({"value_1": -slope, "value_2": slope} for slope in SLOPES)
+    return Hypothesis(site.name, driver, "depends", effect, ("value_1", "value_2"), starts)
+
+
+def _store(site: Site, state: str, moved: float, size: float, dt: float) -> Hypothesis:
+    effect = Effect(site.name, state, "store")
+    starts = tuple({"exchange": 0.3 * size / moved, "time_constant": n * dt} for n in (20.0, 100.0))
+    return Hypothesis(site.name, state, "store", effect, ("exchange", "time_constant"), starts)
+
+
+def seen_values(
+    model: Model, fit: JointFit, records: Sequence[Dataset]
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Values at every site, and of every driver, along the free runs of a fit, the records behind one another."""
+    stepper = Stepper(model, records[0].dt)
+    sites: list[FloatArray] = []
+    drivers: list[FloatArray] = []
+    names = model.drivers or (*model.names("inputs"), *model.names("states"))
+    p = model.with_parameters(fit.values).parameter_values
+    for record, x0 in zip(records, fit.initial, strict=True):
+        run = stepper.simulate(x0, record.inputs[1:], p, float(record.time[0]))
+        states, n = np.vstack([x0, run.states]), len(record)
+        columns = {**dict(zip(model.names("inputs"), record.inputs.T, strict=True)),
+                   **dict(zip(model.names("states"), states.T, strict=True))}  # fmt: skip
+        if model.signals:
+            columns |= {s.name: np.concatenate([[c[0]], c]) for s, c in zip(model.signals, run.signals.T, strict=True)}
+        drivers.append(np.column_stack([columns[d] for d in names if d in columns]))
+        z = model.ode.map(n)(record.time, states.T, record.inputs.T, np.tile(p[:, None], n))[3]
+        at = model.site_values.map(n)(record.time, states.T, record.inputs.T, np.tile(p[:, None], n), z)
+        sites.append(np.array(at).T)
+    together, moved = np.vstack(sites), np.vstack(drivers)
+    known = [d for d in names if d in {*model.names("inputs"), *model.names("states"), *model.names("signals")}]
+    return (
+        {s.name: together[:, i] for i, s in enumerate(model.sites)},
+        {d: moved[:, i] for i, d in enumerate(known)},
+    )

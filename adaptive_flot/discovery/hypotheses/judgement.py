@@ -1,0 +1,152 @@
+"""From tested hypotheses to a word."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from adaptive_flot.discovery.hypotheses.comparison import (
+    EXPLAINED,
+    Blocks,
+    blocks_of,
+    stands,
+    tied,
+)
+from adaptive_flot.discovery.hypotheses.cross_validation import Tested
+from adaptive_flot.discovery.hypotheses.rows import Rows
+from adaptive_flot.greybox.model import FloatArray
+
+Word = Literal["none", "named", "class", "abstain"]
+CHANCE = 0.95
+"""Quantile of what chance does."""
+DRAWS = 999
+LARGEST_CLASS = 3
+"""Parts that a class may hold at most."""
+
+
+@dataclass(frozen=True)
+class UsualLoss:
+    """What the model costs on its reference.
+
+    Attributes
+    ----------
+    losses
+        Mean loss of a row in each block of the reference records (b,).
+    constants
+        Number of constants and initial states that have a prior.
+    """
+
+    losses: FloatArray
+    constants: int
+
+    def exceeded(self, tested: Tested, count: int, blocks: int) -> str | None:
+        """What is larger on new rows than it would be by chance, in words; None where nothing is.
+
+        Chance: means of as many blocks, drawn from the reference (bootstrap), and constants that differ by what the
+        reference leaves open (chi-squared).
+        """
+        draws = np.random.default_rng(0).choice(self.losses, (DRAWS, max(blocks, 1))).mean(axis=1)
+        if (tested.total - tested.prior) / count > float(np.quantile(draws, CHANCE)):
+            return "its errors are larger than on the reference"
+        if tested.prior > float(chi2.ppf(CHANCE, self.constants)):
+            return "it needs constants that the reference excludes"
+        return None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What the tested hypotheses amount to.
+
+    Attributes
+    ----------
+    word
+        `none`, `named`, `class` or `abstain`.
+    best
+        The best hypothesis that stands; None where none does.
+    alike
+        Those that the records do not tell from it, of the same part and of others, best first.
+    why
+        What decided, in words, where the word is `none` or `abstain`.
+    explained
+        Share of what is above the usual level that the best one removes; NaN where there is none.
+    """
+
+    word: Word
+    best: Tested | None
+    alike: tuple[Tested, ...]
+    why: str
+    explained: float
+
+    @property
+    def parts(self) -> tuple[Tested, ...]:
+        """The simplest hypothesis of each site that is not told apart, the best site first."""
+        sites: dict[str, list[Tested]] = {}
+        for t in filter(None, (self.best, *self.alike)):
+            sites.setdefault(_site(t), []).append(t)
+        return tuple(min(each, key=lambda t: (len(t.fit.coefficients), t.total)) for each in sites.values())
+
+
+def _simplest(best: Tested, alike: tuple[Tested, ...]) -> tuple[Tested, tuple[Tested, ...]]:
+    """Of what is not told apart, the hypothesis with the fewest coefficients at the best one's site comes first."""
+    same = [best, *(t for t in alike if _site(t) == _site(best))]
+    first = min(same, key=lambda t: (len(t.fit.coefficients), t.total))
+    return first, tuple(t for t in (best, *alike) if t is not first)
+
+
+def _site(tested: Tested) -> str:
+    return tested.hypothesis.site if tested.hypothesis else ""
+
+
+def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss | None) -> tuple[Judged, Blocks]:
+    """Judge.
+
+    Parameters
+    ----------
+    rows
+        Records and rows.
+    null
+        The model as it is.
+    tested
+        The hypotheses.
+    usual
+        Losses of the reference; None where there is none.
+
+    Returns
+    -------
+    tuple
+        The judgement, and the blocks that it was made on.
+    """
+    blocks = blocks_of(rows, null.fresh)
+    count = rows.count
+    level = null.total / count
+    least = float(np.mean(usual.losses)) if usual is not None else float(len(rows.columns) / np.mean(rows.memory))
+    if usual is not None:
+        if usual.exceeded(null, count, len(blocks.edges)) is None:
+            return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
+    ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
+    standing = [t for t in ranked if stands(rows, blocks, null, t)]
+    if not standing:
+        why = "no single hypothesis makes the errors smaller on rows that did not fit it"
+        return Judged("abstain", None, tuple(ranked[:3]), why, float("nan")), blocks
+    best = standing[0]
+    excess = max(level - least, 1e-12)
+    explained = float((level - best.total / count) / excess)
+    rivals = [t for t in ranked if t is not best]
+    alike = tied(
+        blocks, null, best, rivals, usual is not None and usual.exceeded(best, count, len(blocks.edges)) is None
+    )
+    judged = Judged("named", best, alike, "", explained)
+    if ranked[0] is not best and not any(t is ranked[0] for t in alike):
+        why = "what fits best makes an output worse, so that something else is the matter"
+        return Judged("abstain", best, alike, why, explained), blocks
+    if explained < EXPLAINED:
+        why = f"the best one removes {100 * explained:.0f} % of what is unusual, so that something else is the matter"
+        return Judged("abstain", best, alike, why, explained), blocks
+    parts = len(judged.parts)
+    if parts > LARGEST_CLASS:
+        return Judged("abstain", best, alike, f"{parts} parts explain it about as well", explained), blocks
+    return Judged("named" if parts == 1 else "class", best, alike, "", explained), blocks

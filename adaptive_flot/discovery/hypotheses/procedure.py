@@ -1,0 +1,167 @@
+"""The stages: constants from the reference, the model as it is on the new records, hypotheses, judgement."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.parallel import one_thread, parallel_map
+from adaptive_flot.discovery.hypotheses.calibration import Calibration, calibrate
+from adaptive_flot.discovery.hypotheses.comparison import Blocks, blocks_of
+from adaptive_flot.discovery.hypotheses.cross_validation import (
+    REFRESH,
+    Fitted,
+    Tested,
+    fit_all_rows,
+    model_with,
+    refined,
+    test_on_stretches,
+    worth_testing,
+)
+from adaptive_flot.discovery.hypotheses.families import STRUCTURE, Hypothesis, hypotheses, seen_values
+from adaptive_flot.discovery.hypotheses.joint_fit import JointFit
+from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judge
+from adaptive_flot.discovery.hypotheses.known_before import loose_constants, scattered_starts
+from adaptive_flot.discovery.hypotheses.rows import Rows, measured_columns, rows_of
+from adaptive_flot.discovery.hypotheses.telling import verdict_of
+from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What several records say, and everything behind it.
+
+    Attributes
+    ----------
+    verdict
+        What to tell.
+    model
+        The model with what was named added; with the constants of the reference else.
+    calibration
+        Constants and usual errors; from the reference, or from the new records where there is none.
+    rows, blocks
+        The new records, and the blocks of rows that were judged.
+    null, tested
+        The model as it is, and every hypothesis, best first.
+    judged
+        The judgement before the words.
+    tried
+        Number of hypotheses that were fitted.
+    referred
+        Whether there was a reference.
+    """
+
+    verdict: Verdict
+    model: Model
+    calibration: Calibration
+    rows: Rows
+    blocks: Blocks
+    null: Tested
+    tested: tuple[Tested, ...]
+    judged: Judged
+    tried: int
+    referred: bool
+
+
+@one_thread()
+def compare(
+    model: Model,
+    records: Sequence[Dataset],
+    references: Sequence[Dataset] = (),
+    *,
+    adapted: Sequence[str] = (),
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Comparison:
+    """Find what has changed since a reference, or what a model lacks in several records of one process.
+
+    Parameters
+    ----------
+    model
+        The model, with sites.
+    records
+        New records of one process, each with an initial state of its own.
+    references
+        Records on which the model was right. Constants and the usual size of the errors come from them, and stay.
+        Without any, the constants are fitted to the new records together with each hypothesis.
+    adapted
+        Names of the constants that are fitted; default those of role "estimated".
+    processes
+        Hypotheses that are fitted at once.
+    progress
+        Called with a word for each stage.
+
+    Raises
+    ------
+    ModelError
+        No site.
+    DataError
+        No common output, or a record that the model can not simulate.
+    """
+    began = time.perf_counter()
+    if not model.sites:
+        raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
+    free = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
+    columns = measured_columns(model, (*records, *references))
+    progress("fit the constants")
+    calibration = calibrate(model, references or records, free, columns, records, local=bool(references))
+    sizes = [calibration.usual.sizes(r) for r in records] if references else calibration.rows.sizes
+    rows = rows_of(records, columns, sizes, calibration.rows.memory)
+    constants = calibration.constants if references else loose_constants(calibration.model, free)
+    refresh = REFRESH if references else 1
+    elsewhere = () if references else scattered_starts(model, constants)
+    progress("run the new records")
+    base = fit_all_rows(calibration.model, rows, None, constants, None, refresh=1)
+    assert base is not None  # the model as it is can be simulated: its constants were fitted
+    candidates = _candidates(calibration, base.fit, rows, bool(references))
+    progress(f"fit {len(candidates)} hypotheses")
+
+    def fit_one(h: Hypothesis) -> Fitted | None:
+        with np.errstate(all="ignore"):
+            return fit_all_rows(calibration.model, rows, h, constants, base.fit, refresh=refresh, elsewhere=elsewhere)
+
+    fitted = [f for f in parallel_map(fit_one, candidates, processes, lambda: progress("fit")) if f is not None]
+    near = worth_testing(base, fitted)
+    progress(f"test {len(near)} of them on fresh stretches")
+
+    def test_one(f: Fitted) -> Tested:
+        with np.errstate(all="ignore"):
+            near = refined(calibration.model, rows, f, refresh) if references and f.hypothesis else f
+            return test_on_stretches(calibration.model, rows, near, hold_constants=bool(references))
+
+    null, *results = parallel_map(test_one, [base, *near], processes, lambda: progress("test"))
+    tested = tuple(sorted(results, key=lambda t: t.total))
+    usual = _usual_losses(calibration) if references else None
+    judged, blocks = judge(rows, null, tested, usual)
+    verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
+    told = judged.word in ("named", "class") and judged.best is not None
+    best = judged.best if told and judged.best is not None else null
+    extended = model_with(calibration.model, best.hypothesis).with_parameters(best.fit.values)
+    return Comparison(
+        verdict, extended, calibration, rows, blocks, null, tested, judged, len(candidates), bool(references)
+    )
+
+
+def _candidates(calibration: Calibration, base: JointFit, rows: Rows, reference: bool) -> tuple[Hypothesis, ...]:
+    seen, drivers = dict(calibration.seen), dict(calibration.drivers)
+    if reference:
+        new, moved = seen_values(calibration.model, base, rows.records)
+        seen = {k: np.concatenate([v, new[k]]) for k, v in seen.items()}
+        drivers = {k: np.concatenate([v, moved[k]]) for k, v in drivers.items()}
+    dt = rows.records[0].dt
+    found = hypotheses(calibration.model, seen, drivers, dt, dt * min(map(len, rows.records)))
+    return tuple(h for h in found if not (reference and h.kind in STRUCTURE))
+
+
+def _usual_losses(calibration: Calibration) -> UsualLoss:
+    rows, errors = calibration.rows, calibration.fit.errors
+    blocks = blocks_of(rows, errors)
+    sums = blocks.sums([loss.sum(axis=1) for loss in rows.losses(errors)])
+    lengths = np.array([b - a for _, a, b in blocks.edges])
+    return UsualLoss(sums / lengths, len(calibration.constants.names))

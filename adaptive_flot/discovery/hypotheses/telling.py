@@ -1,0 +1,118 @@
+"""The verdict: word, first sentence, effects with intervals, errors before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.calibration import Calibration
+from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
+from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
+from adaptive_flot.discovery.hypotheses.judgement import Judged
+from adaptive_flot.discovery.hypotheses.rows import Rows
+from adaptive_flot.discovery.hypotheses.wording import words_of
+from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
+from adaptive_flot.greybox.model import Model
+
+ABOVE_NOISE = 3.0
+"""An error so many times the noise from row to row says that more is missing."""
+JUDGED_ON = "fresh stretches"
+
+
+def verdict_of(
+    calibration: Calibration,
+    rows: Rows,
+    blocks: Blocks,
+    null: Tested,
+    judged: Judged,
+    reference: bool,
+    seconds: float,
+) -> Verdict:
+    """Return what to tell: `reference` says whether there was one, `seconds` how long it took."""
+    model = calibration.model
+    told = judged.word in ("named", "class")
+    after = judged.best if judged.best is not None else null
+    old, new = rms(rows, null.fresh), rms(rows, after.fresh)
+    error = tuple(
+        OutputChange(
+            model.outputs[c].name, model.outputs[c].unit, float(old[j]), float(new[j]),
+            float(calibration.usual.overall[j]),
+            (r.low, r.high),
+        )
+        for j, c in enumerate(rows.columns)
+        for r in [reduction(blocks, j, null.fresh, after.fresh)]
+    )  # fmt: skip
+    effects = _effects(model, null, judged) if told else ()
+    members = tuple((t.hypothesis.site, t.hypothesis.driver) for t in judged.parts if t.hypothesis)
+    fitted = model.indices("parameters", calibration.constants.names)
+    labels = {model.parameters[i].label: model.parameters[i].value for i in fitted}
+    return Verdict(
+        word=judged.word,
+        reason=_reason(model, judged, reference, error),
+        effects=effects,
+        members=members if judged.word == "class" else (),
+        error=error,
+        split=JUDGED_ON,
+        parameters=labels,
+        notes=_left(calibration, error) if told else (),
+        seconds=seconds,
+    )
+
+
+def _left(calibration: Calibration, error: Sequence[OutputChange]) -> tuple[str, ...]:
+    """What stays open: errors that are still far above the noise from row to row."""
+    left = [
+        f"{c.output} {c.after / noise:.2g} times"
+        for c, noise in zip(error, calibration.noise, strict=True)
+        if c.after > ABOVE_NOISE * noise
+    ]
+    if not left:
+        return ()
+    return (f"More is missing: with it the error is still above the noise from row to row: {', '.join(left)}.",)
+
+
+def _effects(model: Model, null: Tested, judged: Judged) -> tuple[NamedEffect, ...]:
+    best = judged.best
+    assert best is not None and best.hypothesis is not None  # a verdict that tells has a best hypothesis
+    fitted = model_with(model, best.hypothesis).with_parameters(best.fit.values)
+    effect = fitted.fitted_effects()[-1]
+    count = len(best.values)
+    jack = np.sqrt((count - 1) * np.var(best.values, axis=0))
+    interval = {
+        c: (effect.coefficients[c] - 1.96 * float(s), effect.coefficients[c] + 1.96 * float(s))
+        for c, s in zip(best.hypothesis.free, jack, strict=True)
+    }
+    others = tuple(
+        (t.hypothesis.site, t.hypothesis.driver, t.total - best.total, float("nan"))
+        for t in judged.alike
+        if t.hypothesis is not None
+    )
+    del null
+    return (NamedEffect(effect, words_of(model, best), interval, others),)
+
+
+def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[OutputChange]) -> str:
+    changed = "has changed" if reference else "is missing"
+    if judged.word == "none":
+        return f"Nothing {changed} that these records show: {judged.why}."
+    if judged.word == "abstain":
+        near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis)
+        return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near or 'nothing'}."
+    said = [_part_in_words(model, judged, t) for t in judged.parts]
+    first = f"{said[0][0].upper()}{said[0][1:]}." if judged.word == "named" else _one_of(said)
+    helped = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}" for c in error)
+    return f"{first} Error on stretches that did not fit it: {helped}."
+
+
+def _part_in_words(model: Model, judged: Judged, best: Tested) -> str:
+    """The best hypothesis at a part, and in brackets the others there that are not told from it."""
+    assert best.hypothesis is not None  # the model as it is has no part
+    same = [t for t in judged.alike if t is not best and t.hypothesis and t.hypothesis.site == best.hypothesis.site]
+    site = best.hypothesis.site.replace("_", " ")
+    others = [words_of(model, t).removeprefix(f"{site} ") for t in same]
+    return words_of(model, best) + (f" (or {', or '.join(others)})" if others else "")
+
+
+def _one_of(said: Sequence[str]) -> str:
+    return f"One of these, which the records can not tell apart: {'; or '.join(said)}."

@@ -1,0 +1,154 @@
+"""The report of `discover` on several records: what has changed, the runs before and after, and what was tried."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.comparison import mean_difference
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.wording import words_of
+from adaptive_flot.files import write_text
+from adaptive_flot.report.kit import figures
+from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, number, render
+from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
+
+MOST_RECORDS = 5
+"""Records whose runs are drawn."""
+MOST_HYPOTHESES = 12
+TITLES = {
+    "none": "nothing has changed that the records show",
+    "named": "what has changed, by name",
+    "class": "one of a few parts has changed",
+    "abstain": "something has changed, but not told what",
+}
+WITHOUT_REFERENCE = {
+    "none": "no effect is missing",
+    "named": "a missing effect, by name",
+    "class": "one of a few effects is missing",
+    "abstain": "something is missing, but not told what",
+}
+
+
+def write_records_report(comparison: Comparison, name: str, path: Path | str, command: str = "") -> None:
+    """Write the report as a single HTML file without external parts.
+
+    Parameters
+    ----------
+    comparison
+        What `compare` returned.
+    name
+        What the records are called.
+    path
+        File to write, whole or not at all.
+    command
+        Command line that made it, for the footer.
+
+    Raises
+    ------
+    OutputError
+        The file can not be written.
+    """
+    write_text(Path(path), records_report(comparison, name, command))
+
+
+def records_report(comparison: Comparison, name: str, command: str = "") -> str:
+    """Return the page that `write_records_report` writes."""
+    verdict, album = comparison.verdict, Album()
+    titles = TITLES if comparison.referred else WITHOUT_REFERENCE
+    old = [r.name for r in comparison.calibration.rows.records] if comparison.referred else []
+    lead = f"Records: {name}." + (f" Reference: {', '.join(old)}." if old else "")
+    contents = [
+        ("verdict", "Verdict"),
+        ("errors", "Error before and after"),
+        ("hypotheses", "What was tried"),
+        ("constants", "Constants"),
+    ]
+    made = made_by(command, [("Model", comparison.calibration.model.name), ("Time", f"{verdict.seconds:.1f} s")])
+    return render(
+        "records.html",
+        Page(f"Discovery report: {titles[verdict.word]}", lead, contents, made),
+        word=verdict.word,
+        reason=verdict.reason,
+        notes=list(verdict.notes),
+        runs=_runs(comparison, album),
+        errors=_errors(comparison),
+        tried=_tried(comparison),
+        hypotheses=_hypotheses(comparison) if comparison.tested else None,
+        constants=_constants(comparison),
+    )
+
+
+def run_panels(comparison: Comparison, which: int) -> list[Panel]:
+    """Measured values and the model's runs of one record, a panel an output."""
+    rows, best, panels = comparison.rows, comparison.judged.best, []
+    record = rows.records[which]
+    for j, c in enumerate(rows.columns):
+        q, measured = comparison.model.outputs[c], record.outputs[:, c]
+        before = measured - comparison.null.fit.errors[which][:, j]
+        traces = [
+            Trace("measured", record.time, measured, Role.TRUTH),
+            Trace("model as it is", record.time, before, Role.ESTIMATE, 0),
+        ]
+        if best is not None and best.hypothesis is not None:
+            label = f"with {best.hypothesis.label.replace('_', ' ')}"
+            after = measured - best.fit.errors[which][:, j]
+            traces.append(Trace(label, record.time, after, Role.ESTIMATE, 1))
+        panels.append(Panel(q.name.replace("_", " "), q.unit, tuple(traces)))
+    return panels
+
+
+def _runs(comparison: Comparison, album: Album) -> list[Picture]:
+    pictures = []
+    for i, record in enumerate(comparison.rows.records[:MOST_RECORDS]):
+        caption = f"Record {record.name}: measured values and free runs of the model."
+        figure = figures.time_figure(run_panels(comparison, i))
+        pictures.append(album.add(figure, caption, f"Measured and modelled outputs of {record.name}"))
+    return pictures
+
+
+def _errors(comparison: Comparison) -> Table:
+    cells = []
+    for c in comparison.verdict.error:
+        low, high = (number(100 * r, ".0f") for r in c.reduction95)
+        cells.append((c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}"))
+    usual = "on the reference" if comparison.referred else "of the plain fit"
+    header = ("output", "unit", "before", "after", f"usual {usual}", "reduction [%], 95 % interval")
+    caption = "Root mean square error of free runs, every stretch by a fit that did not see it"
+    return Table(caption, header, tuple(cells), 2)
+
+
+def _tried(comparison: Comparison) -> str:
+    told = len(comparison.tested)
+    return (
+        f"{comparison.tried} hypotheses were fitted, one at a time, with the constants free within what is known of "
+        f"them. The {told} that came near to the best one were judged on stretches that did not fit them. Gain: how "
+        "much less the errors cost than those of the model as it is. One that lies within 15 % of the best gain, or "
+        "whose difference may be zero, is not told apart from it."
+    )
+
+
+def _hypotheses(comparison: Comparison) -> Table:
+    cells = []
+    for t in comparison.tested[:MOST_HYPOTHESES]:
+        gain = mean_difference(comparison.blocks, comparison.null, t)
+        scale = len(comparison.blocks.edges)
+        low, high = number(scale * gain.low, ".1f"), number(scale * gain.high, ".1f")
+        words = words_of(comparison.calibration.model, t)
+        cells.append((f"{words[0].upper()}{words[1:]}", number(scale * gain.value, ".1f"), f"{low} to {high}"))
+    return Table("Hypotheses, best first", ("hypothesis", "gain", "95 % interval"), tuple(cells))
+
+
+def _constants(comparison: Comparison) -> Table:
+    constants = comparison.calibration.constants
+    std = np.sqrt(np.sum(constants.root**2, axis=1))
+    best = comparison.judged.best or comparison.null
+    cells = []
+    for name, mean, s in zip(constants.names, constants.mean, std, strict=True):
+        p = comparison.calibration.model.parameters[comparison.calibration.model.index("parameters", name)]
+        cells.append((p.label, p.unit, f"{mean:.4g}", f"{s:.2g}", f"{best.fit.value(name):.4g}"))
+    source = "the reference" if comparison.referred else "all records"
+    header: Sequence[str] = ("constant", "unit", f"by {source}", "standard deviation", "on the new records")
+    return Table("Constants of the model", tuple(header), tuple(cells), 2)

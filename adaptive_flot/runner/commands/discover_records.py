@@ -1,0 +1,65 @@
+"""Discovery on several files: what has changed since a reference, or what a model lacks in records of one process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.tables import Source
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.processes.model_writer import save_model
+from adaptive_flot.processes.registry import read_measurements
+from adaptive_flot.records.tag_map import TagMap
+
+
+def discover_records(
+    sources: Sequence[Source | Dataset],
+    model: Model,
+    references: Sequence[Source | Dataset] = (),
+    *,
+    tag_map: TagMap | None = None,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Comparison:
+    """Read records, and find what has changed since the references; without any, what the model lacks in all of them.
+
+    Parameters
+    ----------
+    sources
+        New records of one process: CSV or Parquet files, tables, or records at hand.
+    model
+        The model, with sites.
+    references
+        Records on which the model was right.
+    tag_map
+        From the tags of exports to the model's quantities.
+    processes
+        Fits that run at once.
+    progress
+        Called with a word for each stage and each fit.
+
+    Raises
+    ------
+    DataError, RangeError, ModelError
+        A table or the model can not be used.
+    """
+    new, old = ([_read(s, model, tag_map) for s in group] for group in (sources, references))
+    return compare(model, new, old, processes=processes, progress=progress)
+
+
+def save_extended(
+    comparison: Comparison, name: str, path: Path, *, base: str, cell: str | None, folder: Path | None
+) -> bool:
+    """Write the model with what was named, with the constants of the reference else, as a model file.
+
+    `base`, `cell` and `folder` are what the model was made from, see `save_model`.
+    """
+    note = f"discovered in {name}: {comparison.verdict.word}"
+    save_model(comparison.model, path, base=base, cell=cell, folder=folder, note=note)
+    return True
+
+
+def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None) -> Dataset:
+    return source if isinstance(source, Dataset) else read_measurements(source, model, tag_map=tag_map).record

@@ -1,0 +1,98 @@
+"""Every verdict on the real records beside the truth, and what a judge would say of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.discovery.hypotheses.procedure import compare
+from adaptive_flot.discovery.results import Verdict
+from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
+
+SHARED = Path(__file__).parents[2].parent / "shared" / "data"
+LARGEST_CLASS = 2
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A verdict beside the truth, and what it is worth: `right`, `wrong`, or `open` where nothing is told."""
+
+    record: str
+    truth: str
+    verdict: Verdict
+    worth: str
+
+
+def told(verdict: Verdict) -> set[str]:
+    """Sites that a verdict tells; empty where it tells none."""
+    if verdict.word == "class":
+        return {site for site, _ in verdict.members}
+    return {e.effect.site for e in verdict.effects} if verdict.word in ("named", "unnamed") else set()
+
+
+def faulted_days(folder: Path) -> Iterator[Judged]:
+    """The fourteen faulted days, with the clean day as reference."""
+    unit = air_handling_unit
+    model, days = unit.make_model(), unit.days(folder)
+    for day, (part, fault) in unit.TRUTH.items():
+        verdict = compare(model, [days[day]], [days[unit.REFERENCE]], processes=available_processes()).verdict
+        sites = {unit.SAME_PART.get(site, site) for site in told(verdict)}
+        worth = "open" if not sites else "right" if part in sites and len(sites) <= LARGEST_CLASS else "wrong"
+        yield Judged(f"air handling {day}", f"{part} {fault}".replace("_", " "), verdict, worth)
+
+
+def drives(folder: Path) -> Iterator[Judged]:
+    """Five records of one plant together, without a reference."""
+    verdict = compare(
+        electric_drives.make_model(), electric_drives.records(folder), processes=available_processes()
+    ).verdict
+    right = told(verdict) == {electric_drives.TRUTH[0]} and "absolute value" in verdict.reason
+    worth = "right" if right else "wrong" if told(verdict) else "open"
+    yield Judged("electric drives, 5 records", " ".join(electric_drives.TRUTH), verdict, worth)
+
+
+def single_records(folder: Path) -> Iterator[Judged]:
+    """One record each, without a reference."""
+    record = heat_exchanger.record(folder).rows(heat_exchanger.FIRST, heat_exchanger.LAST)
+    verdict = discover(heat_exchanger.make_model(), record, processes=available_processes()).verdict
+    named = {(e.effect.site, e.effect.driver) for e in verdict.effects} if verdict.word == "named" else set()
+    right = bool(named) and named <= {("heating", "flow"), ("residence_time", "flow")}
+    yield Judged(
+        "heat exchanger", " ".join(heat_exchanger.TRUTH), verdict, "right" if right else "wrong" if named else "open"
+    )
+    verdict = discover(lamp.make_model(), lamp.record(folder), processes=available_processes()).verdict
+    yield Judged("lamp", ", ".join(lamp.TRUTH), verdict, "wrong" if verdict.word == "named" else "open")
+
+
+def main(folder: Path) -> int:
+    """Judge, print and count; 2 where there is nothing to judge."""
+    if not (folder / "air-handling-unit").is_dir():
+        print(f"no measured records in {folder}; give the folder that holds them", file=sys.stderr)
+        return 2
+    console, judged = Console(width=160), []
+    table = Table(title="Verdicts on real records", title_justify="left")
+    for heading in ("record", "truth", "verdict", "worth", "s", "told"):
+        table.add_column(heading)
+    for group in (faulted_days, drives, single_records):
+        for j in group(folder):
+            judged.append(j)
+            console.print(f"{j.record}: {j.verdict.word}, {j.worth}")
+            table.add_row(j.record, j.truth, j.verdict.word, j.worth, f"{j.verdict.seconds:.0f}", j.verdict.reason)
+    console.print(table)
+    shows = {f"air handling {day}" for day in air_handling_unit.SHOWS}
+    right = sum(j.worth == "right" for j in judged if j.record in shows)
+    wrong = sum(j.worth == "wrong" for j in judged)
+    console.print(f"Days whose fault shows, right part named or in a class of two: {right} of {len(shows)}.")
+    console.print(f"Wrong names, all records: {wrong} of {len(judged)}.")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else SHARED))

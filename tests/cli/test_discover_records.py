@@ -1,0 +1,63 @@
+"""`adaptive-flot discover` with a reference: what it writes and says, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from tests.discovery.hypotheses import tank
+
+MODEL = f"{tank.__file__}:make_model"
+
+
+@pytest.fixture
+def records(tmp_path: Path) -> tuple[Path, Path]:
+    """A record with a draught, and one without."""
+    paths = tmp_path / "new.csv", tmp_path / "old.csv"
+    for path, data in zip(paths, (tank.record("new", 1, tank.DRAUGHT), tank.record("old", 2)), strict=True):
+        tank.table(data).to_csv(path, index=False)
+    return paths
+
+
+def test_what_has_changed_is_said_with_its_size_and_written(
+    call: Call, records: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """The loss is 65 % larger (a factor exp(0.5)): first sentence, verdict, page and extended model say so."""
+    new, old = records
+    result = call("discover", new, "--reference", old, "--model", MODEL, "--out", "r", "--save-model", "m.yaml")
+    assert result.code == 0, result.err
+    assert result.out.startswith("named: Heat loss is 65 % larger.")
+    verdict = json.loads((tmp_path / "r" / "verdict.json").read_text())
+    assert verdict["verdict"] == "named" and verdict["effects"][0]["site"] == "heat_loss"
+    page = (tmp_path / "r" / "report.html").read_text()
+    assert "Heat loss is 65 % larger" in page and "Reference: old" in page and "<svg" not in verdict["reason"]
+
+
+def test_the_model_that_was_written_has_nothing_left_to_find(
+    call: Call, records: tuple[Path, Path], tmp_path: Path
+) -> None:
+    new, old = records
+    arguments = ("--model", MODEL, "--out", "r", "--save-model", "m.yaml", "--no-report")
+    assert call("discover", new, "--reference", old, *arguments).code == 0
+    tank.table(tank.record("later", 5, tank.DRAUGHT)).to_csv(tmp_path / "later.csv", index=False)
+    later = call("discover", "later.csv", "--reference", new, "--model", "m.yaml", "--out", "r2", "--no-report")
+    assert later.code == 0 and later.out.startswith("none: "), later.out + later.err
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (["--reference", "nowhere.csv"], "nowhere.csv"),
+        (["--reference", "old.csv", "--limit", "power=0:1000"], "--limit"),
+        (["nowhere.csv"], "nowhere.csv"),
+    ],
+)
+def test_a_mistake_is_one_line_and_writes_nothing(
+    call: Call, records: tuple[Path, Path], tmp_path: Path, more: list[str], says: str
+) -> None:
+    result = call("discover", records[0], "--model", MODEL, "--out", "r", *more)
+    assert result.code == 2 and says in result.err and len(result.err.splitlines()) == 1
+    assert not (tmp_path / "r").exists()
