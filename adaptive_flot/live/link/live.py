@@ -68,6 +68,8 @@ class Speaker:
         if outcome.estimate is not None and not self._estimating:
             self._estimating = True
             self._say(f"{outcome.number}: the estimator runs")
+        if progress.found:
+            self._say(f"{outcome.number}: discovery: {progress.found}")
         if outcome.faults != self._faults:
             self._faults = outcome.faults
             self._say(f"{outcome.number}: {'; '.join(outcome.faults) or 'all is well again'}")

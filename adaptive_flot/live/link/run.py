@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.link.client import LOST, PlantClient
 from adaptive_flot.live.link.cycle import Cycle, CycleState
+from adaptive_flot.live.link.discovery import LiveDiscovery
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome, Written
 from adaptive_flot.live.safety.modes import Mode
@@ -34,6 +35,7 @@ class Progress:
     snapshot: Snapshot
     outcome: Outcome
     seconds: float
+    found: str = ""
 
 
 class LinkRun:
@@ -56,7 +58,7 @@ class LinkRun:
 
     def __init__(self, link: Link, memory: Memory, show: Callable[[Progress], None] = lambda progress: None) -> None:
         self.link, self.memory = link, memory
-        self.cycle = Cycle(link)
+        self.cycle, self.discovery = Cycle(link), LiveDiscovery(link)
         self.state: CycleState = self.cycle.start(None if memory.resumed is None else memory.resumed.prior)
         self._show = show
         self._interval = link.scenario.dt / link.file.cycle.speed  # of this machine
@@ -78,6 +80,7 @@ class LinkRun:
             while not stop.is_set() and (cycles is None or self.state.number < cycles):
                 in_time, written = await self._one(in_time, written)
         finally:
+            self.discovery.close()
             await self._leave()
 
     async def _one(self, in_time: bool, before: Mapping[str, Written]) -> tuple[bool, dict[str, Written]]:
@@ -89,11 +92,13 @@ class LinkRun:
         well = all(not result.problem for result in before.values())
         snapshot = NOTHING if client is None else client.snapshot(alive, in_time, well)
         self.state, outcome = await asyncio.to_thread(self.cycle.step, self.state, snapshot)
-        await asyncio.to_thread(self.memory.store, snapshot, outcome, self.state.estimation.noise_std, before)
+        found = self.discovery.look(outcome)
+        noise = self.state.estimation.noise_std
+        await asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found)
         seconds = loop.time() - begin
         in_time = seconds <= self.link.file.cycle.deadline * self._interval
         written = await self._tell(client, outcome, in_time)
-        self._show(Progress(snapshot, outcome, seconds))
+        self._show(Progress(snapshot, outcome, seconds, found))
         return in_time, written
 
     async def _tell(self, client: PlantClient | None, outcome: Outcome, in_time: bool) -> dict[str, Written]:

@@ -125,6 +125,7 @@ class Memory:
         outcome: Outcome,
         noise_std: Sequence[float],
         before: Mapping[str, Written],
+        found: str = "",
     ) -> None:
         """Store a cycle whole or not at all, before anything of it is written to the plant.
 
@@ -136,6 +137,8 @@ class Memory:
             Noise that the estimator counts with (m,).
         before
             What came of the writes of the cycle before.
+        found
+            What discovery says in this cycle; empty for nothing.
 
         Raises
         ------
@@ -145,6 +148,8 @@ class Memory:
         rows: Rows = {schema.cycles: [_cycle(snapshot, outcome)]}
         rows[schema.tags] = _tags(snapshot, outcome)
         rows[schema.events] = self._events(snapshot, outcome)
+        if found:
+            rows[schema.events].append({"kind": "discovery", "text": found})
         rows[schema.limits] = self._changed_limits(snapshot)
         if outcome.sample is not None:
             rows[schema.samples] = [_sample(outcome)]

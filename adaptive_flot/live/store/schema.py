@@ -97,4 +97,4 @@ results = _of_cycle(
     keys=("input",),
 )
 events = _of_cycle("events", Column("text", Text, nullable=False), keys=("kind",))
-"""Mode changes, and what the operator did at the panel."""
+"""Mode changes, what the operator did at the panel, and what discovery found."""

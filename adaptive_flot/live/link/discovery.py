@@ -1,0 +1,125 @@
+"""Discovery beside a link: watches the innovations, searches for a cause, says what it found, and applies nothing.
+
+A model is never extended on a live plant without a person. What is found is stored as an event.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from adaptive_flot.contracts import Decision, Estimate, PlantRecord, Sample, Setup, Status
+from adaptive_flot.contracts.delayed_measurements import in_time
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.live.link_file import Link, load_link
+from adaptive_flot.live.outcome import Outcome
+from adaptive_flot.runner.adaptation.supervisor import measured_record
+from adaptive_flot.runner.adaptation.whiteness_watch import watch
+from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.runner.results.timeseries import innovations
+
+Search = Callable[[Path, Dataset], str]
+
+
+def search(link_file: Path, record: Dataset) -> str:
+    """Search a record for what the model of a link lacks: the verdict in words. Runs in a process of its own."""
+    from adaptive_flot.runner.adaptation.extension import search_record
+
+    link = load_link(link_file)
+    options = link.scenario.file.discovery
+    finding = search_record(link.scenario.setup, record, 1 if options is None else options.processes)
+    return f"{finding.verdict.word}: {finding.verdict.reason}"
+
+
+class LiveDiscovery:
+    """Watches a link as its scenario's key `discovery` says; without the key it does nothing.
+
+    Parameters
+    ----------
+    link
+        The link file and its scenario.
+    searcher
+        Judges a record; default `search`.
+    """
+
+    def __init__(self, link: Link, searcher: Search = search) -> None:
+        self._options = link.scenario.file.discovery if link.file.estimator in link.scenario.watched else None
+        self._path, self._search = link.path.absolute(), searcher
+        self._setup: Setup = link.scenario.setup
+        self._pool: ProcessPoolExecutor | None = None
+        self._found: Future[str] | None = None
+        self._alarm, self._quiet_until, self._window = "", -np.inf, 0
+        rows = 0 if self._options is None else max(self._options.record_s, self._options.window_s) / self._setup.dt
+        self._steps: deque[Step] = deque(maxlen=round(rows) + 1)
+
+    def look(self, outcome: Outcome) -> str:
+        """Look at a cycle; words to store and to say, empty where there is nothing new."""
+        if self._options is None or outcome.sample is None:
+            return ""
+        last = self._steps[-1].plant.sample.time if self._steps else outcome.sample.time - self._setup.dt
+        if outcome.sample.time > last + 1.5 * self._setup.dt:
+            self._steps.clear()  # a record has no holes
+            self._window = 0
+        self._steps.append(_step(outcome.sample, outcome.estimate))
+        if self._found is not None:
+            return self._result(outcome.sample.time)
+        self._window = self._window + 1 if outcome.estimate is not None else 0
+        words = self._test(outcome.sample.time) if self._window * self._setup.dt >= self._options.window_s else ""
+        if self._alarm and len(self._steps) * self._setup.dt >= self._options.least_record_s:
+            record = measured_record(list(self._steps)[-round(self._options.record_s / self._setup.dt) :], self._setup)
+            self._found = self._executor().submit(self._search, self._path, record)
+            begun = f"search begins after an alarm of {self._alarm}"
+            self._alarm = ""
+            return begun
+        return words
+
+    def close(self) -> None:
+        """End a search whose result nobody waits for."""
+        if self._pool is not None:
+            processes = list(self._pool._processes.values())
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.terminate()
+            self._pool = None
+
+    def _test(self, now: float) -> str:
+        assert self._options is not None
+        rows, self._window = self._window, 0
+        if now < self._quiet_until or self._alarm:
+            return ""
+        seen = np.vstack([s.outputs for s in in_time(innovations(list(self._steps)[-rows:]), self._setup)])
+        names = self._options.outputs or self._setup.outputs
+        columns = {name: seen[:, self._setup.model.index("outputs", name)] for name in names}
+        alarm = watch(columns, self._options.false_alarm)
+        self._alarm = "" if alarm is None else str(alarm)
+        return f"alarm: {self._alarm}" if self._alarm else ""
+
+    def _result(self, now: float) -> str:
+        """What a search found, once it has ended."""
+        assert self._found is not None and self._options is not None
+        if not self._found.done():
+            return ""
+        found, self._found = self._found, None
+        self._quiet_until, self._window = now + self._options.pause_s, 0
+        try:
+            return f"search ended: {found.result()}"
+        except Exception as error:  # the link goes on without a search that failed, whatever it was
+            return f"search failed: {type(error).__name__}: {error}"
+
+    def _executor(self) -> ProcessPoolExecutor:
+        """A process that shares nothing with this one: the link has threads, which no fork may copy."""
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+        return self._pool
+
+
+def _step(sample: Sample, estimate: Estimate | None) -> Step:
+    unknown = np.full_like(sample.outputs, np.nan)
+    return Step(
+        Decision(sample.inputs, Status.OK, "plant"), PlantRecord(sample, unknown, unknown, sample.inputs), estimate
+    )

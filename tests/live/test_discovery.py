@@ -1,0 +1,89 @@
+"""Discovery beside a link says what it found, and changes nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adaptive_flot.contracts import Estimate, Sample, Status
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.live.link.discovery import LiveDiscovery
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.outcome import Outcome
+from adaptive_flot.live.safety.modes import Mode
+from adaptive_flot.runner.scenario.scenario import Scenario
+
+WINDOW, LEAST = 60, 100
+
+
+def judge(link_file: Path, record: Dataset) -> str:
+    """A search that costs nothing: how many rows it was given."""
+    return f"{link_file.name} with {len(record)} rows"
+
+
+def fails(link_file: Path, record: Dataset) -> str:
+    raise ValueError(f"{link_file.name} is beyond me")
+
+
+@pytest.fixture(scope="module")
+def watched(write_live_scenario: Callable[[Mapping[str, object]], Scenario], write_link: Callable[..., Link]) -> Link:
+    options = {"window_s": WINDOW, "least_record_s": LEAST, "record_s": 150, "pause_s": 50}
+    return write_link(write_live_scenario({"discovery": options}), {"controller": "hold"})
+
+
+def outcome(link: Link, time: float, innovation: float) -> Outcome:
+    """A cycle whose estimator was off by so much."""
+    model, setup = link.scenario.model, link.scenario.setup
+    off = np.full(len(model.outputs), np.nan)
+    off[model.index("outputs", "concentrate_grade")] = innovation
+    sample = Sample(time, np.ones(len(model.inputs)), off)
+    q, m = len(setup.parameters), len(setup.outputs)
+    state = np.zeros(len(model.states))
+    estimate = Estimate(time, off, off, np.ones(m), np.ones(q), np.eye(q), state, Status.OK)
+    return Outcome(round(time), Mode.MONITOR, "", (), {}, sample, estimate, None, {}, {}, False)
+
+
+def said(discovery: LiveDiscovery, link: Link, offset: float, rows: int = 400) -> list[str]:
+    """What is said while innovations have this mean, in units of their standard deviation."""
+    noise = np.random.default_rng(1).standard_normal(rows)
+    found = []
+    for k in range(rows):
+        words = discovery.look(outcome(link, k + 1.0, noise[k] + offset))
+        if words.startswith("search begins"):
+            while discovery._found is not None and not discovery._found.done():
+                time.sleep(0.05)
+        found += [words] if words else []
+    return found
+
+
+def test_an_alarm_starts_a_search_whose_verdict_is_said(watched: Link) -> None:
+    discovery = LiveDiscovery(watched, judge)
+    try:
+        words = said(discovery, watched, offset=2.0)
+    finally:
+        discovery.close()
+    assert words[0].startswith("alarm: concentrate_grade mean p =")
+    assert words[1].startswith("search begins after an alarm of concentrate_grade mean")
+    assert words[2] == "search ended: link.yaml with 100 rows"
+    assert words[-1].endswith("with 150 rows"), "no record is longer than asked"
+
+
+def test_white_innovations_raise_no_alarm(watched: Link) -> None:
+    assert said(LiveDiscovery(watched, judge), watched, offset=0.0) == []
+
+
+def test_a_search_that_fails_is_said_too(watched: Link) -> None:
+    discovery = LiveDiscovery(watched, fails)
+    try:
+        words = said(discovery, watched, offset=2.0, rows=150)
+    finally:
+        discovery.close()
+    assert words[2] == "search failed: ValueError: link.yaml is beyond me"
+
+
+def test_without_the_key_nobody_watches(link: Link) -> None:
+    assert said(LiveDiscovery(link, judge), link, offset=5.0) == []

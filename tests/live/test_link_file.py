@@ -1,0 +1,42 @@
+"""Tags in the plant's units come to the same as tags in the model's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from adaptive_flot.live.link_file import Link, LiveTag, Scale
+from adaptive_flot.runner.scenario.scenario import Scenario
+
+
+@pytest.mark.parametrize(
+    ("unit", "tag", "model"), [("L/min", 90.0, 1.5e-3), ("m3/s", 1.5e-3, 1.5e-3), (None, 2.0, 2.0)]
+)
+def test_a_value_goes_there_and_back(unit: str | None, tag: float, model: float) -> None:
+    scale = Scale.of(unit, "m3/s")
+    assert scale.model(tag) == pytest.approx(model, rel=1e-12)
+    assert scale.tag(scale.model(tag)) == pytest.approx(tag, rel=1e-12)
+
+
+def test_a_unit_with_an_offset() -> None:
+    assert Scale.of("degC", "K").model(20.0) == pytest.approx(293.15)
+
+
+def test_the_models_own_unit_changes_no_bit() -> None:
+    assert Scale.of("m3/s", "m3/s") == Scale()
+
+
+def test_rules_are_in_the_models_unit() -> None:
+    tag = LiveTag(tag="FIC", unit="L/min", range=(0.0, 120.0), jump=6.0, bad=("-9999", "Bad Input"), frozen="1 min")
+    rules = tag.rules(Scale.of("L/min", "m3/s"), -1.0, 1.0)
+    assert [rules.low, rules.high, rules.largest_jump] == pytest.approx([0.0, 2e-3, 1e-4])
+    assert list(rules.bad) == pytest.approx([-9999 / 60000])
+    assert (rules.frozen_after_s, rules.stale_after_s) == (60.0, 10.0)
+
+
+def test_a_bad_code_is_found_in_the_tags_unit(write_link: Callable[..., Link], scenario: Scenario) -> None:
+    """A code goes through the same arithmetic as the value, so that the two are equal to the bit."""
+    link = write_link(scenario, {"tags.air_flow": {"tag": "air_flow", "unit": "L/min", "bad": [-9999]}})
+    scale = Scale.of("L/min", "m3/s")
+    assert scale.model(-9999.0) in link.file.tags["air_flow"].rules(scale, 0.0, 1.0).bad
