@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +184,8 @@ def runs_of_equal(values: FloatArray) -> list[tuple[int, int]]:
     [(0, 2), (3, 6)]
     """
     edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0) + 1, [len(values)]])
-    return [(int(a), int(b)) for a, b in pairwise(edges) if b - a > 1]
+    long = np.flatnonzero(np.diff(edges) > 1)
+    return list(zip(edges[long].tolist(), edges[long + 1].tolist(), strict=True))
 
 
 def spikes(values: FloatArray) -> np.ndarray[Any, np.dtype[np.bool_]]:

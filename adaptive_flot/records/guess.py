@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from adaptive_flot.errors import DataError, located, near_match
-from adaptive_flot.greybox.data.wrong_unit import OTHER_UNITS
+from adaptive_flot.greybox.data.wrong_unit import other_units
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.records.reading.export import Export, Signal
@@ -42,6 +42,8 @@ LOOP_LETTERS = {"f": "flow", "l": "level", "a": "grade", "q": "grade", "t": "tem
 """First letter of a loop's name (ISA-5.1): FIC, LT, AI."""
 CONTRARY = {"sp": "setpoint", "setpoint": "setpoint", "spt": "setpoint"}
 """Words of a tag that only suit a quantity whose name has the other one."""
+SPECIFIC = ("air", "feed", "tails", "concentrate", "recovery")
+"""Words that say where in a plant a tag is: one of another place speaks against it."""
 PROCESS_VALUE = ("pv", "act", "actual", "ist", "meas", "measured")
 NAMED = 0.45
 """Least share of a quantity's words that the name of an output's tag must have."""
@@ -52,9 +54,10 @@ IMPOSSIBLE = -1e3
 
 @dataclass(frozen=True)
 class Candidate:
-    """A tag for a quantity: how well it suits."""
+    """A tag for a quantity: how well it suits, all in all and by its name alone."""
 
     score: float
+    named: float
 
 
 def guess_tags(export: Export, model: Model, known: TagMap, *, outputs: bool = True) -> TagMap:
@@ -82,11 +85,12 @@ def guess_tags(export: Export, model: Model, known: TagMap, *, outputs: bool = T
     for name, keys in known.quantities.items():
         if keys.tag not in export.signals:
             raise DataError(f"{export.file}: {name}: no tag {keys.tag!r}; {near_match(keys.tag, export.signals)}")
-    wanted = [q for q in (*model.inputs, *(model.outputs if outputs else ())) if q.name not in known.quantities]
-    used = {keys.tag for keys in known.quantities.values()}
-    signals = [s for tag, s in export.signals.items() if tag not in used and np.isfinite(s.values).mean() > 0.2]
-    for q, signal in _assigned(wanted, signals, model, export):
-        known = known.with_keys(q.name, {"tag": signal.tag})
+    for group in (model.inputs, model.outputs if outputs else ()):  # an output never takes a tag that an input needs
+        wanted = [q for q in group if q.name not in known.quantities]
+        used = {keys.tag for keys in known.quantities.values()}
+        signals = [s for tag, s in export.signals.items() if tag not in used and np.isfinite(s.values).mean() > 0.2]
+        for q, signal in _assigned(wanted, signals, model, export):
+            known = known.with_keys(q.name, {"tag": signal.tag})
     for q in (*model.inputs, *model.outputs):
         own = known.quantities.get(q.name)
         if own is not None and own.unit is None:
@@ -100,20 +104,20 @@ def candidate(q: Quantity, signal: Signal) -> Candidate | None:
     if signal.tag in (q.name, q.column):
         score = 1.5
     if signal.unit and not is_unit(signal.unit):
-        return Candidate(score) if score >= NAMED else None  # refused where it is converted, with the reason
+        return Candidate(score, score) if score >= NAMED else None  # refused where it is converted, with the reason
     if signal.unit and not fits(signal.unit, q.unit):
         return None
     units, usual = _units(q, signal)
     if not units and score < NAMED:
         return None
-    return Candidate(score + 0.3 * bool(signal.unit) + 0.1 * bool(units) + 0.25 * usual)
+    return Candidate(score + 0.3 * bool(signal.unit) + 0.1 * bool(units) + 0.25 * usual, score)
 
 
 def _units(q: Quantity, signal: Signal) -> tuple[tuple[str, ...], bool]:
     """Units in which the median of a signal would be one of ordinary operation (else: possible), and whether it is."""
     finite = signal.values[np.isfinite(signal.values)]
     middle = float(np.median(finite)) if len(finite) else np.nan
-    given = (signal.unit,) if signal.unit else (q.unit, *OTHER_UNITS.get(q.unit, ()))
+    given = (signal.unit,) if signal.unit else (q.unit, *other_units(q))
     if signal.tag == q.column and not signal.unit:
         given = (q.unit,)
     for low, high in filter(None, (q.usual, (q.lower, q.upper))):
@@ -130,10 +134,10 @@ def name_score(q: Quantity, text: str) -> float:
 
     >>> q = Quantity("level_setpoint", "m", "")
     >>> name_score(q, "LIC_201.SP"), name_score(q, "LIC_201.PV")
-    (1.0, 0.0)
+    (1.0, -0.5)
     """
-    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
-    tokens = [t for t in re.split(r"[^a-zäöüß]+", parts.lower()) if t]
+    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)  # AirFlow, and pH as it stands
+    tokens = [t for t in re.split(r"[^a-zäöüß]+", f"{text} {parts}".lower()) if t]
     has: set[str] = set()
     loops: set[str] = set()
     for token in tokens:
@@ -142,11 +146,12 @@ def name_score(q: Quantity, text: str) -> float:
             loops.add(LOOP_LETTERS[token[0]])
     own = q.name.lower().split("_")
     share = len([w for w in own if w in has | loops or w in tokens]) / len(own)
-    if loops - set(own) and not has & set(own):
+    if loops - set(own) and not (has | loops) & (set(own) - {"setpoint"}):
         return -1.0
-    against = any(word in tokens and CONTRARY[word] not in own for word in CONTRARY)
+    against = any(word in has and word not in own for word in SPECIFIC)
+    against |= any(word in tokens and CONTRARY[word] not in own for word in CONTRARY)
     against |= "setpoint" in own and any(word in tokens for word in PROCESS_VALUE)
-    return share - 0.5 * against
+    return share - against
 
 
 def _assigned(
@@ -160,8 +165,8 @@ def _assigned(
     score = np.full((len(wanted), len(signals) + len(wanted)), IMPOSSIBLE)
     for i, row in enumerate(table):
         for j, found in enumerate(row):
-            needs = 0.0 if wanted[i].name in inputs else NAMED
-            if found is not None and found.score >= needs:
+            needs = -0.25 if wanted[i].name in inputs else NAMED
+            if found is not None and found.named >= needs:
                 score[i, j] = found.score
         score[i, len(signals) + i] = -5.0 if wanted[i].name in inputs else NAMED
     rows, columns = linear_sum_assignment(score, maximize=True)

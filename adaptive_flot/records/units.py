@@ -30,8 +30,9 @@ PLAIN = {
     **dict.fromkeys(("cfm", "acfm"), "foot**3/minute"),
     **dict.fromkeys(("tph", "mtph"), "metric_ton/hour"),
     **dict.fromkeys(("cps",), "centipoise"),
+    **dict.fromkeys(("rpm", "1/min", "u/min"), "1/minute"),
 }
-"""Spellings of plants that Pint does not know, or takes for something else: `cfm` for centifermi."""
+"""Spellings that Pint does not know, or takes for something else: `cfm` for centifermi, `rpm` for an angle."""
 WORDS = {"hr": "hour", "hrs": "hour", "mins": "minute", "secs": "second", "l": "liter", "t": "metric_ton"}
 """Parts of a unit that Pint would not take, or not for what a plant means."""
 NORMAL = re.compile(r"^(?:n|s)(?:m3|m³|m\^3|l|cm3)(?:/|$)|^scf|^sccm|^slpm|^nlpm", re.IGNORECASE)

@@ -26,6 +26,7 @@ from adaptive_flot.records.units import convert, fits, is_unit, read_unit, secon
         ("mm", "m", 1e-3),
         ("t/h", "kg/s", 1000 / 3600),
         ("kPa", "Pa", 1e3),
+        ("rpm", "1/s", 1 / 60),
     ],
 )
 def test_a_unit_has_the_factor_of_its_definition(unit: str, wanted: str, factor: float) -> None:

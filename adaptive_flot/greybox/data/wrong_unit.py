@@ -21,6 +21,16 @@ FAR = 20.0
 """A median so many times as large as what is usual is of another unit."""
 
 
+def other_units(quantity: Quantity) -> dict[str, float]:
+    """Units that plants may use for a quantity, and what one of them is in its own.
+
+    A number without unit that may be larger than 1, as pH or a scaled flow, is no fraction: it has no others.
+    """
+    if quantity.unit == "-" and quantity.usual is None and quantity.upper > 1:
+        return {}
+    return OTHER_UNITS.get(quantity.unit, {})
+
+
 def units_that_fit(quantity: Quantity, value: float) -> dict[str, float]:
     """Units of plants in which a value would be one of ordinary operation, with that value in the quantity's unit.
 
@@ -31,7 +41,7 @@ def units_that_fit(quantity: Quantity, value: float) -> dict[str, float]:
     {'mm': 0.38}
     """
     low, high = quantity.usual or (quantity.lower, quantity.upper)
-    found = {unit: value * factor for unit, factor in OTHER_UNITS.get(quantity.unit, {}).items()}
+    found = {unit: value * factor for unit, factor in other_units(quantity).items()}
     return {unit: inside for unit, inside in found.items() if low <= inside <= high}
 
 

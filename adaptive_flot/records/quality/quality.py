@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from adaptive_flot.records.importing import Imported
 from adaptive_flot.records.quality.excitation import Excitation, excitation
-from adaptive_flot.records.quality.relations import Correlation, Feedback, correlation, feedback
+from adaptive_flot.records.quality.relations import Correlation, Feedback, block_means, correlation, feedback
 from adaptive_flot.records.quality.signals import SignalQuality, signal_quality
 
 TOGETHER = 0.95
 """Correlation of two inputs from which their effects can not be told apart."""
+MOST_CORRELATED = 5000
+"""Rows that are correlated; of more, the means of blocks."""
 FEWEST_ROWS = 200
 """Rows that discovery asks for."""
 
@@ -70,8 +72,10 @@ def judge(imported: Imported) -> Quality:
     outputs = [c.quantity.name for c in imported.cleaned if not imported.is_input(c.quantity.name)]
     values = {name: rows.values[name][inside] for name in (*inputs, *outputs)}
     pairs = [*((i, o) for i in inputs for o in outputs)]
-    found = [correlation(a, b, values[a], values[b]) for a, b in pairs]
-    found += [correlation(a, b, values[a], values[b], lags=0) for a, b in combinations(inputs, 2)]
+    size = -(-int(inside.sum()) // MOST_CORRELATED)
+    means = {name: block_means(v, size) for name, v in values.items()}
+    found = [correlation(a, b, means[a], means[b]) for a, b in pairs]
+    found += [correlation(a, b, means[a], means[b], lags=0) for a, b in combinations(inputs, 2)]
     loops = [feedback(i, o, values[i], values[o]) for i, o in pairs]
     return Quality(
         len(rows.time),
@@ -79,7 +83,7 @@ def judge(imported: Imported) -> Quality:
         tuple(int(n) for n in counts),
         tuple(signal_quality(c, rows, imported.is_input(c.quantity.name)) for c in imported.cleaned),
         tuple(excitation(name, values[name]) for name in inputs),
-        tuple(c for c in found if c is not None),
+        tuple(replace(c, lag=c.lag * size) for c in found if c is not None),
         tuple(f for f in loops if f is not None),
     )
 

@@ -101,6 +101,20 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
     return Feedback(name, output, float(share), p_value)
 
 
+def block_means(values: FloatArray, size: int) -> FloatArray:
+    """Means of blocks of `size` rows, missing values left out; a block without any is missing.
+
+    >>> block_means(np.array([1.0, 3.0, np.nan, 5.0, 7.0]), 2).tolist()
+    [2.0, 5.0]
+    """
+    if size == 1:
+        return values
+    blocks = values[: len(values) // size * size].reshape(-1, size)
+    seen = np.isfinite(blocks)
+    total = np.where(seen, blocks, 0.0).sum(axis=1)
+    return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
+
+
 def _still(values: FloatArray) -> bool:
     seen = values[np.isfinite(values)]
     return len(seen) == 0 or float(np.ptp(seen)) <= 1e-9 * max(float(np.max(np.abs(seen))), 1e-300)

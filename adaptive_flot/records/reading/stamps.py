@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from adaptive_flot.records.reading.numbers import plain, read_numbers
 from adaptive_flot.records.reading.raw import RawTable, UnclearError
 
 _YMD = r"(?P<y>\d{4})[-/.](?P<m>\d{1,2})[-/.](?P<d>\d{1,2})"
-_AB = r"(?P<a>\d{1,2})(?P<mark>[-/.])(?P<b>\d{1,2})[-/.](?P<y>\d{4}|\d{2})"
+_YEAR = r"(?P<y>\d{4}|\d{2})"
+_AB = rf"(?P<a>\d{{1,2}})(?P<mark>[-/.])(?P<b>\d{{1,2}})[-/.]{_YEAR}"
 _NAMED = r"(?P<d>\d{1,2})[-/. ](?P<month>[A-Za-z]{3})[a-z]*[-/., ]+(?P<y>\d{4}|\d{2})"
 _CLOCK = (
     r"(?P<H>\d{1,2})[:.](?P<M>\d{2})(?:[:.](?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?(?:\s*(?P<p>[AaPp])\.?[Mm]\.?)?"
@@ -180,16 +182,25 @@ def _what_it_counts(raw: RawTable, texts: pd.Series, number: Any, unit: str) -> 
 def _written(raw: RawTable, texts: pd.Series, form: str | None, rows: Any) -> Stamps:
     """Times as dates and clock times."""
     texts = plain(texts)
+    if texts.duplicated().mean() > 0.5:  # a row a value: the same times again and again
+        codes, known = pd.factorize(texts)
+        first = np.flatnonzero(~texts.duplicated().to_numpy())
+        found = _written(raw, pd.Series(known, index=texts.index[first], dtype=texts.dtype), form, rows[first])
+        return replace(found, clock=found.clock[codes], rows=rows)
     kinds = {name: texts.str.fullmatch(pattern).to_numpy(dtype=bool) for name, pattern in FORMS.items()}
     name = max(kinds, key=lambda k: int(kinds[k].sum()))
     _all_read(raw, texts, ~kinds[name], "no time that is known")
+    order = "iso"
+    if name == "numbers":
+        dates = texts.str.slice(0, 10).drop_duplicates().str.extract(rf"^{_AB[: -len(_YEAR)]}(?P<y>\d{{2,4}})")
+        order = form if form in ("day-first", "month-first") else _order(raw, dates)
+    quick = _quick(texts, name, order)
+    if quick is not None:
+        return Stamps(quick, False, rows, order)
     parts = texts.str.extract(FORMS[name])
     if name == "numbers":
-        order = form if form in ("day-first", "month-first") else _order(raw, parts)
         day, month = ("a", "b") if order == "day-first" else ("b", "a")
         parts = parts.assign(d=parts[day], m=parts[month])
-    else:
-        order = "iso"
     if name == "named":
         months = parts["month"].str.lower().map(MONTHS)
         _all_read(raw, texts, months.isna().to_numpy(), "of a month that is not known")
@@ -200,6 +211,26 @@ def _written(raw: RawTable, texts: pd.Series, form: str | None, rows: Any) -> St
     if zone.notna().any() and zone.isna().any():
         _all_read(raw, texts, zone.isna().to_numpy(), "without an offset, where others have one")
     return Stamps(clock, bool(zone.notna().all()), rows, order)
+
+
+def _quick(texts: pd.Series, name: str, order: str) -> Any:
+    """Clock times of texts of the plainest forms, ten times as fast; None where a text is of another."""
+    first = str(texts.iloc[0])
+    if name == "iso":
+        plainest = texts.str.fullmatch(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d{1,9})?)?")
+        if not plainest.all():
+            return None
+        dates = pd.to_datetime(texts, format="ISO8601", errors="coerce")
+    else:
+        found = re.fullmatch(r"\d{1,2}([-/.])\d{1,2}\1\d{4} \d{1,2}:\d{2}(:\d{2})?( [AP]M)?", first)
+        if name != "numbers" or found is None:
+            return None
+        day, month = ("%d", "%m") if order == "day-first" else ("%m", "%d")
+        clock = ("%I" if found[3] else "%H") + ":%M" + (":%S" if found[2] else "") + (" %p" if found[3] else "")
+        dates = pd.to_datetime(texts, format=f"{day}{found[1]}{month}{found[1]}%Y {clock}", errors="coerce")
+    if dates.isna().any():
+        return None
+    return dates.astype("datetime64[ns]").to_numpy().astype(np.int64)
 
 
 def _order(raw: RawTable, parts: pd.DataFrame) -> str:
