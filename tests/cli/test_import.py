@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from adaptive_flot.cli import import_preview
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.records.importing import import_table
 from adaptive_flot.records.tag_map import TagMap, load_tag_map
@@ -111,8 +110,8 @@ def test_on_a_terminal_it_asks(
     for stream in (sys.stdin, sys.stdout):
         monkeypatch.setattr(stream, "isatty", lambda: True)
     answers = iter(["1", False, "1", True])
-    monkeypatch.setattr(import_preview.typer, "prompt", lambda *a, **k: next(answers))
-    monkeypatch.setattr(import_preview.typer, "confirm", lambda *a, **k: next(answers))
+    monkeypatch.setattr("typer.prompt", lambda *a, **k: next(answers))
+    monkeypatch.setattr("typer.confirm", lambda *a, **k: next(answers))
     result = call("import", file, "--out", "record.parquet")
     assert result.code == 2 and "nothing is written" in result.err and files(tmp_path) == {"export.csv"}
     assert "1  time: {format: day-first}" in result.out

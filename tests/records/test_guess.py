@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.records.guess import guess_tags, name_score
 from adaptive_flot.records.habits import complete_habits, holds_its_value, period
@@ -19,19 +19,22 @@ from adaptive_flot.records.tag_map import FileKeys, TagMap, TimeKeys
 BASE = {"FIC_101.PV": ("L/min", 90.0), "FIC_102.PV": ("L/min", 10.0), "LIC_201.SP": ("mm", 380.0)}
 
 
-def signal(tag: str, unit: str, values: object, step: float = 10.0) -> Signal:
-    found = np.broadcast_to(np.asarray(values, dtype=float), 200 if np.ndim(values) == 0 else np.shape(values))
-    time = (step * 1e9 * np.arange(len(found))).astype(np.int64)
-    return Signal(tag, unit, "", time, np.array(found), np.arange(len(found)))
+Values = float | FloatArray
 
 
-def export(**more: tuple[str, object]) -> Export:
-    tags = {**BASE, **more}
+def signal(tag: str, unit: str, values: Values) -> Signal:
+    found = np.full(200, values) if isinstance(values, float) else values
+    time = (10.0 * 1e9 * np.arange(len(found))).astype(np.int64)
+    return Signal(tag, unit, "", time, found, np.arange(len(found)))
+
+
+def export(**more: tuple[str, Values]) -> Export:
+    tags: dict[str, tuple[str, Values]] = {**BASE, **more}
     signals = {tag: signal(tag, unit, value) for tag, (unit, value) in tags.items()}
     return Export(Path("export.csv"), signals, FileKeys(), TimeKeys(column="Timestamp"), ())
 
 
-def tags(model: Model, **more: tuple[str, object]) -> dict[str, str]:
+def tags(model: Model, **more: tuple[str, Values]) -> dict[str, str]:
     found = guess_tags(export(**more), model, TagMap())
     return {name: f"{keys.tag} {keys.unit}" for name, keys in found.quantities.items()}
 
@@ -111,14 +114,14 @@ def test_a_set_point_is_told_from_what_is_measured(tag: str, score: float) -> No
 # -- habits ------------------------------------------------------------------------------------------------------------
 
 
-def habits(model: Model, values: object, tag: str = "AI_401.PV") -> dict[str, object]:
+def habits(model: Model, values: Values, tag: str = "AI_401.PV") -> dict[str, object]:
     given = export(**{tag: ("%", values)})
     found = complete_habits(given, model, guess_tags(given, model, TagMap()))
     return found.quantities["concentrate_grade"].model_dump(exclude={"tag", "unit"}, exclude_defaults=True)
 
 
-def noisy(rows: int = 200) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    found: np.ndarray[tuple[int], np.dtype[np.float64]] = 23 + 0.1 * np.random.default_rng(0).standard_normal(rows)
+def noisy(rows: int = 200) -> FloatArray:
+    found: FloatArray = 23 + 0.1 * np.random.default_rng(0).standard_normal(rows)
     return found
 
 
