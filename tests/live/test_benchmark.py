@@ -52,4 +52,5 @@ def test_a_careless_link_is_caught(
     reason: str,
 ) -> None:
     sabotage(monkeypatch)
-    assert any(words.startswith(reason) for words in run(link, tmp_path, monkeypatch).audit.unsafe)
+    found = run(link, tmp_path, monkeypatch, cycles=250)
+    assert any(words.startswith(reason) for words in found.audit.unsafe)
