@@ -11,6 +11,8 @@ import pytest
 from adaptive_flot.errors import DataError
 from adaptive_flot.records.reading.clock import check_clock, to_utc
 from adaptive_flot.records.reading.raw import UnclearError
+from adaptive_flot.records.reading.signals import read_export
+from adaptive_flot.records.tag_map import TagMap
 
 ZONES = ("Europe/London", "America/Santiago", "Australia/Adelaide", "UTC", "Asia/Kolkata")
 NIGHTS = ("2025-10-26", "2026-04-05", "2025-11-02", "2026-03-29", "2025-09-07")
@@ -58,3 +60,12 @@ def test_other_jumps_are_none_of_summer_time() -> None:
     repeated = whole[np.concatenate([np.arange(400), np.arange(300, 320)])]
     for instants in (whole, hole, repeated):
         check_clock(clock_of(instants, "UTC"), np.arange(len(instants)), FILE)
+
+
+def test_tags_of_an_hour_one_after_the_other_are_no_change_of_the_clock(tmp_path: Path) -> None:
+    """In long form the time goes back by an hour where the next tag begins."""
+    stamps = pd.date_range("2026-03-29 00:00:00", periods=360, freq="10s").strftime("%Y-%m-%d %H:%M:%S")
+    rows = [f"{tag},{stamp},1.5,Good" for tag in ("A", "B") for stamp in stamps]
+    (tmp_path / "export.csv").write_text("\n".join(["Tag,Timestamp,Value,Quality", *rows]))
+    found = read_export(tmp_path / "export.csv", TagMap())
+    assert {len(s) for s in found.signals.values()} == {360}

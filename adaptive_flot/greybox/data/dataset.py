@@ -170,7 +170,8 @@ def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path)
         )
     if f"{column}_measured" in columns:
         raise DataError(f"{file}: column {column!r} is missing; of a time series of `run`, rename '{column}_measured'")
-    raise DataError(f"{file}: column {column!r} is missing; add it ({near_match(column, columns)})")
+    hint = ", or make a record of an export with 'adaptive-flot import'" if column == TIME_COLUMN else ""
+    raise DataError(f"{file}: column {column!r} is missing; add it ({near_match(column, columns)}){hint}")
 
 
 def _other_unit(columns: Sequence[str], name: str, column: str) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import statsmodels.api as sm
+from scipy.stats import f as f_distribution
 
 from adaptive_flot.greybox.quantities import FloatArray
 
@@ -80,7 +80,8 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
         share = 1 - RSS1 / RSS0,               F = (RSS0 - RSS1) / p / (RSS1 / (n - 2 p - 1))
 
     Granger, *Econometrica* 37 (1969) 424; as a test of feedback Caines & Chan, *IEEE Trans. Autom. Control* 20 (1975)
-    498. A feedback that acts at once within a row is not seen.
+    498. Where lags depend on each other, the ranks of the regressions stand for p and 2 p. A feedback that acts
+    within a row is not seen.
     """
     held = _held(y)
     first = int(np.argmax(np.isfinite(held))) if np.isfinite(held).any() else len(held)
@@ -92,13 +93,22 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
     own = np.column_stack([u[p - i : len(u) - i] for i in range(1, p + 1)])
     other = np.column_stack([held[p - i : len(u) - i] for i in range(1, p + 1)])
     own, other, target = (_scaled(a) for a in (own, other, u[p:]))
-    short = sm.OLS(target, sm.add_constant(own, has_constant="add")).fit()
-    long = sm.OLS(target, sm.add_constant(np.column_stack([own, other]), has_constant="add")).fit()
-    if short.ssr <= 1e-20 * n:
+    rss0, rank0 = _residual(own, target)
+    rss1, rank1 = _residual(np.column_stack([own, other]), target)
+    if rss0 <= 1e-20 * n or rank1 == rank0:
         return None
-    share = max(0.0, 1 - long.ssr / short.ssr)
-    p_value = 0.0 if long.ssr <= 1e-14 * short.ssr else float(long.compare_f_test(short)[1])
+    more, left = rank1 - rank0, n - rank1 - 1
+    share = max(0.0, 1 - rss1 / rss0)
+    ratio = (rss0 - rss1) / more / (max(rss1, 1e-300) / left)
+    p_value = float(f_distribution.sf(ratio, more, left))
     return Feedback(name, output, float(share), p_value)
+
+
+def _residual(design: FloatArray, target: FloatArray) -> tuple[float, int]:
+    """Sum of squares that a regression leaves, and its rank; all columns are about their means."""
+    coefficients, _, rank, _ = np.linalg.lstsq(design, target, rcond=1e-10)
+    left = target - design @ coefficients
+    return float(left @ left), int(rank)
 
 
 def block_means(values: FloatArray, size: int) -> FloatArray:

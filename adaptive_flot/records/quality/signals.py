@@ -45,7 +45,7 @@ class SignalQuality:
     low, middle, high
         Quantiles 0.05, 0.5 and 0.95, in the unit.
     noise
-        Standard deviation from row to row, in the unit: median(|y[k] - y[k-1]|) / (0.6745 sqrt(2)).
+        Standard deviation from row to row, in the unit; see the function `noise`.
     drift
         Change over the record, in the unit: Theil and Sen's slope times its duration.
     """

@@ -53,8 +53,8 @@ def read_export(source: Source, tag_map: TagMap) -> Export:
     values = [j for j in range(len(layout.names)) if j not in layout.time]
     numbers = [long["value"]] if long else values
     decimal = keys.decimal or ("." if raw.point else decimal_mark(raw, numbers, slice(layout.first, None)))
-    parts = _long(raw, layout, stamps, long) if long else _wide(raw, layout, stamps, values)
-    zone, said = _zone(stamps, tag_map.time, raw, layout)
+    parts = list(_long(raw, layout, stamps, long) if long else _wide(raw, layout, stamps, values))
+    zone, said = _zone(stamps, tag_map.time, parts[: None if long else 1], raw.file)
     good = {q.lower() for q in (keys.good or GOOD)}
     signals = {}
     for part in parts:
@@ -152,7 +152,7 @@ def _long(raw: RawTable, layout: Layout, stamps: Stamps, columns: dict[str, int]
         )
 
 
-def _zone(stamps: Stamps, keys: TimeKeys, raw: RawTable, layout: Layout) -> tuple[str | None, str]:
+def _zone(stamps: Stamps, keys: TimeKeys, parts: list[_Part], file: Path) -> tuple[str | None, str]:
     """Zone in which the clock times are read, None where they need none, and what is said of it."""
     if not stamps.dated:
         return None, f"{stamps.form} from the start"
@@ -160,7 +160,8 @@ def _zone(stamps: Stamps, keys: TimeKeys, raw: RawTable, layout: Layout) -> tupl
         return None, "with an offset of its own"
     if keys.zone:
         return keys.zone, keys.zone
-    check_clock(stamps.clock, raw.cells.index.to_numpy()[stamps.rows], raw.file)
+    for part in parts:  # tags may follow one another in the file, each with times of its own
+        check_clock(part.stamps.clock, part.lines, file)
     return "UTC", "no zone given: read as UTC, a clock that is never changed"
 
 
