@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import median_filter
 
-from adaptive_flot.errors import DataError, RangeError
+from adaptive_flot.errors import DataError, RangeError, located
 from adaptive_flot.greybox.data.columns import shown
 from adaptive_flot.greybox.data.wrong_unit import is_far_outside, units_that_fit
 from adaptive_flot.greybox.quantities import FloatArray, Quantity
@@ -97,7 +97,8 @@ def clean(signal: Signal, quantity: Quantity, keys: TagKeys, file: Path) -> Clea
         fates[~np.isfinite(signal.values)] = FATES.index("quality")
     numbers = np.array([float(c) for c in keys.bad if _is_number(c)])
     fates[np.isin(signal.values, numbers)] = FATES.index("code")
-    values = convert(signal.values, unit, quantity.unit)
+    with located(where):
+        values = convert(signal.values, unit, quantity.unit)
     _check_unit(values[fates == 0], quantity, unit, where)
     low, high = (
         (quantity.lower, quantity.upper)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.errors import DataError
+from adaptive_flot.errors import DataError, located
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import FloatArray, Quantity
 from adaptive_flot.records.clean import runs_of_equal, spikes
@@ -42,7 +42,8 @@ def complete_habits(export: Export, model: Model, known: TagMap) -> TagMap:
         more: dict[str, object] = {}
         given = keys.model_fields_set
         if "bad" not in given:
-            codes = bad_codes(signal, q, keys.unit or q.unit, export)
+            with located(f"{export.file}: {q.name}: tag {keys.tag!r}"):
+                codes = bad_codes(signal, q, keys.unit or q.unit, export)
             more |= {"bad": codes} if codes else {}
         if q.name not in inputs:
             values = signal.values[np.isfinite(signal.values) & ~np.isin(signal.values, _numbers(more.get("bad")))]
@@ -92,7 +93,8 @@ def _freezes(values: FloatArray) -> bool:
     runs = runs_of_equal(values)
     still = sum(b - a for a, b in runs if b - a >= LONG_RUN)
     rest = sum(b - a for a, b in runs if b - a < LONG_RUN)
-    return still > 0 and rest < 0.5 * max(len(values) - still, 1)
+    moving = len(values) - still
+    return still > 0 and moving > 0.2 * len(values) and rest < 0.5 * moving
 
 
 def period(signal: Signal) -> tuple[float, bool]:
@@ -120,7 +122,8 @@ def period(signal: Signal) -> tuple[float, bool]:
 def _grid(export: Export, model: Model, known: TagMap) -> TagMap:
     """Step: that of the fastest regular input, else a round one for the fastest. Held for three steps."""
     inputs = [export.signals[known.quantities[q.name].tag] for q in model.inputs]
-    found = {s.tag: period(s) for s in inputs}
+    with located(str(export.file)):
+        found = {s.tag: period(s) for s in inputs}
     if known.grid.step is None:
         regular = [p for p, even in found.values() if even]
         fastest = min(regular) if regular else min(p for p, _ in found.values())

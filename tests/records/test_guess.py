@@ -139,6 +139,10 @@ def test_a_sensor_that_stops_is_seen(model: Model) -> None:
     assert habits(model, values) == {"frozen": "300 s"}
 
 
+def test_a_constant_signal_is_no_sensor_that_stopped(model: Model) -> None:
+    assert habits(model, np.full(200, 23.0)) == {}
+
+
 def test_lone_values_far_from_all_others_are_dropped(model: Model) -> None:
     values = noisy()
     values[[30, 90]] = 60.0

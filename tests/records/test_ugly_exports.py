@@ -110,6 +110,8 @@ SOUND = {
     "unsorted": Sound(lambda t: t.sample(frac=1, random_state=1)),
     "rows twice": Sound(lambda t: pd.concat([t, t.iloc[10:20]])),
     "a row corrected by a later one": Sound(lambda t: pd.concat([put("AI_401.PV [%]", 9, 99.0)(t), t.iloc[9:10]])),
+    "a clock that jumped to 1970": Sound(put("Timestamp", 9, "1970-01-01 00:00:00"), missing=(8,)),
+    "a clock that jumped to 2099": Sound(put("Timestamp", 9, "2099-01-01 00:00:00"), missing=(8,)),
     "empty columns and blank lines": Sound(
         lambda t: t.assign(Empty=""), lines(lambda ls: [*ls[:4], "", *ls[4:], "", ""])
     ),
@@ -235,6 +237,12 @@ REFUSED = {
     "map and header differ": Refused(
         "is in L/min by the file and in m3/h by the map", given="air_flow: {tag: FIC_101.PV, unit: m3/h}"
     ),
+    "map gives a unit of something else": Refused(
+        "concentrate_grade: tag 'AI_401.PV': unit 'mm' can not be converted to '-'",
+        lambda t: t.rename(columns={SHORT[3]: "AI_401.PV"}),
+        given="concentrate_grade: {tag: AI_401.PV, unit: mm}",
+    ),
+    "a single row": Refused("tag 'FIC_101.PV' has 1 value; a record needs at least 2", lambda t: t.iloc[:1]),
     "map names no tag of the file": Refused(
         "air_flow: no tag 'FIC_1O1.PV'; did you mean 'FIC_101.PV'", given="air_flow: {tag: FIC_1O1.PV, unit: L/min}"
     ),

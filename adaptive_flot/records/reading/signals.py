@@ -18,7 +18,7 @@ from adaptive_flot.records.reading.export import Export, Instants, Signal
 from adaptive_flot.records.reading.header import Layout, find_layout, split_unit
 from adaptive_flot.records.reading.numbers import decimal_mark, read_numbers, unit_behind, without_unit
 from adaptive_flot.records.reading.raw import RawTable
-from adaptive_flot.records.reading.stamps import Stamps, read_stamps
+from adaptive_flot.records.reading.stamps import Stamps, read_stamps, without_jumps
 from adaptive_flot.records.reading.workbook import read_raw
 from adaptive_flot.records.tag_map import FileKeys, TagMap, TimeKeys
 from adaptive_flot.records.units import is_unit
@@ -49,6 +49,7 @@ def read_export(source: Source, tag_map: TagMap) -> Export:
     layout = find_layout(raw, tag_map.time)
     time_unit = layout.units[layout.time[0]] or ("s" if layout.names[layout.time[0]].lower().endswith("_s") else "")
     stamps = read_stamps(raw, layout.time, layout.first, tag_map.time.format, time_unit)
+    stamps, jumped = without_jumps(stamps)
     long = _long_columns(layout, keys, raw.file)
     values = [j for j in range(len(layout.names)) if j not in layout.time]
     numbers = [long["value"]] if long else values
@@ -75,7 +76,14 @@ def read_export(source: Source, tag_map: TagMap) -> Export:
         **{k: layout.names[j] for k, j in long.items() if k in ("tag", "value", "quality")},
         good=keys.good,
     )
-    found = (*raw.found, shape, *(["decimal comma"] if decimal == "," else []), f"time: {' and '.join(names)}, {said}")
+    odd = [f"left out: {jumped} rows with a time far from all others"] if jumped else []
+    found = (
+        *raw.found,
+        shape,
+        *odd,
+        *(["decimal comma"] if decimal == "," else []),
+        f"time: {' and '.join(names)}, {said}",
+    )
     return Export(raw.file, signals, known, TimeKeys(column=column, zone=zone, format=form), found)
 
 

@@ -29,6 +29,9 @@ MONTHS = {m: k for k, m in enumerate("jan feb mar apr may jun jul aug sep oct no
 UNITS = {"epoch s": 1e9, "epoch ms": 1e6, "seconds": 1e9, "minutes": 60e9, "hours": 3600e9, "excel": 86_400e9}
 """Nanoseconds in one, by form of a time that is a number."""
 EXCEL_ZERO = np.datetime64("1899-12-30", "ns")
+DAY = 86_400e9
+FAR = 10.0
+"""Spans of a record from the rest of it, at which a time is one of a clock that jumped."""
 MOST_AFTER = 5
 """Lines without a time that may stand below a table, as `End of report`."""
 
@@ -56,6 +59,20 @@ class Stamps:
     rows: np.ndarray[Any, np.dtype[np.int64]]
     form: str
     dated: bool = True
+
+
+def without_jumps(stamps: Stamps) -> tuple[Stamps, int]:
+    """Leave out a few times far from all others, as a clock shows after a restart (1970); and how many they are.
+
+    Far is ten times the span of the others, and a day at least. More than one in a hundred are no jumps.
+    """
+    low, high = np.quantile(stamps.clock.astype(float), (0.05, 0.95))
+    reach = max(FAR * (high - low), DAY)
+    near = (stamps.clock >= low - reach) & (stamps.clock <= high + reach)
+    count = int((~near).sum())
+    if not 0 < count <= max(1, len(near) // 100):
+        return stamps, 0
+    return replace(stamps, clock=stamps.clock[near], rows=stamps.rows[near]), count
 
 
 def looks_like_time(texts: pd.Series) -> pd.Series:
