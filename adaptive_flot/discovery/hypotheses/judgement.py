@@ -135,12 +135,12 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
     best = standing[0]
     excess = max(level - least, 1e-12)
     explained = float((level - best.total / count) / excess)
-    rivals = [t for t in ranked if t is not best]
-    alike = tied(
-        blocks, null, best, rivals, usual is not None and usual.exceeded(best, count, len(blocks.edges)) is None
-    )
+    adequate = usual is not None and usual.exceeded(best, count, len(blocks.edges)) is None
+    alike = tied(blocks, null, best, [t for t in ranked if t is not best], adequate)
+    beaten = ranked[0] is not best and not any(t is ranked[0] for t in alike)
+    best, alike = _simplest(best, alike)
     judged = Judged("named", best, alike, "", explained)
-    if ranked[0] is not best and not any(t is ranked[0] for t in alike):
+    if beaten:
         why = "what fits best makes an output worse, so that something else is the matter"
         return Judged("abstain", best, alike, why, explained), blocks
     if explained < EXPLAINED:

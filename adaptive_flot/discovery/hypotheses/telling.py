@@ -15,8 +15,10 @@ from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.greybox.model import Model
 
-ABOVE_NOISE = 3.0
-"""An error so many times the noise from row to row says that more is missing."""
+ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
+"""An error so many times the noise from row to row, or that of the reference, says that more is missing."""
+MOVED = 1.0
+"""A constant is said to have moved from so many of its standard deviations on."""
 JUDGED_ON = "fresh stretches"
 
 
@@ -55,21 +57,41 @@ def verdict_of(
         error=error,
         split=JUDGED_ON,
         parameters=labels,
-        notes=_left(calibration, error) if told else (),
+        notes=(
+            *(_left(calibration, error, reference) if told else ()),
+            *(_moved(calibration, after) if reference else ()),
+        ),
         seconds=seconds,
     )
 
 
-def _left(calibration: Calibration, error: Sequence[OutputChange]) -> tuple[str, ...]:
-    """What stays open: errors that are still far above the noise from row to row."""
+def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
+    """Constants that the new records want elsewhere, within what the reference leaves open."""
+    constants, model = calibration.constants, calibration.model
+    std = np.sqrt(np.sum(constants.root**2, axis=1))
+    label = {p.name: p.label for p in model.parameters}
+    moved = [
+        f"{label[n]} {after.fit.value(n):.3g} instead of {mean:.3g} +- {s:.2g}"
+        for n, mean, s in zip(constants.names, constants.mean, std, strict=True)
+        if abs(after.fit.value(n) - mean) > MOVED * s
+    ]
+    if not moved:
+        return ()
+    return (f"The new records want other constants, which the reference leaves open: {', '.join(moved)}.",)
+
+
+def _left(calibration: Calibration, error: Sequence[OutputChange], reference: bool) -> tuple[str, ...]:
+    """What stays open: errors that are still above those of the reference, or far above the noise from row to row."""
+    level, factor = (calibration.usual.overall, ABOVE_USUAL) if reference else (calibration.noise, ABOVE_NOISE)
     left = [
-        f"{c.output} {c.after / noise:.2g} times"
-        for c, noise in zip(error, calibration.noise, strict=True)
-        if c.after > ABOVE_NOISE * noise
+        f"{c.output} {c.after / usual:.3g} times"
+        for c, usual in zip(error, level, strict=True)
+        if c.after > factor * usual
     ]
     if not left:
         return ()
-    return (f"More is missing: with it the error is still above the noise from row to row: {', '.join(left)}.",)
+    than = "that of the reference" if reference else "the noise from row to row"
+    return (f"More is missing: the error that is left is still above {than}: {', '.join(left)}.",)
 
 
 def _effects(model: Model, null: Tested, judged: Judged) -> tuple[NamedEffect, ...]:

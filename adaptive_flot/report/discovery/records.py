@@ -148,7 +148,7 @@ def _constants(comparison: Comparison) -> Table:
     cells = []
     for name, mean, s in zip(constants.names, constants.mean, std, strict=True):
         p = comparison.calibration.model.parameters[comparison.calibration.model.index("parameters", name)]
-        cells.append((p.label, p.unit, f"{mean:.4g}", f"{s:.2g}", f"{best.fit.value(name):.4g}"))
+        cells.append((p.label, p.unit, f"{mean:.4g}", f"{s:.3g}", f"{best.fit.value(name):.4g}"))
     source = "the reference" if comparison.referred else "all records"
     header: Sequence[str] = ("constant", "unit", f"by {source}", "standard deviation", "on the new records")
     return Table("Constants of the model", tuple(header), tuple(cells), 2)
