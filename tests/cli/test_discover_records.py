@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from tests.cli.conftest import Call
@@ -61,3 +62,16 @@ def test_a_mistake_is_one_line_and_writes_nothing(
     result = call("discover", records[0], "--model", MODEL, "--out", "r", *more)
     assert result.code == 2 and says in result.err and len(result.err.splitlines()) == 1
     assert not (tmp_path / "r").exists()
+
+
+def test_a_hole_splits_a_record_and_nothing_is_fitted_across_it(
+    call: Call, records: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """100 rows are lost, the clock goes on: the draught is named all the same, from both stretches."""
+    new, old = records
+    table = pd.read_csv(new)
+    pd.concat([table[:200], table[300:]]).to_csv(tmp_path / "holed.csv", index=False)
+    result = call("discover", "holed.csv", "--reference", old, "--model", MODEL, "--out", "r")
+    assert result.code == 0 and result.out.startswith("named: Heat loss is 65 % larger."), result.out + result.err
+    page = (tmp_path / "r" / "report.html").read_text()
+    assert "holed, stretch 1" in page and "holed, stretch 2" in page

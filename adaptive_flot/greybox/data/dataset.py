@@ -101,7 +101,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
         An input outside the model's physical range, or a column in another unit than its name says (`check_unit`).
     """
     file = named(path)
-    table, notes = longest_stretch(read_table(path), file)
+    table, notes = longest_stretch(read_table(path), TIME_COLUMN, file)
     columns = [str(c) for c in table.columns]
     time = time_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
     dt = _interval(table, time, file)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.data.tables import Source
+from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
+from adaptive_flot.greybox.data.stretches import every_stretch
+from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.processes.registry import read_measurements
+from adaptive_flot.records.importing import is_record
 from adaptive_flot.records.tag_map import TagMap
 
 
@@ -45,7 +48,7 @@ def discover_records(
     DataError, RangeError, ModelError
         A table or the model can not be used.
     """
-    new, old = ([_read(s, model, tag_map) for s in group] for group in (sources, references))
+    new, old = ([r for s in group for r in _read(s, model, tag_map)] for group in (sources, references))
     return compare(model, new, old, processes=processes, progress=progress)
 
 
@@ -61,5 +64,14 @@ def save_extended(
     return True
 
 
-def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None) -> Dataset:
-    return source if isinstance(source, Dataset) else read_measurements(source, model, tag_map=tag_map).record
+def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None) -> list[Dataset]:
+    """A record, or each of its stretches: nothing is fitted across a gap."""
+    if isinstance(source, Dataset):
+        return [source]
+    if tag_map is None or is_record(source, model):
+        parts = every_stretch(read_table(source), TIME_COLUMN, named(source))
+        if len(parts) > 1:
+            stem = named(source).stem
+            read = [read_measurements(part, model).record for part in parts]
+            return [replace(r, name=f"{stem}, stretch {k}") for k, r in enumerate(read, start=1)]
+    return [read_measurements(source, model, tag_map=tag_map).record]
