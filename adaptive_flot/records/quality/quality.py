@@ -114,8 +114,8 @@ def _loops(pairs: tuple[Feedback, ...]) -> list[str]:
     if not closed:
         return ["No input seems to be set from an output: the record is in open loop, as far as past values tell."]
     return [
-        f"Closed loop: past values of {f.output} explain {100 * f.share:.0f} % of the moves of {f.input} that its own "
-        "past does not. Correlations then mix the plant with its controller."
+        f"Closed loop, or stamps of {f.input} that are late: past values of {f.output} explain {100 * f.share:.0f} % "
+        "of its moves that its own past does not. Correlations then mix the plant with its controller."
         for f in closed
     ]
 

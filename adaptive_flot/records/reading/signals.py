@@ -18,7 +18,8 @@ from adaptive_flot.records.reading.export import Export, Instants, Signal
 from adaptive_flot.records.reading.header import Layout, find_layout, split_unit
 from adaptive_flot.records.reading.numbers import decimal_mark, read_numbers, unit_behind, without_unit
 from adaptive_flot.records.reading.raw import RawTable
-from adaptive_flot.records.reading.stamps import Stamps, read_stamps, without_jumps
+from adaptive_flot.records.reading.stamps import read_stamps
+from adaptive_flot.records.reading.times import Stamps, without_jumps
 from adaptive_flot.records.reading.workbook import read_raw
 from adaptive_flot.records.tag_map import FileKeys, TagMap, TimeKeys
 from adaptive_flot.records.units import is_unit

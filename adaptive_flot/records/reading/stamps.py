@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.data.columns import shown
+from adaptive_flot.records.reading.counted import UNITS, counted
 from adaptive_flot.records.reading.numbers import plain, read_numbers
 from adaptive_flot.records.reading.raw import RawTable, UnclearError
+from adaptive_flot.records.reading.times import Stamps, check_all_read
 
 _YMD = r"(?P<y>\d{4})[-/.](?P<m>\d{1,2})[-/.](?P<d>\d{1,2})"
 _YEAR = r"(?P<y>\d{4}|\d{2})"
@@ -26,53 +27,8 @@ FORMS = {
     name: rf"(?:[A-Za-z]{{2,3}},?\s+)?{date}(?:[T ,]+{_CLOCK})?" for name, date in (("iso", _YMD), ("named", _NAMED))
 } | {"numbers": rf"{_AB}(?:[T ,]+{_CLOCK})?"}
 MONTHS = {m: k for k, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
-UNITS = {"epoch s": 1e9, "epoch ms": 1e6, "seconds": 1e9, "minutes": 60e9, "hours": 3600e9, "excel": 86_400e9}
-"""Nanoseconds in one, by form of a time that is a number."""
-EXCEL_ZERO = np.datetime64("1899-12-30", "ns")
-DAY = 86_400e9
-FAR = 10.0
-"""Spans of a record from the rest of it, at which a time is one of a clock that jumped."""
 MOST_AFTER = 5
 """Lines without a time that may stand below a table, as `End of report`."""
-
-
-@dataclass(frozen=True)
-class Stamps:
-    """Times of the rows of an export.
-
-    Attributes
-    ----------
-    clock
-        Times (N,) [ns since 1970], as the clock of the file shows them.
-    offset
-        Whether these are UTC: the stamps have an offset of their own, or count from a fixed instant.
-    rows
-        Rows (N,) of the table that have a time; lines below the table are left out.
-    form
-        Their form, as a map names it.
-    dated
-        Whether they stand for dates at all; else they count from the start of the record.
-    """
-
-    clock: np.ndarray[Any, np.dtype[np.int64]]
-    offset: bool
-    rows: np.ndarray[Any, np.dtype[np.int64]]
-    form: str
-    dated: bool = True
-
-
-def without_jumps(stamps: Stamps) -> tuple[Stamps, int]:
-    """Leave out a few times far from all others, as a clock shows after a restart (1970); and how many they are.
-
-    Far is ten times the span of the others, and a day at least. More than one in a hundred are no jumps.
-    """
-    low, high = np.quantile(stamps.clock.astype(float), (0.05, 0.95))
-    reach = max(FAR * (high - low), DAY)
-    near = (stamps.clock >= low - reach) & (stamps.clock <= high + reach)
-    count = int((~near).sum())
-    if not 0 < count <= max(1, len(near) // 100):
-        return stamps, 0
-    return replace(stamps, clock=stamps.clock[near], rows=stamps.rows[near]), count
 
 
 def looks_like_time(texts: pd.Series) -> pd.Series:
@@ -122,10 +78,10 @@ def read_stamps(raw: RawTable, columns: tuple[int, ...], first: int, form: str |
     texts = texts.iloc[rows]
     number = read_numbers(texts, "," if not raw.point and texts.str.contains(",").any() else ".")
     if form in UNITS or (form is None and np.isfinite(number).mean() > 0.9):
-        return _counted(raw, texts, number, form, unit, rows + first)
+        return counted(raw, texts, number, form, unit, rows + first)
     if form is not None and "%" in form:
         dates = pd.to_datetime(texts, format=form, errors="coerce")
-        _all_read(raw, texts, dates.isna().to_numpy(), f"not of the form {form!r}")
+        check_all_read(raw, texts, dates.isna().to_numpy(), f"not of the form {form!r}")
         aware = dates.dt.tz is not None
         clock = (dates.dt.tz_convert("UTC").dt.tz_localize(None) if aware else dates).astype("datetime64[ns]")
         return Stamps(clock.to_numpy().astype(np.int64), aware, rows + first, form)
@@ -154,48 +110,6 @@ def _rows(texts: pd.Series, form: str | None) -> np.ndarray[Any, np.dtype[np.int
     return filled[: len(filled) - after]
 
 
-def _all_read(raw: RawTable, texts: pd.Series, wrong: np.ndarray[Any, np.dtype[np.bool_]], why: str) -> None:
-    if wrong.any():
-        k = int(np.flatnonzero(wrong)[0])
-        raise DataError(
-            f"{raw.file}: line {texts.index[k]}: the time {shown(str(texts.iloc[k]))} is {why} ({int(wrong.sum())} in "
-            "all); correct or remove the row, or give the form in a map, as 'time: {format: \"%d.%m.%Y %H:%M\"}'"
-        )
-
-
-def _counted(raw: RawTable, texts: pd.Series, number: Any, form: str | None, unit: str, rows: Any) -> Stamps:
-    """Times that are numbers: seconds since 1970, days of a spreadsheet, or time since the start."""
-    _all_read(raw, texts, ~np.isfinite(number), "no number")
-    found = form or _what_it_counts(raw, texts, number, unit)
-    scaled = np.round(number * UNITS[found])
-    if np.abs(scaled).max() > 9e18:
-        raise DataError(f"{raw.file}: times up to {np.abs(number).max():g} are no {found}; give the form in a map")
-    clock = scaled.astype(np.int64)
-    if found == "excel":  # whole milliseconds: a day in a double is known to a microsecond
-        return Stamps(np.round(clock, -6) + EXCEL_ZERO.astype(np.int64), False, rows, found)
-    return Stamps(clock, True, rows, found, dated=found.startswith("epoch"))
-
-
-def _what_it_counts(raw: RawTable, texts: pd.Series, number: Any, unit: str) -> str:
-    named = {"s": "seconds", "sec": "seconds", "min": "minutes", "h": "hours", "hr": "hours"}.get(unit.lower())
-    if named is not None:
-        return named
-    low, high = float(number.min()), float(number.max())
-    if 1e9 <= low and high < 4e9:
-        return "epoch s"
-    if 1e12 <= low and high < 4e12:
-        return "epoch ms"
-    step = float(np.median(np.abs(np.diff(number)))) if len(number) > 1 else 1.0
-    if 20_000 <= low and high < 80_000 and step < 1 / 24:  # the days from 1954 to 2119
-        return "excel"
-    choices = ("excel", "seconds") if 20_000 <= low and high < 80_000 else ("seconds", "minutes", "hours")
-    raise UnclearError(
-        f"{raw.file}: line {texts.index[0]}: the time {texts.iloc[0]} is a number that may count several things",
-        "time",
-        [{"format": choice} for choice in choices],
-    )
-
-
 def _written(raw: RawTable, texts: pd.Series, form: str | None, rows: Any) -> Stamps:
     """Times as dates and clock times."""
     texts = plain(texts)
@@ -206,7 +120,7 @@ def _written(raw: RawTable, texts: pd.Series, form: str | None, rows: Any) -> St
         return replace(found, clock=found.clock[codes], rows=rows)
     kinds = {name: texts.str.fullmatch(pattern).to_numpy(dtype=bool) for name, pattern in FORMS.items()}
     name = max(kinds, key=lambda k: int(kinds[k].sum()))
-    _all_read(raw, texts, ~kinds[name], "no time that is known")
+    check_all_read(raw, texts, ~kinds[name], "no time that is known")
     order = "iso"
     if name == "numbers":
         dates = texts.str.slice(0, 10).drop_duplicates().str.extract(rf"^{_AB[: -len(_YEAR)]}(?P<y>\d{{2,4}})")
@@ -220,13 +134,13 @@ def _written(raw: RawTable, texts: pd.Series, form: str | None, rows: Any) -> St
         parts = parts.assign(d=parts[day], m=parts[month])
     if name == "named":
         months = parts["month"].str.lower().map(MONTHS)
-        _all_read(raw, texts, months.isna().to_numpy(), "of a month that is not known")
+        check_all_read(raw, texts, months.isna().to_numpy(), "of a month that is not known")
         parts = parts.assign(m=months)
     clock, wrong = _instants(parts)
-    _all_read(raw, texts, wrong, "no time of any calendar" if form is None else f"no time, read {order}")
+    check_all_read(raw, texts, wrong, "no time of any calendar" if form is None else f"no time, read {order}")
     zone = parts["z"]
     if zone.notna().any() and zone.isna().any():
-        _all_read(raw, texts, zone.isna().to_numpy(), "without an offset, where others have one")
+        check_all_read(raw, texts, zone.isna().to_numpy(), "without an offset, where others have one")
     return Stamps(clock, bool(zone.notna().all()), rows, order)
 
 
