@@ -18,8 +18,8 @@ from tests.edits import edit
 from tests.live.bench import INITIAL, Bench, Distort, as_told
 
 CONTENT = f"""
-description: Ten minutes of the cell under a controller that costs little
-duration_s: 600
+description: Ten hours of the cell under a controller that costs little
+duration_s: 36000
 seeds: [1]
 inputs:
   air_flow_m3_s: {{profile: steps, at_s: [0, 4, 8], values: [1.4e-3, 1.6e-3, 1.5e-3]}}

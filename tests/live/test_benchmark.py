@@ -52,5 +52,5 @@ def test_a_careless_link_is_caught(
     reason: str,
 ) -> None:
     sabotage(monkeypatch)
-    found = run(link, tmp_path, monkeypatch, cycles=250)
+    found = run(link, tmp_path, monkeypatch, cycles=400)
     assert any(words.startswith(reason) for words in found.audit.unsafe)
