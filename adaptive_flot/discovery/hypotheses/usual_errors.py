@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from adaptive_flot.discovery.hypotheses.rows import Rows
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -40,7 +40,7 @@ class UsualErrors:
         Range of the inputs (nu,).
     """
 
-    tree: cKDTree
+    tree: KDTree
     magnitudes: FloatArray
     overall: FloatArray
     low: FloatArray
@@ -91,4 +91,4 @@ def usual_errors(
     every = np.concatenate([inputs, *(r.inputs for r in others)])
     low, width = every.min(axis=0), np.ptp(every, axis=0)
     width = np.where(width > 0, width, 1.0)
-    return UsualErrors(cKDTree((inputs - low) / width), magnitudes, overall_sizes(rows, errors, floor), low, width)
+    return UsualErrors(KDTree((inputs - low) / width), magnitudes, overall_sizes(rows, errors, floor), low, width)

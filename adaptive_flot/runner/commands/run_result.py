@@ -12,9 +12,10 @@ import pandas as pd
 from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
+from adaptive_flot.processes.flotation.account import account
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.loop.loop import Step
-from adaptive_flot.runner.results.accounts import account, control_account
+from adaptive_flot.runner.results.accounts import control_account
 from adaptive_flot.runner.results.plans import plan_table
 from adaptive_flot.runner.results.timeseries import fits, time_series
 from adaptive_flot.runner.scenario.realisation import Realisation

@@ -3,7 +3,7 @@
 Map
 ---
 timeseries.py        One row an interval, and the fits that are taken from it.
-accounts.py          What the run earned, and how it was decided.
+accounts.py          How the inputs of a run were decided.
 plans.py             What the controller expected.
 replay_table.py      The table of a replay, and its errors.
 whiteness.py         Are innovations white?

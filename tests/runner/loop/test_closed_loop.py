@@ -11,10 +11,10 @@ import pytest
 
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox import Model
+from adaptive_flot.processes.flotation.account import account
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.results.accounts import account
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from adaptive_flot.errors import ScenarioError
+from adaptive_flot.processes.flotation.account import account
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.results.accounts import account
 from adaptive_flot.runner.scenario.keys import DisturbancePart
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.profiles import Factors, Steps
