@@ -82,7 +82,9 @@ FAULTS: dict[str, Callable[[TagValue], TagValue | None]] = {
 }
 
 
-@pytest.mark.parametrize(("name", "fault"), [*(("air_flow", f) for f in FAULTS), ("acting air_flow", "bad")])
+@pytest.mark.parametrize(
+    ("name", "fault"), [*(("air_flow", f) for f in FAULTS), *(("acting air_flow", f) for f in ("bad", "out of range"))]
+)
 def test_no_move_is_computed_from_an_input_that_is_not_good(at_closed: AtClosed, fault: str, name: str) -> None:
     """The link sheds after three bad cycles, and the plant holds what acted."""
     bench = at_closed(changed(name=name, make=FAULTS[fault]))

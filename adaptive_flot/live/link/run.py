@@ -91,7 +91,7 @@ class LinkRun:
         begin = loop.time()
         well = all(not result.problem for result in before.values())
         snapshot = NOTHING if client is None else client.snapshot(alive, in_time, well)
-        self.state, outcome = await asyncio.to_thread(self.cycle.step, self.state, snapshot)
+        self.state, outcome = await self._stepped(client, snapshot)
         found = self.discovery.look(outcome)
         noise = self.state.estimation.noise_std
         await asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found)
@@ -100,6 +100,16 @@ class LinkRun:
         written = await self._tell(client, outcome, in_time)
         self._show(Progress(snapshot, outcome, seconds, found))
         return in_time, written
+
+    async def _stepped(self, client: PlantClient | None, snapshot: Snapshot) -> tuple[CycleState, Outcome]:
+        """One step; one that does not end (a solver may hang) gives control back before it is waited for."""
+        working = asyncio.create_task(asyncio.to_thread(self.cycle.step, self.state, snapshot))
+        longest = max(self.link.file.cycle.shed_after * self._interval, LEAST_PATIENCE_S)
+        done, _ = await asyncio.wait({working}, timeout=longest)
+        if not done and client is not None and self.state.modes.mode is Mode.CLOSED:
+            with contextlib.suppress(*LOST):
+                await client.tell(self.state.number + 1, False, f"{Mode.SHED.name.lower()}: a cycle does not end")
+        return await working
 
     async def _tell(self, client: PlantClient | None, outcome: Outcome, in_time: bool) -> dict[str, Written]:
         """Heartbeat, request and mode; then the set-points, unless the cycle took too long."""

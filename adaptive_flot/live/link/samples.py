@@ -58,7 +58,10 @@ class Samples:
             name: tag.rules(Scale.of(tag.unit, known[name].unit), known[name].lower, known[name].upper)
             for name, tag in link.file.tags.items()
         }
-        self._of_acting = {name: TagRules(stale_after_s=self.rules[name].stale_after_s) for name in link.file.writes}
+        self._of_acting = {  # a set-point may stand still and step, but not leave the range of what it sets
+            name: TagRules(self.rules[name].low, self.rules[name].high, self.rules[name].stale_after_s)
+            for name in link.file.writes
+        }
         limited = () if scenario.limits is None else tuple(scenario.limits.outputs)
         self._inputs = model.names("inputs")
         self._needed = tuple(dict.fromkeys([*scenario.setup.outputs, *(n for n in limited if n in self.rules)]))
