@@ -68,9 +68,11 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
         module = _import(module_name, folder)
     except ModuleNotFoundError as error:
         stem = Path(module_name).stem
-        raise PluginError(
-            f"{what} {address!r}: no module {error.name!r}; put {stem}.py beside the file that names it or here"
-        ) from error
+        if module_file(module_name, folder) is not None:
+            reason = f"{stem}.py imports {error.name!r}, which is not there; put it beside {stem}.py, or install it"
+        else:
+            reason = f"no module {error.name!r}; put {stem}.py beside the file that names it or here"
+        raise PluginError(f"{what} {address!r}: {reason}") from error
     except (Exception, SystemExit) as error:
         file = module_file(module_name, folder)
         place = _place(error, {str(file.resolve())}) if file is not None else None
@@ -115,6 +117,8 @@ def _import_file(file: Path) -> ModuleType:
         raise ModuleNotFoundError(str(file), name=str(file))
     module = importlib.util.module_from_spec(spec)
     sys.modules[file.stem] = module
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))  # it may import its neighbours, also later, as a script may
     try:
         spec.loader.exec_module(module)
     except BaseException:

@@ -120,7 +120,7 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
 def _meaning(model: Model, effect: Effect) -> str:
     """What the table of known effects says of an effect."""
     if not model.known_effects:
-        return "named by the model's own site and driver"
+        return "the model lists no known effects"
     known = listed(model, effect)
     if known is None:
         return "not listed among the effects known for this model"

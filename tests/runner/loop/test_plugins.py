@@ -134,7 +134,7 @@ def test_the_module_may_be_given_as_the_path_of_its_file(tmp_path: Path, write_m
         ("own_missing:Mine", "", "no module 'own_missing'"),
         ("own_broken:Mine", "x = 1 +", "importing 'own_broken' failed: SyntaxError"),
         ("own_broken:Mine", "raise ValueError('no')", "importing 'own_broken' failed: ValueError: no"),
-        ("own_broken:Mine", "import not_there_either", "no module 'not_there_either'"),
+        ("own_broken:Mine", "import not_there_either", "own_broken.py imports 'not_there_either', which is not there"),
         ("own_broken:Myne", "class Mine: pass", "has no 'Myne'; did you mean 'Mine'"),
         ("own_broken:", "class Mine: pass", "has no ''"),
         (":Mine", "", "estimator ':Mine'"),
@@ -148,6 +148,16 @@ def test_what_can_not_be_loaded_is_one_line(
     with pytest.raises(PluginError) as caught:
         load(address, ESTIMATORS, "estimator", tmp_path)
     assert says in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_module_may_import_its_neighbours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever the command is given from: a model of one's own is often more than one file."""
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.chdir("/")
+    (tmp_path / "own_neighbour.py").write_text("SHARE = 0.25")
+    (tmp_path / "own_importer.py").write_text("from own_neighbour import SHARE\n\ndef make(): return SHARE")
+    made = load(f"{tmp_path}/own_importer.py:make", {}, "model", None)
+    assert made() == 0.25
 
 
 def test_a_model_beside_the_record_is_fitted(tmp_path: Path, write_module: WriteModule) -> None:
