@@ -115,6 +115,7 @@ def _at_site(
     if site.role == "sensor" and moves:
         if low < 0 < high or low >= 0:
             yield _sign(site, spread)
+        yield _frozen(site, low, spread)
         lag = _lag(site, size, dt, LONGEST_LAG * duration)
         shortest = next(c.lower for c in lag.effect.terms if c.name == "time_constant")
         if shortest < LONGEST_LAG * duration:
@@ -144,6 +145,14 @@ def _stuck_or_leaking(site: Site, low: float, spread: float) -> Iterator[Hypothe
         site.name, "own_value", "leak", {"amplitude": 1.0, "level": low}, {"width": ROUNDING * spread}
     )  # fmt: skip
     yield Hypothesis(site.name, "own_value", "leaks", effect, ("level",), levels[1:])
+
+
+def _frozen(site: Site, low: float, spread: float) -> Hypothesis:
+    """A sensor that has stopped; its level may be anywhere."""
+    effect = Effect(site.name, "own_value", "stuck", {"amplitude": 1.0})
+    return Hypothesis(
+        site.name, "own_value", "stuck", effect, ("level",), tuple({"level": low + s * spread} for s in LEVELS)
+    )
 
 
 def _limited(site: Site, low: float, spread: float) -> Hypothesis:

@@ -20,10 +20,12 @@ from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.rows import Rows
 from adaptive_flot.greybox.model import FloatArray
 
-Word = Literal["none", "named", "class", "abstain"]
+Word = Literal["none", "named", "class", "abstain", "insufficient"]
 CHANCE = 0.95
 """Quantile of what chance does."""
 DRAWS = 999
+FEWEST_ROWS = 60
+"""Rows that the new records, and the reference, must have."""
 LARGEST_CLASS = 3
 """Parts that a class may hold at most."""
 
@@ -38,10 +40,13 @@ class UsualLoss:
         Mean loss of a row in each block of the reference records (b,).
     constants
         Number of constants and initial states that have a prior.
+    rows
+        Rows of the reference that count.
     """
 
     losses: FloatArray
     constants: int
+    rows: int
 
     def exceeded(self, tested: Tested, count: int, blocks: int) -> str | None:
         """What is larger on new rows than it would be by chance, in words; None where nothing is.
@@ -64,13 +69,13 @@ class Judged:
     Attributes
     ----------
     word
-        `none`, `named`, `class` or `abstain`.
+        `none`, `named`, `class`, `abstain` or `insufficient`.
     best
         The best hypothesis that stands; None where none does.
     alike
         Those that the records do not tell from it, of the same part and of others, best first.
     why
-        What decided, in words, where the word is `none` or `abstain`.
+        What decided, in words, where the word is `none`, `abstain` or `insufficient`.
     explained
         Share of what is above the usual level that the best one removes; NaN where there is none.
     """
@@ -122,6 +127,10 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
     """
     blocks = blocks_of(rows, null.fresh)
     count = rows.count
+    if min(count, usual.rows if usual is not None else count) < FEWEST_ROWS:
+        short = f"{count} rows count" + (f", and {usual.rows} of the reference" if usual is not None else "")
+        why = f"{short}; {FEWEST_ROWS} of each are needed"
+        return Judged("insufficient", None, (), why, float("nan")), blocks
     level = null.total / count
     least = float(np.mean(usual.losses)) if usual is not None else float(len(rows.columns) / np.mean(rows.memory))
     if usual is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
+FEWEST_REPEATED, REPEATED = 30, 0.1
+"""An output that shows one value for so many rows, and for such a share of them, may have stopped."""
 MOVED = 1.0
 """A constant is said to have moved from so many of its standard deviations on."""
 JUDGED_ON = "fresh stretches"
@@ -58,11 +61,27 @@ def verdict_of(
         split=JUDGED_ON,
         parameters=labels,
         notes=(
+            *_stopped(model, rows),
             *(_left(calibration, error, reference) if told else ()),
             *(_moved(calibration, after) if reference else ()),
         ),
         seconds=seconds,
     )
+
+
+def _stopped(model: Model, rows: Rows) -> tuple[str, ...]:
+    """Outputs that show the same value for long: no process is so still."""
+    notes = []
+    for record in rows.records:
+        for c in rows.columns:
+            values = record.outputs[:, c][np.isfinite(record.outputs[:, c])]
+            longest = max((len(list(run)) for _, run in groupby(values)), default=0)
+            if longest > max(FEWEST_REPEATED, REPEATED * len(values)):
+                name = model.outputs[c].name.replace("_", " ")
+                notes.append(
+                    f"{record.name}: {name} shows the same value in {longest} rows on end; its sensor may have stopped."
+                )
+    return tuple(notes)
 
 
 def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
@@ -118,6 +137,8 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
     changed = "has changed" if reference else "is missing"
     if judged.word == "none":
         return f"Nothing {changed} that these records show: {judged.why}."
+    if judged.word == "insufficient":
+        return f"The records do not say enough: {judged.why}."
     if judged.word == "abstain":
         near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis)
         return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near or 'nothing'}."

@@ -23,12 +23,14 @@ TITLES = {
     "named": "what has changed, by name",
     "class": "one of a few parts has changed",
     "abstain": "something has changed, but not told what",
+    "insufficient": "the records do not say enough",
 }
 WITHOUT_REFERENCE = {
     "none": "no effect is missing",
     "named": "a missing effect, by name",
     "class": "one of a few effects is missing",
     "abstain": "something is missing, but not told what",
+    "insufficient": "the records do not say enough",
 }
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from tests.discovery.hypotheses.tank import COLDER, DRAUGHT, LEAKS, STUCK, record, tank
+from tests.discovery.hypotheses.tank import COLDER, DRAUGHT, LEAKS, ROWS, STUCK, record, tank
 
 EFFECTS = {"stuck": (STUCK,), "leaks": (LEAKS,), "colder": (COLDER,), "draught": (DRAUGHT,), "none": ()}
 
@@ -73,3 +75,31 @@ def test_records_have_an_initial_state_each() -> None:
     calibration = compare(tank(), [warm, cold]).calibration
     assert [float(x[0]) for x in calibration.fit.initial] == pytest.approx([330.0, 300.0], abs=0.5)
     assert calibration.model.parameter_values == pytest.approx([0.9, 80.0], rel=0.03)
+
+
+def test_a_sensor_that_has_stopped_is_told_beside_a_part_that_would_do_the_same() -> None:
+    """A heater that stays where it is holds a tank at rest just as still; but no noise at all is a note of its own."""
+    new = record("new", 1)
+    frozen = replace(new, outputs=np.full_like(new.outputs, 303.0))
+    verdict = compare(tank(), [frozen], [record("old", 2)]).verdict
+    assert verdict.word == "class" and ("thermometer", "own_value") in verdict.members
+    assert "new: temperature shows the same value in 500 rows on end; its sensor may have stopped." in verdict.notes
+
+
+@pytest.mark.parametrize(("rows", "reference"), [(20, ROWS), (ROWS, 20), (3, 3)])
+def test_a_few_rows_say_nothing(rows: int, reference: int) -> None:
+    new, old = record("new", 1, DRAUGHT).rows(0, rows), record("old", 2).rows(0, reference)
+    verdict = compare(tank(), [new], [old]).verdict
+    assert verdict.word == "insufficient" and "60 of each are needed" in verdict.reason
+
+
+def test_missing_values_and_spikes_give_no_other_name() -> None:
+    """A third of the values is gone: the same verdict. With a spike in every 37th row: the same, or none."""
+    new = record("new", 1, DRAUGHT)
+    gone = np.where(np.random.default_rng(0).random(new.outputs.shape) < 0.3, np.nan, new.outputs)
+    spiked = new.outputs.copy()
+    spiked[::37] += 50.0
+    for outputs, words in ((gone, {"named"}), (spiked, {"named", "abstain"})):
+        verdict = compare(tank(), [replace(new, outputs=outputs)], [record("old", 2)]).verdict
+        assert verdict.word in words
+        assert all(e.effect.site == "heat_loss" for e in verdict.effects)

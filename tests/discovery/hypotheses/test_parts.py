@@ -112,7 +112,7 @@ def test_each_role_has_its_own_hypotheses() -> None:
     for h in hypotheses(model, seen, drivers, 20.0, 10_000.0):
         kinds.setdefault(h.site, set()).add(h.kind)
     assert kinds["heater"] == {"stuck", "leaks", "range", "gain", "offset"}
-    assert kinds["thermometer"] == {"sign", "lag", "span", "offset"}
+    assert kinds["thermometer"] == {"stuck", "sign", "lag", "span", "offset"}
     assert kinds["heat_loss"] == {"gain", "depends", "store"}
 
 
