@@ -34,12 +34,11 @@ def import_(
     from adaptive_flot.records.quality.quality import judge
     from adaptive_flot.records.tag_map import TagMap, load_tag_map
 
-    page, new_map = out.with_suffix(".quality.html"), _free(out.with_suffix(".map.yaml"))
+    read = [export, map_, *model_inputs(model, cell, export.parent)]
+    check_targets(read, [("--out", out)])
     check_table_path(out)
-    check_targets(
-        [export, map_, *model_inputs(model, cell, export.parent)],
-        [("--out", out), ("--out", page if report else None), ("--out", new_map)],
-    )
+    page, new_map = out.with_suffix(".quality.html"), _free(out.with_suffix(".map.yaml"))
+    check_targets(read, [("--out", out), ("--out", page if report else None), ("--out", new_map)])
     given = TagMap() if map_ is None else load_tag_map(map_)
     terminal = sys.stdin.isatty() and sys.stdout.isatty()
     made = make_model(model, cell=cell, folder=export.parent)
