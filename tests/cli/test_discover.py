@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -150,8 +151,8 @@ def _drop(t: pd.DataFrame) -> pd.DataFrame:
     return t.drop(columns="fan_speed_1_s")
 
 
-def _gap(t: pd.DataFrame) -> pd.DataFrame:
-    return t.drop(index=range(200, 260))
+def _uneven(t: pd.DataFrame) -> pd.DataFrame:
+    return t.assign(time_s=t["time_s"] + np.where(t.index == 200, 0.3 * (t["time_s"][1] - t["time_s"][0]), 0.0))
 
 
 def _still(t: pd.DataFrame) -> pd.DataFrame:
@@ -170,7 +171,7 @@ def _range(t: pd.DataFrame) -> pd.DataFrame:
     ("change", "code", "says"),
     [
         (_drop, 2, "fan_speed_1_s"),
-        (_gap, 2, "not uniform"),
+        (_uneven, 2, "not uniform"),
         (_range, 2, "power"),
         (_still, 0, "insufficient: "),
         (_no_output, 0, "no output"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,18 +26,17 @@ SERVER, INIT = shutil.which("pg_ctl", path=PLACES), shutil.which("initdb", path=
 
 
 @pytest.fixture
-def url(tmp_path: Path) -> Iterator[str]:
+def url() -> Iterator[str]:
     """URL of an empty database in a server of its own."""
     if SERVER is None or INIT is None:
         pytest.skip("needs the programs initdb and pg_ctl of PostgreSQL")
-    data, port = tmp_path / "postgresql", free_port()
-    user: str | None = None
-    if os.geteuid() == 0:  # PostgreSQL refuses to run as root
-        user = "postgres"
-        tmp_path.chmod(0o777)
-        for folder in tmp_path.parents:
-            if folder.stat().st_uid == 0 and folder.name.startswith("pytest"):
-                folder.chmod(0o755)
+    # a short path below the system's own folder: sockets ask for it, and PostgreSQL, which refuses to run as root, may
+    # not look into the folders of the tests, which belong to whoever runs them
+    place = Path(tempfile.mkdtemp(prefix="flot-"))
+    data, port = place / "data", free_port()
+    user = "postgres" if os.geteuid() == 0 else None
+    if user is not None:
+        shutil.chown(place, user)
     subprocess.run([INIT, "-D", data, "-U", "tester", "-A", "trust"], check=True, capture_output=True, user=user)
     options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='{data}'"
     start = [SERVER, "-D", str(data), "-l", str(data / "log"), "-w", "-o", options, "start"]
@@ -45,6 +45,7 @@ def url(tmp_path: Path) -> Iterator[str]:
         yield f"postgresql+psycopg://tester@127.0.0.1:{port}/postgres"
     finally:
         subprocess.run([SERVER, "-D", data, "-m", "immediate", "stop"], check=True, capture_output=True, user=user)
+        shutil.rmtree(place)
 
 
 def test_cycles_come_back_to_the_bit(url: str, cycle: Cycle, link: Link, tmp_path: Path) -> None:
