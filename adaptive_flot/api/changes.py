@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from adaptive_flot.api.models import Origin
-from adaptive_flot.api.shown import html_of, text_of
+from adaptive_flot.api.shown import error_table, html_of, text_of
 from adaptive_flot.discovery.hypotheses.comparison import mean_difference
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.results import Verdict
@@ -55,12 +55,7 @@ class Change:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Root mean square error of each output, before and after, every stretch by a fit that did not see it."""
-        rows = [
-            {"output": c.output, "unit": c.unit, "before": c.before, "after": c.after, "usual": c.noise,
-             "reduction_low_pct": 100 * c.reduction95[0], "reduction_high_pct": 100 * c.reduction95[1]}
-            for c in self.verdict.error
-        ]  # fmt: skip
-        return pd.DataFrame(rows)
+        return error_table(self.verdict, "usual")
 
     @cached_property
     def hypotheses(self) -> pd.DataFrame:

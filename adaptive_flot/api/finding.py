@@ -14,7 +14,7 @@ from adaptive_flot.api.changes import Change
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.progress import staged
 from adaptive_flot.api.records import AnyMap, AnyRecord, SeveralRecords, read_map, record_files, record_name
-from adaptive_flot.api.shown import check_kind, html_of, text_of
+from adaptive_flot.api.shown import check_kind, error_table, html_of, text_of
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery, Verdict
@@ -64,19 +64,7 @@ class Finding:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Free-run root mean square error of each output, before and after, on rows that neither fitted nor chose."""
-        rows = [
-            {
-                "output": c.output,
-                "unit": c.unit,
-                "before": c.before,
-                "after": c.after,
-                "noise": c.noise,
-                "reduction_low_pct": 100 * c.reduction95[0],
-                "reduction_high_pct": 100 * c.reduction95[1],
-            }
-            for c in self.verdict.error
-        ]
-        return pd.DataFrame(rows)
+        return error_table(self.verdict, "noise")
 
     @cached_property
     def effects(self) -> pd.DataFrame:

@@ -162,13 +162,17 @@ def test_on_stretches(model: Model, rows: Rows, fitted: Fitted, *, hold_constant
     whole, own, extended = fitted.fit, fitted.fit.coefficients, model_with(model, fitted.hypothesis)
     fresh = [np.full(e.shape, np.nan) for e in whole.errors]
     values = []
+    fitter = JointFitter(extended, rows, fitted.constants, own, fitted.initial)
     for left_out in stretches(rows, folds):
-        fitter = JointFitter(extended, rows.without(left_out), fitted.constants, own, fitted.initial)
-        part = _fitted_elsewhere(fitter, whole, hold_constants) if own or not hold_constants else whole
+        part = (
+            _fitted_elsewhere(fitter.on(rows.without(left_out)), whole, hold_constants)
+            if own or not hold_constants
+            else whole
+        )
         values.append([part.value(name) for name in own])
         for target, theirs, mask in zip(fresh, part.errors, left_out, strict=True):
             target[mask] = theirs[mask]
-    prior = float(np.sum(JointFitter(extended, rows, fitted.constants, own, fitted.initial).prior(whole.unknowns) ** 2))
+    prior = float(np.sum(fitter.prior(whole.unknowns) ** 2))
     return Tested(fitted.hypothesis, whole, tuple(fresh), rows.losses(fresh), np.array(values), prior)
 
 

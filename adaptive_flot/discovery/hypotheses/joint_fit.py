@@ -8,13 +8,14 @@ have to be made anew for every hypothesis.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from adaptive_flot.discovery.hypotheses.known_before import LOOSE, Constants, first_states
+from adaptive_flot.discovery.hypotheses.known_before import Constants, first_states
 from adaptive_flot.discovery.hypotheses.rows import TAIL, Rows
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -112,14 +113,18 @@ class JointFitter:
         self._state_scale = np.array([s.scale for s in model.states])
         self._lower = np.array([p.lower for p in model.parameters])
         self._upper = np.array([p.upper for p in model.parameters])
+        scales = np.array([model.parameters[i].scale or 1.0 for i in self._shared])
+        # how many scales the constants move with each of their unknowns; a difference moves them by a small part of one
+        self._reach = np.maximum(1.0, np.abs(constants.root / scales[:, None]).max(axis=0, initial=0.0))
         each = np.broadcast_to(rows.memory, len(rows.columns))
         self._memory = np.concatenate([np.tile(each, len(r)) for r in rows.records])
         self._sizes = (len(self._own), len(self._shared), len(model.states))
 
-    @property
-    def first(self) -> tuple[FloatArray, ...]:
-        """First guess of the initial state of each record (nx,)."""
-        return self._initial
+    def on(self, rows: Rows) -> JointFitter:
+        """The same fitter on other rows of the same records: the model's functions are not made again."""
+        other = copy(self)
+        other.rows, other._last = rows, None
+        return other
 
     def prior(self, z: FloatArray) -> FloatArray:
         """Residuals of the priors of constants and initial states."""
@@ -162,9 +167,9 @@ class JointFitter:
         self._last = (z.copy(), errors)
         return errors
 
-    def cost(self, z: FloatArray, errors: Sequence[FloatArray], rows: Rows | None = None) -> float:
+    def cost(self, z: FloatArray, errors: Sequence[FloatArray]) -> float:
         """Criterion of errors over the rows that count, and the priors of constants and initial states."""
-        return float(np.sum(self.prior(z) ** 2)) + float(sum(loss.sum() for loss in (rows or self.rows).losses(errors)))
+        return float(np.sum(self.prior(z) ** 2)) + float(sum(loss.sum() for loss in self.rows.losses(errors)))
 
     def fit(
         self, z: FloatArray, *, most: int = MOST_EVALUATIONS, refresh: int = 1, shared: FloatArray | None = None
@@ -233,8 +238,8 @@ class JointFitter:
         for i in range(len(z) if count is None else count):
             step = np.zeros(len(z))
             step[i] = DIFFERENCE if z[i] + DIFFERENCE <= upper[i] else -DIFFERENCE
-            if i >= q and i < q + c:
-                step[i] /= LOOSE if self._loose(i - q) else 1.0
+            if q <= i < q + c:
+                step[i] /= self._reach[i - q]
             moved = list(errors)
             touched = range(len(errors)) if i < q + c else [(i - q - c) // nx]
             parameters = self._parameters(z + step) if i < q + c else p
@@ -242,11 +247,6 @@ class JointFitter:
                 moved[k] = self._errors_of(k, parameters, z + step)
             columns.append((self._residuals(z + step, moved) - base) / step[i])
         return np.column_stack(columns) if columns else np.empty((len(base), 0))
-
-    def _loose(self, which: int) -> bool:
-        i = self._shared[which]
-        scale = self.model.parameters[i].scale or 1.0
-        return bool(np.linalg.norm(self.constants.root[which]) > 0.5 * LOOSE * scale)
 
     def _parameters(self, z: FloatArray) -> FloatArray:
         q, c, _ = self._sizes

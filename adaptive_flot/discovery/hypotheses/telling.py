@@ -48,7 +48,7 @@ def verdict_of(
         for j, c in enumerate(rows.columns)
         for r in [reduction(blocks, j, null.fresh, after.fresh)]
     )  # fmt: skip
-    effects = _effects(model, null, judged) if told else ()
+    effects = _effects(model, judged) if told else ()
     members = tuple((t.hypothesis.site, t.hypothesis.driver) for t in judged.parts if t.hypothesis)
     fitted = model.indices("parameters", calibration.constants.names)
     labels = {model.parameters[i].label: model.parameters[i].value for i in fitted}
@@ -113,7 +113,7 @@ def _left(calibration: Calibration, error: Sequence[OutputChange], reference: bo
     return (f"More is missing: the error that is left is still above {than}: {', '.join(left)}.",)
 
 
-def _effects(model: Model, null: Tested, judged: Judged) -> tuple[NamedEffect, ...]:
+def _effects(model: Model, judged: Judged) -> tuple[NamedEffect, ...]:
     best = judged.best
     assert best is not None and best.hypothesis is not None  # a verdict that tells has a best hypothesis
     fitted = model_with(model, best.hypothesis).with_parameters(best.fit.values)
@@ -129,7 +129,6 @@ def _effects(model: Model, null: Tested, judged: Judged) -> tuple[NamedEffect, .
         for t in judged.alike
         if t.hypothesis is not None
     )
-    del null
     return (NamedEffect(effect, words_of(model, best), interval, others),)
 
 
