@@ -77,4 +77,6 @@ def scenario_inputs(scenario: Scenario, *plugins: Mapping[str, Plugin] | Iterabl
     addresses = [p.use for p in (*file.estimators.values(), *file.controllers.values())]
     for given in plugins:
         addresses += [p.use for p in given.values()] if isinstance(given, Mapping) else list(given)
-    return [scenario.path, *model_inputs(file.model, file.cell, scenario.path.parent, addresses)]
+    folder = scenario.path.parent
+    plant = [] if file.plant.cell is None else model_inputs(file.model, file.plant.cell, folder)
+    return [scenario.path, *model_inputs(file.model, file.cell, folder, addresses), *plant]

@@ -20,9 +20,9 @@ WHO = (
     "initial_estimate",
     "discovery",
 )
-METHOD: dict[str, Any] = {**dict.fromkeys((*WHO, "effects", "discovery"), True), "plant": {"effects"}}
-"""Keys of a scenario that say who runs, with what model, and how it is told, not what is asked; what effects the plant
-has is taken from its model."""
+METHOD: dict[str, Any] = {**dict.fromkeys((*WHO, "effects", "discovery"), True), "plant": {"effects", "cell"}}
+"""Keys of a scenario that say who runs, with what model, and how it is told, not what is asked; what constants and
+effects the plant has is taken from its model."""
 
 
 def conditions(scenario: Scenario) -> str:

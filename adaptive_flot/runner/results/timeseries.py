@@ -135,7 +135,7 @@ def _others(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str
     """Parameters that are not adapted but move in the plant, or are measured."""
     plant, model = scenario.plant_model, setup.model
     measured = [scenario.model.parameters[i] for i in scenario.measured_parameters]
-    moved = [plant.parameters[plant.index("parameters", name)] for name in scenario.file.parameters]
+    moved = [plant.parameters[plant.index("parameters", name)] for name, _ in scenario.moving_parameters]
     true = np.vstack([s.plant.parameters for s in steps])
     blank = np.full(len(model.parameters), np.nan)
     known = np.vstack([blank if s.plant.sample.parameters is None else s.plant.sample.parameters for s in steps])

@@ -25,6 +25,7 @@ def check_scenario(scenario: Scenario) -> None:
         Names that the model does not have, values outside its range.
     """
     _check_times(scenario)
+    _check_plant(scenario)
     file, model = scenario.file, scenario.model
     columns = [q.column for q in model.inputs]
     for key in file.inputs:
@@ -63,10 +64,25 @@ def check_realisation(realisation: Realisation) -> None:
     _check_parameters(realisation)
 
 
+def _check_plant(scenario: Scenario) -> None:
+    """The plant shows the outputs of the model, and what wanders is there and is not the controller's."""
+    model, plant = scenario.model, scenario.plant_model
+    if plant.names("outputs") != model.names("outputs"):
+        raise ScenarioError("plant.cell: its outputs are not those of the model; give a cell with the same outputs")
+    inputs = [q.column for q in model.inputs]
+    imposed = [inputs[j] for j in scenario.imposed]
+    for key in scenario.file.plant.feed_walk:
+        if key in inputs and key not in imposed:
+            raise ScenarioError(f"plant.feed_walk: {key!r} is the controller's to move; name one without a range")
+        if key not in inputs:
+            with located("plant.feed_walk"):
+                plant.index("parameters", key)
+
+
 def _check_parameters(realisation: Realisation) -> None:
     plant = realisation.scenario.plant_model
     with located("parameters"):
-        for name in realisation.scenario.file.parameters:
+        for name, _ in realisation.scenario.moving_parameters:
             values = realisation.parameters[:, plant.index("parameters", name)]
             for extreme in (values.min(), values.max()):
                 plant.with_parameters({name: float(extreme)})

@@ -13,7 +13,7 @@ from adaptive_flot.processes.effect_entry import EffectEntry
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.faults import Fault
-from adaptive_flot.runner.scenario.profiles import InputProfile, ParameterProfile
+from adaptive_flot.runner.scenario.profiles import FeedWalk, InputProfile, ParameterProfile
 from adaptive_flot.yaml_part import Part
 
 LARGEST_SEED = 2**63 - 1
@@ -48,11 +48,18 @@ class DisturbancePart(Part):
 
 
 class PlantPart(Part):
-    """How the plant is simulated (`fast` is the Runge-Kutta step, `accurate` IDAS on the DAE), and its effects."""
+    """In what the plant differs from the model, and how it is simulated.
+
+    The integrator `fast` is the Runge-Kutta step, `accurate` is IDAS on the DAE.
+    """
 
     integrator: Literal["fast", "accurate"] = "fast"
+    cell: str | None = None
+    """Cell file of the plant, instead of that of the model; default the plant has the constants of the model."""
     effects: list[EffectEntry] | None = None
     """All effects of the plant, instead of those of the model; default the plant has the effects of the model."""
+    feed_walk: dict[str, FeedWalk] = Field(default_factory=dict)
+    """Inputs (by column) and parameters of the plant that wander; what is known of them says `disturbances`."""
 
 
 class Adapt(Part):

@@ -59,12 +59,22 @@ def load_scenario(name: Path | str) -> Scenario:
         raise ScenarioError(f"{path}: {first_problem(error, ScenarioFile)}") from error
     with located(path):
         model = attach(make_model(file.model, cell=file.cell, folder=path.parent), file.effects)
-        plant = model
-        if file.plant.effects is not None:
-            plant = attach(model.without_effects(), file.plant.effects, "plant.effects")
+        plant = _plant_model(file, model, path.parent)
         scenario = Scenario(path.stem, path, file, model, _setup(file, model), plant)
         check_scenario(scenario)
     return scenario
+
+
+def _plant_model(file: ScenarioFile, model: Model, folder: Path) -> Model:
+    """That of the estimators where the file does not tell them apart."""
+    part = file.plant
+    if part.cell is None:
+        return model if part.effects is None else attach(model.without_effects(), part.effects, "plant.effects")
+    with located("plant.cell"):
+        plant = make_model(file.model, cell=part.cell, folder=folder)
+    if part.effects is None:
+        return attach(plant, file.effects)
+    return attach(plant, part.effects, "plant.effects")
 
 
 def _setup(file: ScenarioFile, model: Model) -> Setup:

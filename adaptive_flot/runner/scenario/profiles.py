@@ -151,5 +151,31 @@ class RandomWalk(_Profile):
         return np.exp(walk)
 
 
+class FeedWalk(_Profile):
+    """What wanders about its planned or nominal value: the logarithm of its factor is an Ornstein-Uhlenbeck process.
+
+    ``dX = -X / tau dt + s sqrt(2 / tau) dW`` with X = 0 at the start, held during each interval; s is `share` and tau
+    `correlation_s`. Gillespie, *Physical Review E* 54 (1996) 2084, equation 2.1.
+    """
+
+    share: float = Field(gt=0, le=1)
+    """Standard deviation that it comes to, as a share."""
+    correlation_s: float = Field(gt=0)
+    """Time after which little is left of where it was [s]."""
+    seed: Annotated[int, Field(ge=0)] | Literal["per_run"] = "per_run"
+    """A number fixes the walk for all runs; `per_run` draws another one for each run seed."""
+
+    def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
+        """Factor in the interval that starts at each time [s] (N,); another walk for each name."""
+        own = seed if self.seed == "per_run" else self.seed
+        stream = Stream.FEED_WALK_OF_RUN if self.seed == "per_run" else Stream.FEED_WALK
+        drawn = generator(own, stream, *name.encode()).standard_normal(len(time) - 1)
+        kept = np.exp(-np.diff(time) / self.correlation_s)
+        walk = np.zeros(len(time))
+        for k in range(1, len(time)):
+            walk[k] = kept[k - 1] * walk[k - 1] + self.share * np.sqrt(1 - kept[k - 1] ** 2) * drawn[k - 1]
+        return np.exp(walk)
+
+
 InputProfile = Annotated[Constant | Staircase | Random | Steps, Field(discriminator="profile")]
 ParameterProfile = Change | Factors | RandomWalk

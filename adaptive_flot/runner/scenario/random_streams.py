@@ -28,6 +28,10 @@ class Stream(IntEnum):
     """Random walk of a parameter that is drawn again for each run, a stream for each parameter."""
     RANDOM_WALK = 7
     """Random walk of a parameter that is the same in all runs; its own seed takes the place of the run's."""
+    FEED_WALK_OF_RUN = 8
+    """Feed that wanders (`plant.feed_walk`) and is drawn again for each run, a stream for each quantity."""
+    FEED_WALK = 9
+    """Feed that wanders and is the same in all runs; its own seed takes the place of the run's."""
 
 
 def generator(seed: int, stream: Stream, *within: int) -> np.random.Generator:

@@ -38,9 +38,14 @@ class Realisation(Described):
 
     @cached_property
     def schedule(self) -> FloatArray:
-        """Planned inputs (N, nu), each in its unit, row k for the interval that starts at k dt."""
+        """Planned inputs (N, nu), those that wander as they do; each in its unit, row k from k dt on."""
         s = self.scenario
-        return _fixed(np.column_stack([s.file.inputs[q.column].values(s.starts, self.seed) for q in s.model.inputs]))
+        values = [s.file.inputs[q.column].values(s.starts, self.seed) for q in s.model.inputs]
+        for j, q in enumerate(s.model.inputs):
+            walk = s.file.plant.feed_walk.get(q.column)
+            if walk is not None:
+                values[j] = values[j] * walk.factor(s.starts, self.seed, q.name)
+        return _fixed(np.column_stack(values))
 
     @cached_property
     def plan(self) -> FloatArray:
@@ -54,7 +59,7 @@ class Realisation(Described):
         """True parameters of the plant's model (N, np), each in its unit, row k for the interval from k dt on."""
         s, plant = self.scenario, self.scenario.plant_model
         p = np.tile(plant.parameter_values, (len(s.starts), 1))
-        for name, profile in s.file.parameters.items():
+        for name, profile in s.moving_parameters:
             j = plant.index("parameters", name)
             p[:, j] *= profile.factor(s.starts, self.seed, plant.parameters[j].name)
         return _fixed(p)

@@ -14,6 +14,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.faults import ControllerFault, PlantFault, SlowAnalyser
 from adaptive_flot.runner.scenario.keys import ScenarioFile
+from adaptive_flot.runner.scenario.profiles import FeedWalk, ParameterProfile
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,7 +34,8 @@ class Scenario(Described):
     setup
         What estimators are built for.
     plant_model
-        The plant's own model, which may have other effects and so other states and parameters after those in common.
+        The plant's own model. It may have other constants, and other effects: then it has other states and parameters
+        after those in common.
     """
 
     name: str
@@ -131,10 +133,21 @@ class Scenario(Described):
 
     @property
     def imposed(self) -> list[int]:
-        """Indices of the inputs that no controller moves: all but those with a range in `limits`; none in open loop."""
+        """Indices of the inputs that no controller moves: all but those with a range in `limits`.
+
+        In open loop those that wander (`plant.feed_walk`).
+        """
+        inputs = enumerate(self.model.inputs)
         if self.limits is None:
-            return []
-        return [j for j, q in enumerate(self.model.inputs) if q.name not in self.limits.inputs]
+            return [j for j, q in inputs if q.column in self.file.plant.feed_walk]
+        return [j for j, q in inputs if q.name not in self.limits.inputs]
+
+    @property
+    def moving_parameters(self) -> list[tuple[str, ParameterProfile | FeedWalk]]:
+        """Parameters of the plant that move, with how they do."""
+        inputs = [q.column for q in self.model.inputs]
+        walks = [(key, walk) for key, walk in self.file.plant.feed_walk.items() if key not in inputs]
+        return [*self.file.parameters.items(), *walks]
 
     @property
     def measured_parameters(self) -> list[int]:

@@ -54,6 +54,8 @@ def test_streams_are_the_ones_of_earlier_results() -> None:
         "FAULT": 4,
         "RANDOM_WALK_OF_RUN": 6,
         "RANDOM_WALK": 7,
+        "FEED_WALK_OF_RUN": 8,
+        "FEED_WALK": 9,
     }
     assert generator(1, Stream.FAULT, 2).random() == np.random.default_rng([1, 4, 2]).random()
 
