@@ -317,7 +317,11 @@ class Pem:
             last_state=problem.steady,
             evaluations=0,
             status=Status.NOT_FINITE,
-            identifiability=Identifiability((), (), "the model can not simulate the record from its first guess"),
+            identifiability=Identifiability(
+                tuple((p.label, nan, "not fitted") for p in parameters),
+                (),
+                "the model can not simulate the record from its first guess",
+            ),
         )
 
 

@@ -6,15 +6,18 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
 from adaptive_flot.discovery.assessment.verification import changes
 from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
-from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT
+from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.record.screening import Screening, screen
 from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
@@ -31,11 +34,13 @@ from adaptive_flot.discovery.verdict.report_veto import (
     noise_from_row_to_row,
 )
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
 
 @one_thread()
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a run that leaves all bounds is no fit
 def discover(
     model: Model,
     record: Dataset,
@@ -119,7 +124,13 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
         reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
         return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
-    return replace(state, problem=problem, base=base)
+    noise = noise_by_differences(problem.measured)
+    start = base.initial_state, parameters_of(base)
+    said = wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
+    if not state.adapted:
+        said += ("no parameter has the role 'estimated': all keep the values of the model",)
+    screening = replace(state.screening, notes=state.screening.notes + said)
+    return replace(state, screening=screening, problem=problem, base=base)
 
 
 def check_explained(state: State) -> State | Verdict:

@@ -6,6 +6,7 @@ quantities.py        Named quantities, parameters and known effects.
 scope.py             What equations are written into: symbols, sites, derivatives, outputs.
 lookup.py            Names, places and ranges of the quantities of a model.
 model.py             Model: quantities and equations, its functions, its effects.
+model_checks.py      Names, roles and ranges of a model, checked when it is made.
 build.py             Equations to CasADi functions.
 function_cache.py    Functions derived from a model, each made once.
 forms/               Forms of an effect, their coefficients and what each coefficient does (its role).
@@ -14,6 +15,7 @@ sensors.py           A model without the errors of its sensors.
 stepping/            Simulation of one sampling interval and of whole records, with exact sensitivities.
 filtering/           A model in innovations form: extended Kalman filter, smoother, k-step prediction, likelihood.
 data/                Measured tables.
+assumed_start.py     What is said of a record that does not start where its model assumes.
 steady_state.py      Steady states and their sensitivities.
 linear.py            State space at an operating point (imports python-control, so it is not part of this front).
 cramer_rao_bound.py  Posterior Cramer-Rao bound: the smallest error that any estimator can have.

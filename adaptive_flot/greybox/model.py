@@ -29,7 +29,7 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.build import Built, build, tangent
 from adaptive_flot.greybox.effects import Effect, check_distinct
 from adaptive_flot.greybox.function_cache import FunctionCache
-from adaptive_flot.greybox.lookup import Lookup
+from adaptive_flot.greybox.model_checks import Checks
 from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
 from adaptive_flot.greybox.scope import Scope, Site
 
@@ -39,7 +39,7 @@ Arguments = TypeVarTuple("Arguments")
 
 
 @dataclass(frozen=True, repr=False)
-class Model(Lookup, Described):
+class Model(Checks, Described):
     """Named quantities plus equations; building it compiles nothing and takes milliseconds.
 
     Properties `dae`, `ode` and `decay`, and what `tangent(seeds)` returns, are CasADi functions of `(t, x, u, p[, z])`:
@@ -68,7 +68,8 @@ class Model(Lookup, Described):
     max_step_s
         Largest step [s] at which the fast integration of this model is accurate (about 1e-5 of each state).
     starts_steady
-        Whether a record without further knowledge starts near a steady state; else near `initial_guess`.
+        Whether a record without further knowledge starts near the steady state of its first inputs; else near
+        `initial_guess`. Reports say where this was assumed and does not hold.
     drivers
         Quantities that effects may depend on, in the order of a search; default all inputs and states.
     late_drivers
@@ -85,7 +86,8 @@ class Model(Lookup, Described):
     Raises
     ------
     ModelError
-        A derivative, output, signal or residual is missing, given twice or not declared.
+        A derivative, output, signal or residual is missing, given twice or not declared. A field names something that
+        the model has not, or holds a value out of range.
     """
 
     name: str
@@ -108,7 +110,9 @@ class Model(Lookup, Described):
     _functions: FunctionCache[ca.Function] = field(default_factory=FunctionCache, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        self.check_groups()
         _ = self._built  # equations are checked when the model is made, not when it is first used
+        self.check_names()
 
     def described(self) -> Mapping[str, object]:
         """What it is made of; see `Described`."""

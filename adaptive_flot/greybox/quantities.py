@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from adaptive_flot.errors import ModelError, RangeError
 
 FloatArray = NDArray[np.float64]
+ParameterRole = Literal["fixed", "estimated"]
 Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
 
 
@@ -30,7 +31,8 @@ class Quantity:
     lower, upper
         Physical range, in the unit.
     scale
-        Typical size, in the unit: conditions solvers, and is the standard deviation of an unknown initial state.
+        Typical size of a change, in the unit, above zero. It conditions solvers, and says how far off the initial state
+        may be. 1 is wrong for most units: give it to every state.
     usual
         Lowest and highest value of ordinary operation, in the unit: tells a wrong unit where the physical range can
         not. None where nobody knows.
@@ -89,7 +91,7 @@ class Parameter:
     upper: float = np.inf
     scale: float = 1.0
     prior_std: float | None = None
-    role: Literal["fixed", "estimated"] = "fixed"
+    role: ParameterRole = "fixed"
     disturbance: bool = False
 
     def with_value(self, value: float) -> Parameter:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -63,12 +64,15 @@ class Imported:
     def table(self) -> pd.DataFrame:
         """The record, with the columns that `read_dataset` reads.
 
-        Time [s] from the first row; `stretch`, where there are several; a column a quantity, named with its unit; a
+        Time [s] from the first row, or as in the table where that was a record; `stretch`, where there are several; a
+        column a quantity, named with its unit; a
         status a quantity (`air_flow_status`): measured, held, averaged, missing or bad; and the time in UTC, where the
         export is dated.
         """
         rows = self.rows
-        columns: dict[str, object] = {TIME_COLUMN: ((rows.time - rows.time[0]) // rows.step) * (rows.step / 1e9)}
+        since = ((rows.time - rows.time[0]) // rows.step) * (rows.step / 1e9)
+        own = self.export.time_keys.column == TIME_COLUMN and not self.dated
+        columns: dict[str, object] = {TIME_COLUMN: since + rows.time[0] / 1e9 if own else since}
         if rows.stretch[-1] > 1:
             columns[STRETCH] = rows.stretch
         columns |= {q.column: rows.values[q.name] for q in self.quantities}
@@ -106,6 +110,8 @@ def import_table(source: Source, model: Model, given: TagMap, *, outputs: bool |
         The export can not be used.
     """
     export = read_export(source, given)
+    if export.time_keys.column == TIME_COLUMN and all(q.column in export.signals for q in model.inputs):
+        export = acting_from_the_row_before(export, model.inputs)
     whole = all(q.name in given.quantities for q in model.inputs)
     full = given.model_copy(update={"file": export.file_keys, "time": export.time_keys})
     full = guess_tags(export, model, full, outputs=not whole if outputs is None else outputs)
@@ -126,6 +132,20 @@ def import_table(source: Source, model: Model, given: TagMap, *, outputs: bool |
         export.file,
     )
     return Imported(export, model, full, _guessed(given, full), cleaned, rows)
+
+
+def acting_from_the_row_before(export: Export, inputs: Sequence[Quantity]) -> Export:
+    """The export of a table that is a record already: its inputs acted during the interval that ends at their row.
+
+    In an export of a plant they act from their stamp on. So each input gets the time of the row before, and the first
+    one a time that is a usual interval earlier.
+    """
+    signals = dict(export.signals)
+    for column in (q.column for q in inputs):
+        time = signals[column].time
+        usual = int(np.median(np.diff(time))) if len(time) > 1 else 1
+        signals[column] = replace(signals[column], time=np.concatenate([time[:1] - usual, time[:-1]]))
+    return replace(export, signals=signals, found=(*export.found, "a record already: an input acts up to its row"))
 
 
 def _guessed(given: TagMap, full: TagMap) -> tuple[str, ...]:

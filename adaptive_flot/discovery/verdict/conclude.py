@@ -15,12 +15,14 @@ from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange
 from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.wording import drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 NORMAL95 = 1.96
 """Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
+INSTRUMENTS = {"sensor": "sensor", "actuator": "part that acts", "feed": "feed"}
+"""Roles whose quantities do not depend on the state of the process, in words."""
 
 
 def insufficient(screening: Screening) -> Verdict:
@@ -118,10 +120,11 @@ def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
 
 
 def _meaning(model: Model, effect: Effect) -> str:
-    """What the table of known effects says of an effect."""
-    if not model.known_effects:
-        return "the model lists no known effects"
+    """What the table of known effects says of an effect; why it has no name; empty where site and driver say it all."""
     known = listed(model, effect)
     if known is None:
-        return "not listed among the effects known for this model"
+        role = next(s.role for s in model.sites if s.name == effect.site)
+        if role in INSTRUMENTS and effect.driver not in STATELESS_DRIVERS:
+            return f"without a name, since a {INSTRUMENTS[role]} has no reason to depend on it"
+        return "not listed among the effects known for this model" if model.known_effects else ""
     return f"the other way than: {known.meaning}" if against(model, effect) else known.meaning

@@ -53,13 +53,15 @@ def reason_words(
             "noise would, or what it removes does not stand on rows that did not choose it."
         )
     evidence = f"{result.verification}" if result.verification else ""
-    said = "; and ".join(f"{e.effect.site} depends on {e.effect.driver} ({e.meaning})" for e in effects)
+    said = "; and ".join(
+        f"{e.effect.site} depends on {e.effect.driver}" + (f" ({e.meaning})" if e.meaning else "") for e in effects
+    )
     if judgement.word == "named":
         return f"The model lacks this: {said}. {evidence}."
     if judgement.word == "class":
         return f"{_class_words(judgement)} {evidence}."
     if judgement.word == "unnamed":
-        return f"The model lacks something without a known name: {said}. {evidence}."
+        return f"The model lacks something that has no name: {said}. {evidence}."
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
+from adaptive_flot.greybox.data.dataset import TIME_COLUMN
 from adaptive_flot.records.reading.numbers import read_numbers
 from adaptive_flot.records.reading.raw import RawTable, UnclearError
 from adaptive_flot.records.reading.stamps import looks_like_time, looks_like_time_of_day
@@ -211,8 +212,13 @@ def _time(raw: RawTable, texts: list[pd.Series], names: tuple[str, ...], first: 
         )
     words = [re.split(r"[^a-z]+", name.lower()) for name in names]
     numbers = [j for j, w in enumerate(words) if w[0] in TIME_WORDS and _mostly(pd.Series(_values(data[j])), data[j])]
-    if len(numbers) == 1:
-        return (numbers[0],)
+    own = [j for j in numbers if names[j] == TIME_COLUMN]
+    if len(numbers) == 1 or own:
+        return ((own or numbers)[0],)
+    if numbers:
+        raise UnclearError(
+            f"{raw.file}: {len(numbers)} columns may hold times", "time", [{"column": names[j]} for j in numbers]
+        )
     raise DataError(
         f"{raw.file}: no column of times found (columns: {', '.join(names[:8])}); name it in a map, as "
         "'time: {column: Timestamp}'"

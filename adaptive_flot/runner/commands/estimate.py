@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
 from adaptive_flot.errors import DataError, ModelError, PluginError, located, near_match
+from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
@@ -33,6 +36,7 @@ class RecordEstimate(Described):
         return {"record": self.blocks.name, **fitted, "estimators": ", ".join(r.estimator for r in self.replays)}
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a run that leaves all bounds is a status
 def estimate_record(
     blocks: Blocks,
     model: Model,
@@ -72,7 +76,10 @@ def estimate_record(
     """
     names = model.expand_parameters(fit) if fit else tuple(p.name for p in model.parameters if p.role == "estimated")
     if not names:
-        raise ModelError(f"model '{model.name}' has no parameter with the role 'estimated'; name them with --fit")
+        raise ModelError(
+            f"model '{model.name}' has no parameter with role=\"estimated\", so nothing is fitted; "
+            "name some with --fit, or give them that role in the model"
+        )
     plugins = dict(estimators) if isinstance(estimators, Mapping) else {n: shipped_plugin(n) for n in estimators}
     for name, plugin in plugins.items():
         if plugin.use not in BATCH_ESTIMATORS and plugin.needs_truth(folder):
@@ -88,6 +95,9 @@ def estimate_record(
     factory = load("pem", BATCH_ESTIMATORS, "batch estimator")
     batch: BatchFit = construct(factory, "pem", "batch estimator", setup, initial_state="estimated").fit(blocks.fit)
     progress()
+    columns, noise = model.indices("outputs", driving), batch.noise_std
+    said = wrong_start(model, blocks.fit, batch.initial_state, batch.parameters, columns, noise)
+    blocks = replace(blocks, fit=replace(blocks.fit, notes=blocks.fit.notes + said))
     replays = []
     for name, plugin in plugins.items():
         replays.append(replay(name, plugin, setup, blocks, batch, folder))

@@ -158,7 +158,7 @@ def changed(line: int, text: str) -> tuple[str, ...]:
         (changed(3, ",0.2,1.1,0.2"), ("'time_s' is empty in line 3", "give the time")),
         (changed(4, "2,0.3,1.2,0.3"), ("time does not increase in line 4 (2 s, then 2 s)", "sort")),
         (changed(4, "1,0.3,1.2,0.3"), ("time does not increase in line 4 (2 s, then 1 s)", "sort")),
-        (changed(5, "9,0.4,1.3,0.4"), ("time is not uniform: 5 s before line 5, 2 s elsewhere", "resample")),
+        (changed(5, "9,0.4,1.3,0.4"), ("time is not uniform: 5 s before line 5, 2 s elsewhere", "-flot import")),
         ((HEADER, ROWS[0]), ("1 row", "at least 2")),
         ((HEADER,), ("a header but no rows", "give a table with rows")),
         ((f"{HEADER},k", *(f"{row},{k}" for row, k in zip(ROWS, ("1", "1", "", "1"), strict=True))),
