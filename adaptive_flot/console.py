@@ -124,6 +124,8 @@ def print_estimate(result: RecordEstimate) -> None:
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
     console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
+    if result.batch.agreement:
+        console.print(f"Starts: {result.batch.agreement}", highlight=False)
 
 
 def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:

@@ -8,6 +8,6 @@ rpem/      Recursive prediction error method, as printed and in full.
 ekf/       Extended Kalman filter of state and parameters, its likely drift, its smoother.
 imm/       Interacting multiple models: rest, drift and jump.
 mhe/       Moving horizon estimation.
-pem.py     Batch prediction error method: one fit to a whole record.
+pem/       Batch prediction error method: one fit to a whole record.
 shared/    What several of them use: joint filter, drift, coordinates, state correction.
 """

@@ -116,6 +116,8 @@ class BatchFit:
         What the record can not separate.
     joint_covariance
         Covariance of the last state and the fitted parameters together (nx + q, nx + q), where it is known.
+    starts, agreed
+        Searches of the whole record, each from another start, and how many of them ended at this fit.
     """
 
     record: str
@@ -129,10 +131,20 @@ class BatchFit:
     status: Status
     identifiability: Identifiability
     joint_covariance: FloatArray | None = None
+    starts: int = 1
+    agreed: int = 1
 
     def values(self) -> FloatArray:
         """Fitted values (q,)."""
         return np.array([e.value for e in self.estimates])
+
+    @property
+    def agreement(self) -> str:
+        """How many searches ended here, in words; empty where there was one."""
+        if self.starts < 2:
+            return ""
+        rest = ", the others had a larger error" if self.agreed < self.starts else ""
+        return f"{self.agreed} of {self.starts} searches from different starts ended at this fit{rest}"
 
     def prior(self, time: float) -> Prior:
         """Where a recursive estimator goes on from the last row of the record."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
 from adaptive_flot.runner.commands.record_blocks import Blocks
 from adaptive_flot.runner.commands.replay import Replay, replay
 from adaptive_flot.runner.scenario.keys import Plugin
+
+BATCH_OPTIONS: Mapping[str, Any] = {"initial_state": "estimated", "starts": 12}
+"""Options of the batch fit: the first state is not known, and a fit that leaves much is tried from further starts."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,7 +97,7 @@ def estimate_record(
         check_interval(model, blocks.fit.dt)
     setup = Setup(model, blocks.fit.dt, names, driving)
     factory = load("pem", BATCH_ESTIMATORS, "batch estimator")
-    batch: BatchFit = construct(factory, "pem", "batch estimator", setup, initial_state="estimated").fit(blocks.fit)
+    batch: BatchFit = construct(factory, "pem", "batch estimator", setup, **BATCH_OPTIONS).fit(blocks.fit)
     progress()
     columns, noise = model.indices("outputs", driving), batch.noise_std
     said = wrong_start(model, blocks.fit, batch.initial_state, batch.parameters, columns, noise)

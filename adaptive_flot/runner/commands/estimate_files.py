@@ -26,6 +26,7 @@ def estimate_summary(data: Path, result: RecordEstimate) -> dict[str, Any]:
             "initial_state": dict(zip(result.setup.model.names("states"), batch.initial_state.tolist(), strict=True)),
             "identifiability": asdict(batch.identifiability),
             "status": batch.status,
+            "searches": {"from_different_starts": batch.starts, "ended_at_this_fit": batch.agreed},
         },
         "estimators": [
             {

@@ -124,7 +124,7 @@ def test_a_group_of_parameters_is_fitted_as_its_members(model: Model, cell_case:
 
 def test_a_search_that_runs_out_of_evaluations_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """The best values so far come with a status of their own, not with OK."""
-    monkeypatch.setattr("estimators.pem.MOST_EVALUATIONS", 1)
+    monkeypatch.setattr("estimators.pem.free_runs.MOST_EVALUATIONS", 1)
     model = toys.linear(2)
     record = toys.record(model, np.random.default_rng(3).normal(size=(30, 2)), parameters={"th0": 3.0, "th1": -2.0})
     setup = Setup(model, 1.0, model.names("parameters"), model.names("outputs"))

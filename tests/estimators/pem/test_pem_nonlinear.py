@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-import estimators.pem
+import estimators.pem.free_runs
 from adaptive_flot.contracts import Setup, Status, full_parameters
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.record import RecordSimulator
-from estimators.pem import InitialState, Pem
+from estimators.pem import Pem
+from estimators.pem.free_runs import InitialState
 from tests.estimators import toys
 from tests.estimators.conftest import NOISE_STD, ROWS, CellCase
 
@@ -133,7 +134,7 @@ def test_jacobian_of_the_whole_problem_is_the_derivative_of_its_residuals(
         handed.append((residuals, start, jacobian))
         raise InterruptedError
 
-    monkeypatch.setattr(estimators.pem, "least_squares", spy)
+    monkeypatch.setattr(estimators.pem.free_runs, "least_squares", spy)
     with pytest.raises(InterruptedError):
         Pem(cell_record.setup, initial_state=initial_state).fit(cell_record.record)
     residuals, start, jacobian = handed[0]

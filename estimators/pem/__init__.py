@@ -1,0 +1,13 @@
+"""Batch prediction-error method: one fit to a whole record.
+
+Map
+---
+estimator.py  Pem: the fit, from which starts, and its results.
+free_runs.py  Errors of free runs, their derivatives, and the search from one start.
+problem.py    What is unknown: centre, scale and range.
+starts.py     Scattered starts of a search.
+"""
+
+from estimators.pem.estimator import Pem
+
+__all__ = ["Pem"]
