@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo live-demo test check format docs bench bench-discovery bench-discovery-quick bench-live bench-measured lock clean
+.PHONY: help install demo live-demo test browser check format docs bench bench-discovery bench-discovery-quick bench-live bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,8 +26,11 @@ install: $(READY) ## Create .venv with the pinned dependencies and this project
 demo: $(READY) ## Run the demonstration
 	@$(BIN)/python -m adaptive_flot.demo
 
-test: check ## Run all checks and the test suite
+test: check browser ## Run all checks and the test suite
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+browser: ## Install Chromium for the tests of pages where this system lets us; without it they are skipped
+	@$(install_chromium)
 
 check: $(READY) ## Run the static checks: ruff, mypy, import contracts
 	$(BIN)/ruff check --quiet .
@@ -93,4 +96,14 @@ command -v $(PYTHON) >/dev/null || { \
 $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
   echo "adaptive-flot needs Python 3.11 or newer, and '$(PYTHON)' is $$($(PYTHON) --version 2>&1)." >&2; \
   echo "Name another one, for example: make PYTHON=python3.12" >&2; exit 1; }
+endef
+
+# Debian, as root, and nothing else: a system of somebody's own is left as it is.
+define install_chromium
+for name in chromium chromium-browser google-chrome google-chrome-stable; do \
+  command -v $$name >/dev/null && exit 0; done; \
+if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+  { apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --yes --no-install-recommends \
+    chromium fonts-dejavu-core >/dev/null; } || echo "Chromium could not be installed; tests of pages are skipped" >&2; \
+else echo "No Chromium on this system; tests of pages are skipped" >&2; fi
 endef

@@ -16,7 +16,8 @@ from rich.text import Text
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
-from adaptive_flot.report.kit import page as report
+from adaptive_flot.report.kit.parts import Table as Content
+from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
 from adaptive_flot.runner.commands.estimate import RecordEstimate
@@ -70,7 +71,7 @@ def print_verdict(verdict: Verdict) -> None:
         for heading in ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval"):
             table.add_column(heading, justify="left" if heading in ("output", "unit") else "right")
         for c in verdict.error:
-            low, high = (report.number(100 * r, ".0f") for r in c.reduction95)
+            low, high = (number(100 * r, ".0f") for r in c.reduction95)
             table.add_row(c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
         console.print(table)
     if verdict.experiment is not None:
@@ -138,7 +139,7 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
     print_comparison([table for table in found if table is not None], findings(comparison))
 
 
-def print_comparison(tables: Sequence[report.Table], sentences: Sequence[str]) -> None:
+def print_comparison(tables: Sequence[Content], sentences: Sequence[str]) -> None:
     """Print the tables of a comparison and what follows from them."""
     console = _console()
     for content in tables:

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from adaptive_flot.charts.palette import colour
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
@@ -71,7 +72,7 @@ def _residual(ax: Axes, discovery: Discovery) -> None:
     time = discovery.problem.record.time
     for fit, color, label in (
         (discovery.before, style.CONSTANT, "before"),
-        (discovery.after, style.colour(0), "after"),
+        (discovery.after, colour(0), "after"),
     ):
         ax.plot(time, 1e3 * fit.residual(discovery.problem)[:, j], color=color, lw=0.7, label=label)
     ax.set_title("Residual: measured − free run")
@@ -84,8 +85,8 @@ def _residual(ax: Axes, discovery: Discovery) -> None:
 def _cause(ax: Axes, discovery: Discovery, answer: dict[str, Any]) -> None:
     assert discovery.problem is not None and discovery.after is not None
     (curve,) = effect_curves(discovery.problem, discovery.after, len(discovery.verdict.effects))
-    ax.fill_between(1e3 * curve.driver, curve.low, curve.high, color=style.colour(0), alpha=0.22, lw=0)
-    ax.plot(1e3 * curve.driver, curve.change, color=style.colour(0), label="found, 95 % band")
+    ax.fill_between(1e3 * curve.driver, curve.low, curve.high, color=colour(0), alpha=0.22, lw=0)
+    ax.plot(1e3 * curve.driver, curve.change, color=colour(0), label="found, 95 % band")
     true = truth(answer["effects"][0], curve.effect.driver, curve.driver)
     ax.plot(1e3 * curve.driver, true, color=style.TRUTH, lw=1.1, ls="--", label="truth")
     ax.axhline(1.0, color=style.CONSTANT, lw=1.0, ls=(0, (5, 1.5)))
@@ -99,7 +100,7 @@ def _cause(ax: Axes, discovery: Discovery, answer: dict[str, Any]) -> None:
 def _errors(ax: Axes, discovery: Discovery) -> None:
     change = next(c for c in discovery.verdict.error if c.output == OUTPUT)
     values = 1e3 * np.array([change.before, change.after])
-    bars = ax.bar(["before", "after"], values, color=[style.CONSTANT, style.colour(0)], width=0.6)
+    bars = ax.bar(["before", "after"], values, color=[style.CONSTANT, colour(0)], width=0.6)
     ax.bar_label(bars, labels=[f"{v:.2f}" for v in values])
     ax.axhline(1e3 * change.noise, color="black", lw=1.0, ls=(0, (4, 2)), label="noise")
     ax.set_title("Error, report split")

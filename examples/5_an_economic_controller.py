@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from adaptive_flot.charts.plotdata import Panel, Role, Trace
 from adaptive_flot.contracts import ControllerSetup, Limits, OperatingPoint, Prior, Setup
 from adaptive_flot.greybox import steady_state
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.report.kit.figures import time_figure
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 from adaptive_flot.runner.loop.loop import run_loop
 from adaptive_flot.runner.plants.plant import SimulatedPlant
 from controllers.economic_mpc import EconomicMpc

@@ -100,7 +100,7 @@ class Change:
         from adaptive_flot.report.discovery.records import write_records_report
 
         check_targets(self.sources, [("report", Path(path))])
-        write_records_report(self.comparison, self.name, path)
+        write_records_report(self.comparison, self.name, path, read=self.sources)
         return Path(path)
 
     def save(self, path: Path | str, *, base: str | None = None) -> Path:

@@ -82,7 +82,7 @@ class Estimation:
         Parameters
         ----------
         kind
-            "outputs" of the test block with the predictions, "parameters" over time, or "inputs" of the fit block.
+            "outputs" of the test block with the predictions, "parameters" over time, or "inputs".
 
         Returns
         -------
@@ -114,7 +114,7 @@ class Estimation:
         from adaptive_flot.report.estimate.page import write_estimate_report
 
         check_targets(self.sources, [("report", Path(path))])
-        write_estimate_report(self.result, path)
+        write_estimate_report(self.result, path, read=self.sources)
         return Path(path)
 
     def save(self, path: Path | str, *, base: str | None = None) -> Path:

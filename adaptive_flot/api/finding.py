@@ -132,7 +132,7 @@ class Finding:
         from adaptive_flot.report.discovery.page import write_discovery_report
 
         check_targets(self.sources, [("report", Path(path))])
-        write_discovery_report(self.discovery, Path(self.name).stem, path)
+        write_discovery_report(self.discovery, Path(self.name).stem, path, read=self.sources)
         return Path(path)
 
     def save(self, path: Path | str, *, base: str | None = None) -> Path:

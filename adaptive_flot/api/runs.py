@@ -15,7 +15,7 @@ from adaptive_flot.api.plugins import Choices, plugins
 from adaptive_flot.api.progress import counted
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ResultError, ScenarioError, near_match
-from adaptive_flot.report.kit.page import seed_list
+from adaptive_flot.report.kit.wording import seed_list
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_files, run_summary, write_json, write_runs
 from adaptive_flot.runner.commands.run_result import Run

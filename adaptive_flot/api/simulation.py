@@ -66,8 +66,8 @@ class Simulation:
         ResultError
             No such column.
         """
+        from adaptive_flot.charts.plotdata import Panel, Role, Trace
         from adaptive_flot.report.kit.figures import time_figure
-        from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
 
         inputs = {q.column for q in self.model.inputs}
         known = {q.column: q for q in self._quantities if q.column in self.table}

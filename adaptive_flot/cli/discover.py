@@ -87,8 +87,9 @@ def discover(
     from adaptive_flot.report.discovery.page import write_discovery_report
     from adaptive_flot.report.discovery.records import write_records_report
 
+    read = [*data, *references, *([map_] if map_ is not None else [])]
     if several:
-        write_records_report(compared, name, page, command=command_line())
+        write_records_report(compared, name, page, command=command_line(), read=read)
     else:
-        write_discovery_report(searched, name, page, command=command_line())
+        write_discovery_report(searched, name, page, command=command_line(), read=read)
     typer.echo(f"Report: {page}")

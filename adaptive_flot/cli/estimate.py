@@ -85,5 +85,6 @@ def estimate(
     print_estimate(result)
     from adaptive_flot.report.estimate.page import write_estimate_report
 
-    write_estimate_report(result, folder / "report.html", command=command_line())
+    read = [data, *([map_] if map_ is not None else [])]
+    write_estimate_report(result, folder / "report.html", command=command_line(), read=read)
     typer.echo(f"Report: {folder / 'report.html'}")

@@ -2,11 +2,14 @@
 
 Map
 ---
-kit/        What every page is made of: page, style, figures, strips.
+kit/        What every page is made of: page, parts, album, style, figures.
 run/        The report of scenario runs.
 compare/    Runs side by side.
 discovery/  What a model lacks.
 estimate/   A measured record replayed through estimators.
 quality/    An imported record.
-templates/  The pages (jinja2).
+templates/  The page (jinja2), its style and its script. Charts that move are in `adaptive_flot.charts`.
+
+A page gives the answer first: a title that says it, sentences with sizes, a few numbers, one picture. All else is in
+folded chapters. The foot says how the page was made.
 """

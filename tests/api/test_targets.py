@@ -15,7 +15,7 @@ from adaptive_flot.api.finding import Finding
 from adaptive_flot.api.runs import Runs
 from adaptive_flot.api.simulation import Simulation
 from adaptive_flot.errors import OutputError
-from adaptive_flot.report.kit.page import Album
+from adaptive_flot.report.kit.album import Album
 from adaptive_flot.resources import cell_file
 from tests.runner.conftest import edited
 

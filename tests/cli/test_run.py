@@ -30,10 +30,10 @@ def test_it_writes_summary_tables_and_report(call: Call, scenario: WriteScenario
     assert {"summary.json", "report.html", "fixed_schedule_seed1.csv", "rpem_schedule_seed1.csv"} <= names
     assert not any(n.startswith(".") for n in names)
     summary = json.loads((folder / "summary.json").read_text())
-    assert list(summary) == ["scenario", "runs"] and summary["scenario"] == "short"
+    assert list(summary) == ["scenario", "code", "runs"] and summary["scenario"] == "short"
     assert len(summary["runs"]) == 2
     for run in summary["runs"]:
-        assert list(run) == ["estimator", "controller", "seed", "fit", "status_counts", "seconds"]
+        assert list(run) == ["estimator", "controller", "seed", "fit", "status_counts", "seconds", "options"]
         assert list(run["fit"]) == ["n", "C", "concentrate_grade"]
         assert run["status_counts"] == {"initialising": 30, "ok": 30}
     assert "report.html" in result.out and "rpem" in result.out

@@ -9,10 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adaptive_flot.charts.plotdata import Chart, Role, Strip
 from adaptive_flot.greybox.data.tables import read_table
-from adaptive_flot.report.kit.figures import time_figure
-from adaptive_flot.report.kit.plotdata import Role
-from adaptive_flot.report.kit.strips import Strip, spells, strip_figure
+from adaptive_flot.report.kit.figures import chart_figure, time_figure
 from adaptive_flot.report.run import closed_loop, series
 from adaptive_flot.report.run.page import run_report
 from adaptive_flot.report.run.series import CaseRuns
@@ -111,9 +110,9 @@ def test_page_of_a_closed_loop(result: Result) -> None:
     page = run_report([result])
     links = Links()
     links.feed(page)
-    # plane and spread of the comparison, operation, plans, strip, parameters, outputs, residuals
-    assert (links.fetched, links.scripts, links.images) == ([], 0, 9)
-    for text in ("Plans and what happened", "Statuses over time", "Value [cu/h]", "ok 4"):
+    # contenders, operation, plans, outputs, parameters, bound, two of residuals; plane and spread of the comparison
+    assert (links.fetched, links.charts, links.images) == ([], 8, 10)
+    for text in ("who decided", "Below limit [% of time]", "Value [cu/h]", "ok 4"):
         assert text in page
 
 
@@ -121,17 +120,18 @@ STRIP = Strip("s", np.arange(1.0, 7.0), ["ok", "ok", "held", "ok", "ok", "missin
 
 
 def test_spells_cover_the_time_without_gap() -> None:
-    found = spells(STRIP)
+    found = STRIP.spells()
     assert found == [("ok", 0.0, 2.0), ("held", 2.0, 3.0), ("ok", 3.0, 5.0), ("missing", 5.0, 6.0)]
 
 
 def test_a_second_in_a_day_is_still_seen() -> None:
     states = ["ok"] * 86400
     states[4000] = "held"
-    figure = strip_figure([Strip("s", np.arange(1.0, 86401.0), states, "ok")])
+    figure = chart_figure(Chart(strips=(Strip("s", np.arange(1.0, 86401.0), states, "ok"),)))
     ax = figure.axes[0]
     widths = [path.get_extents().width for c in ax.collections for path in c.get_paths()]
-    assert min(widths) > 0.003 * 86400
+    drawn = sorted(w for w in widths if w > 0)  # those of no width are entries of the legend
+    assert len(drawn) == 3 and drawn[0] > 0.003 * 24, "the axis of a day is in hours"
     assert [t.get_text() for t in figure.legends[0].get_texts()] == ["ok", "held"]
 
 
@@ -148,5 +148,5 @@ def test_each_fault_has_a_strip_of_when_it_acted(result: Result) -> None:
     )
     table.loc[table["time_s"] > 400, "faults"] = "nan_state"
     found = {s.label: s for s in closed_loop.strips(series.cases([(scenario, [replace(run, table=table)])])[0])}
-    assert spells(found["stuck air flow"])[1:] == [("fault", 350.0, 360.0), ("no fault", 360.0, 420.0)]
-    assert [state for state, *_ in spells(found["nan state"])] == ["no fault", "fault", "no fault", "fault"]
+    assert found["stuck air flow"].spells()[1:] == [("fault", 350.0, 360.0), ("no fault", 360.0, 420.0)]
+    assert [state for state, *_ in found["nan state"].spells()] == ["no fault", "fault", "no fault", "fault"]

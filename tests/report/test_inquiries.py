@@ -56,7 +56,9 @@ def test_the_report_and_the_summary_tell_what_came_of_an_alarm(tmp_path: Path, m
     (entry,) = plain(watched["discovery"])
     assert entry["extended"] and entry["verdict"]["verdict"] == "named" and entry["record_s"] == [1.0, 90.0]
     page = run_report([(scenario, runs)])
-    section = page.split("<h3>Effects that the model lacks</h3>")[1].split("<h3>")[0]
+    section = page.split("<h2>Effects that the model lacks</h2>")[1].split("</details>")[0]
+    top = page.split('<details class="fold"')[0]
+    assert "the search named nothing (verdict named); the model in use was extended" in top
     assert (
         "from 1 to 90 s was searched" in section
         and "was extended" in section

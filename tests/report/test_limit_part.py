@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.metrics import rmse
-from adaptive_flot.report.kit.page import Album
+from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.run.cramer_rao_limit import limit_part
 from adaptive_flot.report.run.series import CaseRuns, cases
 from adaptive_flot.runner.commands.run import run_scenario

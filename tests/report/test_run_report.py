@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adaptive_flot.report.kit.page import Table
-from adaptive_flot.report.kit.plotdata import Role
+from adaptive_flot import provenance
+from adaptive_flot.charts.palette import GREY
+from adaptive_flot.charts.plotdata import Role
+from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.run import series
 from adaptive_flot.report.run.findings import below_published, candidates, findings, swing_share
 from adaptive_flot.report.run.page import run_report, write_run_report
@@ -50,11 +52,11 @@ class Links(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
         self.fetched: list[str] = []
-        self.scripts = 0
+        self.charts = 0
         self.images = 0
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.scripts += tag == "script"
+        self.charts += ("type", "application/json") in attrs
         self.images += tag == "img"
         self.fetched += [v for k, v in attrs if k in ("src", "href") and v and not v.startswith(("#", "data:"))]
         assert tag != "img" or dict(attrs).get("alt"), "a picture without a text for those who do not see it"
@@ -66,15 +68,18 @@ def test_page_is_self_contained(result: Result, tmp_path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     links = Links()
     links.feed(text)
-    assert (links.fetched, links.scripts) == ([], 0)
-    assert links.images == 10  # five a scenario: two seeds are too few for a distribution
-    assert len(text) < 3_000_000
+    assert links.fetched == []
+    # a scenario: parameters, outputs, inputs, bound, two of residuals; two seeds are too few for a distribution
+    assert (links.charts, links.images) == (12, 12)
+    assert len(text) < 2_000_000
     assert "adaptive-flot run x --seed 1" in text
     assert "2 seeds (1, 2)" in text
-    assert "nan" not in re.sub(r'src="[^"]*"', "", text).lower().split()
+    words = re.sub(r"<(script|style).*?</\1>", "", re.sub(r'src="[^"]*"', "", text), flags=re.DOTALL)
+    assert "nan" not in words.lower().split()
 
 
-def test_same_runs_same_page(result: Result) -> None:
+def test_same_runs_same_page(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "now", lambda: "2026-01-01 00:00 UTC")
     assert run_report([result]) == run_report([result])
 
 
@@ -136,7 +141,7 @@ def test_report_before_the_estimator_starts(result: Result) -> None:
 
 def test_roles_and_swings(result: Result) -> None:
     case = series.cases([result])[0]
-    assert case.roles == {"fixed": (Role.CONSTANT, 0), "rpem": (Role.ESTIMATE, 0)}
+    assert case.roles == {"fixed": (Role.CONSTANT, GREY), "rpem": (Role.ESTIMATE, 0)}
     run = case.first["rpem"]
     table = run.table.copy()
     table["n_std"] = 0.01

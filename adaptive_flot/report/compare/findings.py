@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.report.kit.page import number
+from adaptive_flot.report.kit.wording import number
 from adaptive_flot.runner.commands.comparison import FIXED, ORACLE, Comparison, Contender, SeedSpread
 
 OFTEN = 0.01
@@ -13,7 +13,7 @@ OFTEN = 0.01
 
 def findings(comparison: Comparison) -> list[str]:
     """Who recaptures how much of the oracle's gain, who breaks the limit, and who earns most within it."""
-    return [*_gains(comparison), *_limit(comparison), *_best(comparison)]
+    return [*_best(comparison), *_gains(comparison), *_limit(comparison)]
 
 
 def _gains(comparison: Comparison) -> list[str]:
@@ -63,12 +63,18 @@ def _limit(comparison: Comparison) -> list[str]:
 
 
 def _best(comparison: Comparison) -> list[str]:
+    """Who earns most within the limit; the oracle is no contender, but what it earns is the ceiling."""
     within = [c for c in comparison.contenders if c.has("value_cu_h") and c.spread("below_limit").median <= OFTEN]
-    if len(within) < 2:
+    real = [c for c in within if c.estimator != ORACLE]
+    if not real or len(within) < 2:
         return []
-    best = max(within, key=lambda c: c.spread("value_cu_h").median)
+    best = max(real, key=lambda c: c.spread("value_cu_h").median)
     value = number(best.spread("value_cu_h").median, ".3f")
-    return [f"Highest value among those that keep the limit: {best.label}, {value} cu/h."]
+    oracle = comparison.rival(best, ORACLE)
+    ceiling = ""
+    if oracle is not None and oracle.has("value_cu_h"):
+        ceiling = f" (with the true parameters: {number(oracle.spread('value_cu_h').median, '.3f')})"
+    return [f"Highest value among those that keep the limit: {best.label}, {value} cu/h{ceiling}."]
 
 
 def _below(contender: Contender) -> str:

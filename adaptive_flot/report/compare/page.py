@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from adaptive_flot.files import write_text
-from adaptive_flot.report.compare.findings import findings
-from adaptive_flot.report.compare.tables import MANY_SEEDS, compare_tables, overview_table, spread_text
+from adaptive_flot.report.compare import answer
+from adaptive_flot.report.compare.contenders import roles
+from adaptive_flot.report.compare.paired import paired_table
+from adaptive_flot.report.compare.tables import MANY_SEEDS, compare_tables, made_table, overview_table, spread_text
+from adaptive_flot.report.compare.trajectories import trajectories_picture
 from adaptive_flot.report.kit import distributions
-from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, render, seed_list
-from adaptive_flot.report.kit.plotdata import Role, Spread
-from adaptive_flot.runner.commands.comparison import ORACLE, Comparison, seeds_of
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.page import Page, made_by, render
+from adaptive_flot.report.kit.parts import Part, Picture, Section, present
+from adaptive_flot.report.kit.plotdata import Spread
+from adaptive_flot.report.kit.wording import seed_list
+from adaptive_flot.runner.commands.comparison import Comparison, seeds_of
+from adaptive_flot.runner.commands.runs_table import SUMMARY
 
 SPREADS = (("recovery", "recovery [–]", 1.0), ("below_limit", "below limit [% of time]", 100.0))
 """Columns, axis labels and factors of the panels beside that of the value."""
-
-
-@dataclass(frozen=True)
-class Chapter:
-    """One scenario as the template shows it."""
-
-    anchor: str
-    title: str
-    tables: list[Table]
-    findings: list[str]
-    pictures: list[Picture]
 
 
 def write_compare_report(comparisons: Sequence[Comparison], path: Path, command: str = "") -> None:
@@ -39,7 +34,7 @@ def write_compare_report(comparisons: Sequence[Comparison], path: Path, command:
     path
         File to write, whole or not at all.
     command
-        Command line that made it, for the footer.
+        Command line that made it, for the foot.
     """
     write_text(path, compare_report(comparisons, command))
 
@@ -47,23 +42,63 @@ def write_compare_report(comparisons: Sequence[Comparison], path: Path, command:
 def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
     """Return the page that `write_compare_report` writes."""
     album = Album()
-    chapters = [compare_chapter(c, f"scenario-{i}", album) for i, c in enumerate(comparisons, 1)]
     runs = sum(len(x.runs) for c in comparisons for x in c.contenders)
+    one = comparisons[0]
     page = Page(
-        title=f"Comparison: {', '.join(c.scenario for c in comparisons)}",
-        lead=f"{runs} runs, {seed_list(seeds_of(comparisons))}. Costs, prices and terms are explained in "
-        "docs/guides/economics.md.",
-        contents=[(c.anchor, c.title) for c in chapters],
-        made=made_by(command),
+        kind="Comparison",
+        title=answer.title(one) if len(comparisons) == 1 else f"{len(comparisons)} scenarios compared",
+        lead=f"{', '.join(c.scenario for c in comparisons)}: {runs} runs, {seed_list(seeds_of(comparisons))}. Costs, "
+        "prices and terms are explained in docs/guides/economics.md.",
+        answer=[s for c in comparisons for s in _said(c, len(comparisons) > 1)],
+        facts=answer.facts(one) if len(comparisons) == 1 else [],
+        first=_first(comparisons, album),
+        sections=[s for i, c in enumerate(comparisons, 1) for s in _sections(c, i, len(comparisons) > 1, album)],
+        made=made_by(command, [("Results", ", ".join(_results(comparisons)))], _summaries(comparisons)),
     )
-    return render("compare.html", page, overview=overview_table(comparisons), chapters=chapters)
+    return render(page, album)
 
 
-def compare_chapter(comparison: Comparison, anchor: str, album: Album) -> Chapter:
-    """Tables, sentences and pictures of one scenario; the pictures take the album's next numbers."""
-    return Chapter(
-        anchor, comparison.scenario, compare_tables(comparison), findings(comparison), _pictures(comparison, album)
+def _said(comparison: Comparison, several: bool) -> list[str]:
+    return [f"{comparison.scenario}: {s}" if several else s for s in answer.sentences(comparison)]
+
+
+def _first(comparisons: Sequence[Comparison], album: Album) -> list[Part]:
+    """What shows the answer: the outcomes, and the trajectories over each other."""
+    if len(comparisons) > 1:
+        return present(overview_table(comparisons))
+    return present(answer.matrix(comparisons[0]), trajectories_picture(comparisons[0], album))
+
+
+def _sections(comparison: Comparison, i: int, several: bool, album: Album) -> list[Section]:
+    if several:
+        parts = present(
+            answer.matrix(comparison), trajectories_picture(comparison, album), *comparison_parts(comparison, album)
+        )
+        parts.append(made_table(comparison))
+        return [Section(f"scenario-{i}", comparison.scenario, "all tables and figures", parts)]
+    paired = paired_table(comparison)
+    return [
+        *([Section("paired", "Paired differences", "with interval, and wins per seed", [paired])] if paired else []),
+        Section("spread", "Distribution over the seeds", "", _pictures(comparison, album)),
+        Section("tables", "All tables", "outcome, terms, statuses, times, fits", compare_tables(comparison)),
+        Section("runs", "Who ran", "options, version and commit", [made_table(comparison)]),
+    ]
+
+
+def comparison_parts(comparison: Comparison, album: Album) -> list[Part]:
+    """Paired differences, pictures and tables of a scenario."""
+    return present(paired_table(comparison), *_pictures(comparison, album), *compare_tables(comparison))
+
+
+def _results(comparisons: Sequence[Comparison]) -> list[str]:
+    """Results as they were given."""
+    return list(
+        dict.fromkeys(str(r) for c in comparisons for x in c.contenders if "result" in x.runs for r in x.runs["result"])
     )
+
+
+def _summaries(comparisons: Sequence[Comparison]) -> list[Path]:
+    return [p / SUMMARY if p.is_dir() else p for p in map(Path, _results(comparisons))]
 
 
 def _pictures(comparison: Comparison, album: Album) -> list[Picture]:
@@ -72,18 +107,9 @@ def _pictures(comparison: Comparison, album: Album) -> list[Picture]:
     return [_plane(comparison, album), _spread(comparison, album)]
 
 
-def _roles(comparison: Comparison) -> dict[str, tuple[Role, int]]:
-    """A colour for each contender; the oracle is black."""
-    roles: dict[str, tuple[Role, int]] = {}
-    for c in comparison.contenders:
-        role = Role.TRUTH if c.estimator == ORACLE else Role.ESTIMATE
-        roles[c.label] = role, sum(r is role for r, _ in roles.values())
-    return roles
-
-
 def _plane(comparison: Comparison, album: Album) -> Picture:
     points = {c.label: (c.values("mean_grade"), c.values("recovery")) for c in comparison.contenders}
-    figure = distributions.plane_figure(points, _roles(comparison), comparison.grade_limit)
+    figure = distributions.plane_figure(points, roles(comparison), comparison.grade_limit)
     caption = (
         f"{comparison.scenario}: recovery against mean grade, one marker a run. Up and right is better; left of the "
         "dashed line the mean grade is below its limit."
@@ -97,7 +123,7 @@ def _spread(comparison: Comparison, album: Album) -> Picture:
         Spread(label, {c.label: factor * c.values(name) for c in comparison.contenders})
         for name, label, factor in wanted
     ]
-    figure = distributions.spread_figure(spreads, _roles(comparison))
+    figure = distributions.spread_figure(spreads, roles(comparison))
     return album.add(figure, _spread_caption(comparison), "Value, recovery and time below the limit by contender")
 
 
@@ -112,11 +138,11 @@ def _fit_pictures(comparison: Comparison, album: Album) -> list[Picture]:
         )
         for name in names
     ]
-    figure = distributions.spread_figure(spreads, _roles(comparison))
+    figure = distributions.spread_figure(spreads, roles(comparison))
     pictures = [album.add(figure, _spread_caption(comparison), "Fits by contender")]
     if max(len(c.seeds) for c in comparison.contenders) >= MANY_SEEDS:
         caption = f"{comparison.scenario}: share of the runs whose fit is at most that; further right is better."
-        figure = distributions.cumulative_figure(spreads, _roles(comparison))
+        figure = distributions.cumulative_figure(spreads, roles(comparison))
         pictures.append(album.add(figure, caption, "Cumulative distribution of the fits"))
     return pictures
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.report.kit.page import Table, number
+from adaptive_flot.report.kit.parts import Table
+from adaptive_flot.report.kit.wording import number
 from adaptive_flot.runner.commands.comparison import Comparison, Contender, SeedSpread
 
 MANY_SEEDS = 20
@@ -144,6 +145,25 @@ def quantile_table(comparison: Comparison) -> Table | None:
     header = ("Quantity", "Controller", "Estimator", *(("Result",) if results else ()))
     caption = f"{comparison.scenario}: distribution over the seeds, by quantiles of the finite values."
     return Table(caption, (*header, "Runs", *(h for _, h in QUANTILES)), tuple(rows), words=len(header))
+
+
+def made_table(comparison: Comparison) -> Table:
+    """What made the runs of each contender: result, version and commit, options that are not at their default."""
+    rows = []
+    for c in comparison.contenders:
+        told = (_distinct(c, "result"), _distinct(c, "code"), _distinct(c, "options"))
+        rows.append((c.controller, c.estimator, *told))
+    header = ("Controller", "Estimator", "Result", "adaptive-flot", "Options")
+    caption = f"{comparison.scenario}: where the runs lie, and what made them."
+    return Table(caption, header, tuple(rows), words=len(header))
+
+
+def _distinct(contender: Contender, column: str) -> str:
+    """Words of a column over the seeds, each once; a dash where the result does not say."""
+    if column not in contender.runs:
+        return "–"
+    words = dict.fromkeys(str(word) for word in contender.runs[column].dropna() if str(word))
+    return "\n".join(words) or "–"
 
 
 def spread_text(comparison: Comparison) -> str:

@@ -8,13 +8,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from adaptive_flot.charts.palette import GREY, colour
+from adaptive_flot.charts.plotdata import Panel, Role, Trace
+from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.verdict.curve import EffectCurve
 from adaptive_flot.report.kit import style
 from adaptive_flot.report.kit.figures import legend_above
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
+from adaptive_flot.report.kit.wording import spaced
 
 LEAST_SHOWN = 1e-4
 """Shares of the best candidate below this all look alike."""
@@ -83,20 +86,19 @@ def curve_figure(curves: Sequence[EffectCurve]) -> Figure:
     grid = figure.subplots(2 * len(curves), 1, squeeze=False, height_ratios=[4, 1] * len(curves))
     for k, c in enumerate(curves):
         ax, below = grid[2 * k, 0], grid[2 * k + 1, 0]
-        power = style.exponent(c.driver)
+        power = exponent(c.driver)
         x, seen = c.driver * 10.0**-power, c.seen * 10.0**-power
-        own = style.exponent(c.low, c.high)
+        own = exponent(c.low, c.high)
         low, middle, high = (v * 10.0**-own for v in (c.low, c.change, c.high))
-        ax.fill_between(x, low, high, color=style.colour(0), alpha=0.22, lw=0, label="95 % band")
-        ax.plot(x, middle, color=style.colour(0), label="fitted effect")
+        ax.fill_between(x, low, high, color=colour(0), alpha=0.22, lw=0, label="95 % band")
+        ax.plot(x, middle, color=colour(0), label="fitted effect")
         ax.axhline(1.0 if c.relative else 0.0, color=style.CONSTANT, lw=1.2, ls=(0, (5, 1.5)), label="model as it was")
         ax.set_ylabel(
-            f"{'factor on' if c.relative else 'added to'}\n{_words(c.effect.site)} "
-            f"[{style.unit_text(c.unit or '-', own)}]"
+            f"{'factor on' if c.relative else 'added to'}\n{spaced(c.effect.site)} [{unit_text(c.unit or '-', own)}]"
         )
         below.hist(seen, bins=60, range=(float(x[0]), float(x[-1])), color=style.CONSTANT)
         below.set_ylabel("rows")
-        below.set_xlabel(f"{_words(c.effect.driver)} [{style.unit_text(c.driver_unit or '-', power)}]")
+        below.set_xlabel(f"{spaced(c.effect.driver)} [{unit_text(c.driver_unit or '-', power)}]")
         for one in (ax, below):
             one.set_xlim(float(x[0]), float(x[-1]))
     figure.align_ylabels(list(grid[:, 0]))
@@ -110,12 +112,23 @@ def residual_panels(problem: Problem, before: Fit, after: Fit) -> list[Panel]:
     time = problem.record.time[shown]
     for j, c in enumerate(problem.columns):
         q = before.model.outputs[c]
-        traces = [Trace("before", time, before.residual(problem)[shown, j], Role.CONSTANT)]
+        traces = [Trace("before", time, before.residual(problem)[shown, j], Role.CONSTANT, GREY)]
         if after is not before:
             traces.append(Trace("after", time, after.residual(problem)[shown, j], Role.ESTIMATE))
-        panels.append(Panel(f"{_words(q.name)}: residual", q.unit, tuple(traces), height=0.8))
+        panels.append(Panel(f"{spaced(q.name)}: residual", q.unit, tuple(traces), height=0.8))
     return panels
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+def run_panels(problem: Problem, before: Fit, after: Fit) -> list[Panel]:
+    """Measured values of each output, and free runs of the model as it is and of the extended one."""
+    panels, time = [], problem.record.time
+    for j, c in enumerate(problem.columns):
+        q = before.model.outputs[c]
+        traces = [
+            Trace("measured", time, problem.measured[:, j], Role.TRUTH),
+            Trace("model as it is", time, before.predicted[:, j], Role.CONSTANT, GREY),
+        ]
+        if after is not before:
+            traces.append(Trace("with what was found", time, after.predicted[:, j], Role.ESTIMATE))
+        panels.append(Panel(spaced(q.name), q.unit, tuple(traces)))
+    return panels

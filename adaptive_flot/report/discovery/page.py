@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from adaptive_flot.charts.palette import GREY
+from adaptive_flot.charts.plotdata import Chart, Role
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
-from adaptive_flot.report.discovery.figures import curve_figure, heat_map, residual_panels
+from adaptive_flot.report.discovery.answer import WORDS, error_facts
+from adaptive_flot.report.discovery.figures import curve_figure, heat_map, residual_panels, run_panels
 from adaptive_flot.report.discovery.test_design import experiment_chapter
-from adaptive_flot.report.kit import figures
-from adaptive_flot.report.kit.page import Album, Page, Picture, made_by, render
-from adaptive_flot.report.kit.plotdata import Residuals, Role
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.page import Page, made_by, render
+from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Picture, Section, present
+from adaptive_flot.report.kit.plotdata import Residuals
+from adaptive_flot.report.kit.residuals import residual_pictures
+from adaptive_flot.report.kit.wording import capital, joined, spaced
 
 MOST_RESIDUALS = 3
 """Outputs whose residuals are drawn: those whose error fell most, in units of their noise."""
@@ -28,70 +35,122 @@ TITLES = {
 }
 
 
-def write_discovery_report(discovery: Discovery, name: str, path: Path | str, command: str = "") -> None:
+def write_discovery_report(
+    discovery: Discovery, name: str, path: Path | str, command: str = "", read: Sequence[Path] = ()
+) -> None:
     """Write the report as a single HTML file without external parts.
 
     Parameters
     ----------
-    found
+    discovery
         What `discover` returned.
     name
         What the record is called.
     path
         File to write, whole or not at all.
     command
-        Command line that made it, for the footer.
+        Command line that made it, for the foot.
+    read
+        Files whose hashes the foot shows.
     """
-    write_text(Path(path), discovery_report(discovery, name, command))
+    write_text(Path(path), discovery_report(discovery, name, command, read))
 
 
-def discovery_report(discovery: Discovery, name: str, command: str = "") -> str:
+def discovery_report(discovery: Discovery, name: str, command: str = "", read: Sequence[Path] = ()) -> str:
     """Return the page that `write_discovery_report` writes."""
-    album = Album()
-    content: dict[str, object] = {
-        "word": discovery.verdict.word,
-        "reason": discovery.verdict.reason,
-        "facts": [],
-        "coefficients": None,
-    }
-    content |= {"curve": None, "errors": None, "experiment": None, "absorbed": None, "data": _data(discovery)}
-    contents = [("verdict", "Verdict")]
+    album, verdict = Album(), discovery.verdict
+    first: list[Part] = []
+    sections: list[Section] = []
     searched = discovery.search is not None  # nothing is searched in a record whose inputs explain nothing
     if searched and discovery.problem is not None and discovery.before is not None and discovery.after is not None:
-        content |= _evidence(discovery, discovery.problem, discovery.before, discovery.after, album)
-        contents += [("errors", "Error before and after"), ("residual", "Residual"), ("evidence", "Evidence")]
-        contents += [("experiment", "Which input moves would tell")] if content["experiment"] else []
-        contents += [("absorbed", "Absorbed")] if content["absorbed"] else []
-    made = made_by(command, [("Model", discovery.model.name), ("Time", f"{discovery.verdict.seconds:.1f} s")])
-    lead = f"Record: {name}, {len(discovery.screening.record)} rows, one every {discovery.screening.record.dt:g} s."
-    title = f"Discovery report: {TITLES[discovery.verdict.word]}"
-    page = Page(title, lead, [*contents, ("data", "Data screening")], made)
-    return render("discovery.html", page, **content)
+        first, sections = _evidence(discovery, discovery.problem, discovery.before, discovery.after, album)
+    data = Section("data", "Data screening", "what of the record can be used", [Bullets(_data(discovery))])
+    record = discovery.screening.record
+    page = Page(
+        kind="Discovery report",
+        title=_title(discovery),
+        lead=f"Record: {name}, {len(record)} rows, one every {record.dt:g} s. Model: {discovery.model.name}.",
+        answer=[spaced(verdict.reason), *(spaced(f) for f in _facts(discovery) if not _repeats(f, verdict.reason))],
+        facts=[Fact("Verdict", verdict.word, WORDS[verdict.word]), *error_facts(verdict.error)],
+        first=first,
+        sections=[*sections, data],
+        made=made_by(command, [("Model", discovery.model.name), ("Time", f"{verdict.seconds:.1f} s")], read),
+    )
+    return render(page, album)
 
 
-def _evidence(discovery: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> dict[str, object]:
+def _title(discovery: Discovery) -> str:
+    """What is missing where it has a name, else what the verdict means."""
     verdict = discovery.verdict
-    curve = _curve_picture(discovery, problem, after, album)
-    columns = _telling(discovery, problem)
-    planned = verdict.experiment
-    return {
-        "facts": _facts(discovery),
-        "coefficients": tables.coefficient_table(discovery) if verdict.effects else None,
-        "curve": curve,
-        "errors": tables.error_table(discovery),
-        "before_after": [_before_after(problem, before, after, album)],
-        "tests": tables.test_table(discovery),
-        "symptoms": tables.symptom_table(discovery),
-        "places": tables.place_table(discovery),
-        "residuals": [_residuals(discovery, problem, j, album) for j in columns],
-        "map": _map(discovery, album),
-        "alternatives": tables.alternative_table(discovery) if tables.ranked_alternatives(discovery) else None,
-        "open": tables.not_told_apart(discovery),
-        "experiment": experiment_chapter(planned, discovery.model, problem.columns, album) if planned else None,
-        "absorbed": tables.absorbed_table(discovery)
-        if verdict.absorbed and discovery.before is not discovery.after
-        else None,
-    }
+    if verdict.word == "named" and verdict.effects:
+        names = [f"{spaced(e.effect.site)} depends on {spaced(e.effect.driver)}" for e in verdict.effects]
+        return capital(f"{joined(names)}, which the model lacks")
+    return capital(TITLES[verdict.word])
+
+
+def _repeats(fact: str, reason: str) -> bool:
+    """Whether the reason says a fact already."""
+    return fact.partition(": ")[2].rstrip(".") in reason
+
+
+def _evidence(
+    discovery: Discovery, problem: Problem, before: Fit, after: Fit, album: Album
+) -> tuple[list[Part], list[Section]]:
+    """What shows the answer, and the chapters behind it."""
+    verdict = discovery.verdict
+    errors = present(
+        tables.error_table(discovery),
+        _all_outputs(problem, before, after, album),
+        _before_after(problem, before, after, album),
+    )
+    residual = present(
+        tables.symptom_table(discovery),
+        tables.test_table(discovery),
+        *(p for j in _telling(discovery, problem) for p in _residuals(discovery, problem, j, album)),
+    )
+    sections = [
+        Section("errors", "Error before and after", "sizes, intervals, over time", errors),
+        Section("residual", "Residual", "symptoms, whiteness", residual),
+        Section("evidence", "Evidence", "alternatives, what can not be told apart", _alternatives(discovery, album)),
+    ]
+    if verdict.experiment is not None:
+        parts = experiment_chapter(verdict.experiment, discovery.model, problem.columns, album)
+        sections.append(Section("experiment", "Which input moves would tell", verdict.experiment.name, parts))
+    if verdict.absorbed and before is not after:
+        sections.append(
+            Section("absorbed", "What the adapted parameters had absorbed", "", [tables.absorbed_table(discovery)])
+        )
+    first = present(
+        _measured_against_model(discovery, problem, before, after, album),
+        _curve_picture(discovery, problem, after, album),
+        tables.coefficient_table(discovery) if verdict.effects else None,
+    )
+    return first, sections
+
+
+def _alternatives(discovery: Discovery, album: Album) -> list[Part]:
+    return present(
+        tables.place_table(discovery),
+        _map(discovery, album),
+        tables.alternative_table(discovery) if tables.ranked_alternatives(discovery) else None,
+        Heading("What can not be told apart"),
+        Bullets(tables.not_told_apart(discovery)),
+    )
+
+
+def _measured_against_model(discovery: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
+    """The first chart: what was measured, and free runs of the model as it is and with what was found."""
+    found = "and with what was found" if after is not before else ""
+    caption = (
+        f"Measured values, and free runs of the model as it is {found}".rstrip()
+        + ": simulated from the inputs alone, never corrected by a measurement."
+    )
+    panels = run_panels(problem, before, after)
+    shown = _telling(discovery, problem)
+    if len(shown) < len(panels):
+        caption += f" Outputs whose error changed most; all {len(panels)} are in the next chapter."
+    chart = Chart(tuple(panels[j] for j in shown))
+    return album.chart(chart, caption, "Measured outputs over time, and free runs of the model")
 
 
 def _facts(discovery: Discovery) -> list[str]:
@@ -133,7 +192,15 @@ def _before_after(problem: Problem, before: Fit, after: Fit, album: Album) -> Pi
         "Measured minus free run, without and with the effect, but for the first rows, which are left out because the "
         "initial state is not known."
     )
-    return album.add(figures.time_figure(panels), caption, "Residual of each output over time, before and after")
+    return album.chart(Chart(tuple(panels)), caption, "Residual of each output over time, before and after")
+
+
+def _all_outputs(problem: Problem, before: Fit, after: Fit, album: Album) -> Picture | None:
+    panels = run_panels(problem, before, after)
+    if len(panels) <= MOST_RESIDUALS:
+        return None
+    caption = "Every measured output, and free runs of the model."
+    return album.chart(Chart(tuple(panels)), caption, "Every measured output over time, and free runs of the model")
 
 
 def _telling(discovery: Discovery, problem: Problem) -> list[int]:
@@ -144,7 +211,7 @@ def _telling(discovery: Discovery, problem: Problem) -> list[int]:
     return ranked[:MOST_RESIDUALS]
 
 
-def _residuals(discovery: Discovery, problem: Problem, j: int, album: Album) -> Picture:
+def _residuals(discovery: Discovery, problem: Problem, j: int, album: Album) -> list[Picture]:
     q = discovery.model.outputs[problem.columns[j]]
     assert discovery.before is not None and discovery.after is not None  # called with a search at hand
     shown = slice(problem.first_row, None)
@@ -153,13 +220,10 @@ def _residuals(discovery: Discovery, problem: Problem, j: int, album: Album) -> 
     fits = [("before", discovery.before), ("after", discovery.after)] if discovery.after is not discovery.before else []
     for k, (label, fit) in enumerate(fits or [("model as it is", discovery.before)]):
         p = discovery.verdict.tests.get(f"ljung_box_{'after' if label == 'after' else 'before'}_{q.name}", float("nan"))
-        role = Role.CONSTANT if k == 0 else Role.ESTIMATE
-        rows.append(Residuals(label, role, 0, problem.record.time[shown], fit.residual(problem)[shown, j] / std, p))
-    caption = (
-        f"{tables.words(q.name)}: free-run residual over the standard deviation of the noise, its autocorrelation with "
-        "the band of white noise, and its histogram."
-    )
-    return album.add(figures.residual_figure(rows), caption, f"Residual of {tables.words(q.name)}")
+        role, slot = (Role.CONSTANT, GREY) if k == 0 else (Role.ESTIMATE, 0)
+        rows.append(Residuals(label, role, slot, problem.record.time[shown], fit.residual(problem)[shown, j] / std, p))
+    caption = f"{capital(spaced(q.name))}: free-run residual over the standard deviation of the noise."
+    return residual_pictures(rows, caption, f"Residual of {spaced(q.name)}", album)
 
 
 def _map(discovery: Discovery, album: Album) -> Picture:

@@ -7,13 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
+from adaptive_flot.charts.palette import GREY
+from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.discovery.hypotheses.comparison import mean_difference
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.files import write_text
-from adaptive_flot.report.kit import figures
-from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, number, render
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
+from adaptive_flot.report.discovery.answer import WORDS, error_facts
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.page import Page, made_by, render
+from adaptive_flot.report.kit.parts import Fact, Part, Picture, Section, Table, Text
+from adaptive_flot.report.kit.wording import capital, number
 
 MOST_RECORDS = 5
 """Records whose runs are drawn."""
@@ -34,7 +38,9 @@ WITHOUT_REFERENCE = {
 }
 
 
-def write_records_report(comparison: Comparison, name: str, path: Path | str, command: str = "") -> None:
+def write_records_report(
+    comparison: Comparison, name: str, path: Path | str, command: str = "", read: Sequence[Path] = ()
+) -> None:
     """Write the report as a single HTML file without external parts.
 
     Parameters
@@ -46,41 +52,45 @@ def write_records_report(comparison: Comparison, name: str, path: Path | str, co
     path
         File to write, whole or not at all.
     command
-        Command line that made it, for the footer.
+        Command line that made it, for the foot.
+    read
+        Files whose hashes the foot shows.
 
     Raises
     ------
     OutputError
         The file can not be written.
     """
-    write_text(Path(path), records_report(comparison, name, command))
+    write_text(Path(path), records_report(comparison, name, command, read))
 
 
-def records_report(comparison: Comparison, name: str, command: str = "") -> str:
+def records_report(comparison: Comparison, name: str, command: str = "", read: Sequence[Path] = ()) -> str:
     """Return the page that `write_records_report` writes."""
     verdict, album = comparison.verdict, Album()
     titles = TITLES if comparison.referred else WITHOUT_REFERENCE
     old = [r.name for r in comparison.calibration.rows.records] if comparison.referred else []
-    lead = f"Records: {name}." + (f" Reference: {', '.join(old)}." if old else "")
-    contents = [
-        ("verdict", "Verdict"),
-        ("errors", "Error before and after"),
-        ("hypotheses", "What was tried"),
-        ("constants", "Constants"),
-    ]
-    made = made_by(command, [("Model", comparison.calibration.model.name), ("Time", f"{verdict.seconds:.1f} s")])
-    return render(
-        "records.html",
-        Page(f"Discovery report: {titles[verdict.word]}", lead, contents, made),
-        word=verdict.word,
-        reason=verdict.reason,
-        notes=list(verdict.notes),
-        runs=_runs(comparison, album),
-        errors=_errors(comparison),
-        tried=_tried(comparison),
-        hypotheses=_hypotheses(comparison) if comparison.tested else None,
-        constants=_constants(comparison),
+    pictures = _runs(comparison, album)
+    tried: list[Part] = [Text(_tried(comparison)), *([_hypotheses(comparison)] if comparison.tested else [])]
+    page = Page(
+        kind="Discovery report",
+        title=capital(titles[verdict.word])
+        if verdict.word != "named"
+        else verdict.reason.partition(". ")[0].rstrip("."),
+        lead=f"Records: {name}." + (f" Reference: {', '.join(old)}." if old else ""),
+        answer=[verdict.reason, *verdict.notes],
+        facts=[Fact("Verdict", verdict.word, WORDS[verdict.word]), *error_facts(verdict.error)],
+        first=pictures[:1],
+        sections=[
+            *([Section("records", "The other records", "measured and modelled", pictures[1:])] if pictures[1:] else []),
+            Section("errors", "Error before and after", "with 95 % intervals", [_errors(comparison)]),
+            Section("hypotheses", "What was tried", f"{comparison.tried} hypotheses", tried),
+            Section("constants", "Constants", "before and after", [_constants(comparison)]),
+        ],
+        made=made_by(
+            command, [("Model", comparison.calibration.model.name), ("Time", f"{verdict.seconds:.1f} s")], read
+        ),
     )
+    return render(page, album)
 
 
 def run_panels(comparison: Comparison, which: int) -> list[Panel]:
@@ -92,12 +102,12 @@ def run_panels(comparison: Comparison, which: int) -> list[Panel]:
         before = measured - comparison.null.fit.errors[which][:, j]
         traces = [
             Trace("measured", record.time, measured, Role.TRUTH),
-            Trace("model as it is", record.time, before, Role.ESTIMATE, 0),
+            Trace("model as it is", record.time, before, Role.CONSTANT, GREY),
         ]
         if best is not None and best.hypothesis is not None:
             label = f"with {best.hypothesis.label.replace('_', ' ')}"
             after = measured - best.fit.errors[which][:, j]
-            traces.append(Trace(label, record.time, after, Role.ESTIMATE, 1))
+            traces.append(Trace(label, record.time, after, Role.ESTIMATE))
         panels.append(Panel(q.name.replace("_", " "), q.unit, tuple(traces)))
     return panels
 
@@ -106,8 +116,8 @@ def _runs(comparison: Comparison, album: Album) -> list[Picture]:
     pictures = []
     for i, record in enumerate(comparison.rows.records[:MOST_RECORDS]):
         caption = f"Record {record.name}: measured values and free runs of the model."
-        figure = figures.time_figure(run_panels(comparison, i))
-        pictures.append(album.add(figure, caption, f"Measured and modelled outputs of {record.name}"))
+        chart = Chart(tuple(run_panels(comparison, i)))
+        pictures.append(album.chart(chart, caption, f"Measured and modelled outputs of {record.name}"))
     return pictures
 
 

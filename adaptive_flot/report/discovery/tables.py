@@ -6,18 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results import SURE, Alternative, Discovery
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.kit.figures import p_text
-from adaptive_flot.report.kit.page import Table, number
-from adaptive_flot.report.kit.style import exponent, unit_text
+from adaptive_flot.report.kit.parts import Table
+from adaptive_flot.report.kit.wording import number, spaced
 
 MOST_ROWS = 10
-
-
-def words(name: str) -> str:
-    """Return a name as the page shows it."""
-    return name.replace("_", " ")
 
 
 def effect_text(names: Sequence[tuple[str, str]]) -> str:
@@ -26,7 +22,7 @@ def effect_text(names: Sequence[tuple[str, str]]) -> str:
     >>> effect_text([("bubble_size", "air_flow"), ("feed_grade", "time")])
     'bubble size by air flow, and feed grade by time'
     """
-    return ", and ".join(f"{words(site)} by {words(driver)}" for site, driver in names)
+    return ", and ".join(f"{spaced(site)} by {spaced(driver)}" for site, driver in names)
 
 
 def error_table(discovery: Discovery) -> Table:
@@ -36,7 +32,7 @@ def error_table(discovery: Discovery) -> Table:
         power = exponent(np.array([c.before, c.after]))
         values = (number(v * 10.0**-power, ".4g") for v in (c.before, c.after, c.noise))
         low, high = (number(100 * r, ".0f") for r in c.reduction95)
-        rows.append((words(c.output), unit_text(c.unit, power), *values, f"{low} to {high}"))
+        rows.append((spaced(c.output), unit_text(c.unit, power), *values, f"{low} to {high}"))
     caption = (
         f"Root mean square error of the free run on the {discovery.verdict.split} split, which neither chose "
         "nor fitted anything. Noise: what no model can remove, as fitted. Reduction: 95 % interval of a paired block "
@@ -55,7 +51,7 @@ def coefficient_table(discovery: Discovery) -> Table:
             interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"
             site = effect_text([(named.effect.site, named.effect.driver)])
             unit = unit_text(units.get(name) or "-")
-            rows.append((site, named.effect.form, words(name), unit, number(value, ".4g"), interval))
+            rows.append((site, named.effect.form, spaced(name), unit, number(value, ".4g"), interval))
     caption = (
         "Coefficients of the effect, fitted on the estimation and confirm splits. A factor form multiplies its site by "
         "exp(g); coefficients of g are logarithms of that factor."
@@ -100,7 +96,7 @@ def test_table(discovery: Discovery) -> Table:
     tests = discovery.verdict.tests
     names = [q.name for q in discovery.model.outputs if f"ljung_box_before_{q.name}" in tests]
     shown = [[p_text(tests.get(f"ljung_box_{when}_{n}", np.nan)) for when in ("before", "after")] for n in names]
-    rows = [(words(n), *(p.removeprefix("= ") for p in pair)) for n, pair in zip(names, shown, strict=True)]
+    rows = [(spaced(n), *(p.removeprefix("= ") for p in pair)) for n, pair in zip(names, shown, strict=True)]
     caption = "p value of the Ljung–Box test (20 lags) of the free-run residual; small: something is left."
     return Table(caption, ("Output", "p before", "p after"), tuple(rows))
 
@@ -111,9 +107,9 @@ def symptom_table(discovery: Discovery) -> Table | None:
         return None
     rows = []
     for s in discovery.verdict.detection.symptoms:
-        follows = ", ".join(map(words, s.follows)) or "none"
+        follows = ", ".join(map(spaced, s.follows)) or "none"
         onset = "-" if s.onset_s is None else number(s.onset_s, ".0f")
-        rows.append((words(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
+        rows.append((spaced(s.output), number(s.size, ".2f"), follows, onset, "yes" if s.shows else "no"))
     caption = (
         "Residual of the model as it is. Size: root mean square over the noise seen from row to row. Follows: inputs "
         "whose past the whitened residual depends on. Change: when its mean changes most (moving sums). Missing: "

@@ -4,36 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 
+from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
+from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results import Experiment
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.report.discovery.tables import effect_text, words
-from adaptive_flot.report.kit import figures
-from adaptive_flot.report.kit.page import Album, Table, number
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
-from adaptive_flot.report.kit.style import exponent, unit_text
+from adaptive_flot.report.discovery.tables import effect_text
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.parts import Part, Table, Text
+from adaptive_flot.report.kit.wording import number, spaced
 
 MOST_OUTPUTS = 3
 """Outputs whose predictions are drawn: those in which the alternatives differ most, in units of the noise."""
 
 
-def experiment_chapter(planned: Experiment, model: Model, columns: tuple[int, ...], album: Album) -> dict[str, object]:
-    """Lead, tables and picture of the chapter; `columns` are the measured outputs of the model."""
-    return {
-        "lead": f"{planned} It would go on where the record ends.",
-        "tables": [_moves(planned), _pairs(planned), _tried(planned)],
-        "picture": album.add(
-            figures.time_figure(_panels(planned, model, columns)),
-            "The proposed test, and what each alternative predicts for it. Shaded: two standard deviations of the "
-            "noise of one sample, around the best alternative.",
-            "Inputs of the proposed test and the predictions of each alternative",
-        ),
-    }
+def experiment_chapter(planned: Experiment, model: Model, columns: tuple[int, ...], album: Album) -> list[Part]:
+    """Parts of the chapter; `columns` are the measured outputs of the model."""
+    picture = album.chart(
+        Chart(tuple(_panels(planned, model, columns))),
+        "The proposed test, and what each alternative predicts for it. Shaded: two standard deviations of the noise of "
+        "one sample, around the best alternative.",
+        "Inputs of the proposed test and the predictions of each alternative",
+    )
+    return [
+        Text(f"{planned} It would go on where the record ends."),
+        picture,
+        _moves(planned),
+        _pairs(planned),
+        _tried(planned),
+    ]
 
 
 def _moves(planned: Experiment) -> Table:
     inputs = np.array([u for _, u in planned.moves()])
     powers = [exponent(inputs[:, j]) for j in range(inputs.shape[1])]
-    header = ("Time [s]", *(f"{words(n)} [{unit_text(u, p)}]" for (n, u), p in _named(planned, powers)))
+    header = ("Time [s]", *(f"{spaced(n)} [{unit_text(u, p)}]" for (n, u), p in _named(planned, powers)))
     rows = [
         (f"{time:g}", *(number(v * 10.0**-p, ".4g") for v, p in zip(u, powers, strict=True)))
         for time, u in planned.moves()
@@ -65,7 +69,7 @@ def _tried(planned: Experiment) -> Table:
 def _panels(planned: Experiment, model: Model, columns: tuple[int, ...]) -> list[Panel]:
     time: FloatArray = planned.dt * np.arange(1.0, len(planned.inputs) + 1)
     panels = [
-        Panel(words(name), unit, (Trace("", time, planned.inputs[:, j], Role.TRUTH, held=True),), height=0.6)
+        Panel(spaced(name), unit, (Trace("", time, planned.inputs[:, j], Role.TRUTH, held=True),), height=0.6)
         for j, (name, unit) in enumerate(planned.quantities)
         if np.ptp(planned.inputs[:, j]) > 0
     ]
@@ -75,7 +79,7 @@ def _panels(planned: Experiment, model: Model, columns: tuple[int, ...]) -> list
         for k, (names, y) in enumerate(zip(planned.compared, planned.predicted, strict=True)):
             std = np.full(len(time), planned.noise[j]) if k == 0 else None
             traces.append(Trace(effect_text(names), time, y[:, j], Role.ESTIMATE, k, std))
-        panels.append(Panel(words(q.name), q.unit, tuple(traces)))
+        panels.append(Panel(spaced(q.name), q.unit, tuple(traces)))
     return panels
 
 

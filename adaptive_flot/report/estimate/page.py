@@ -7,22 +7,26 @@ from pathlib import Path
 
 import numpy as np
 
+from adaptive_flot.charts.plotdata import Chart
+from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.model import Quantity
-from adaptive_flot.report.estimate import series
-from adaptive_flot.report.estimate.series import Block
-from adaptive_flot.report.kit import figures
-from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, number, render
+from adaptive_flot.report.estimate import answer, series
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.figures import p_text
+from adaptive_flot.report.kit.page import Page, made_by, render
+from adaptive_flot.report.kit.parts import Bullets, Part, Picture, Section, Table, Text, present
 from adaptive_flot.report.kit.plotdata import Residuals
-from adaptive_flot.report.kit.style import exponent, unit_text
+from adaptive_flot.report.kit.residuals import residual_pictures
+from adaptive_flot.report.kit.wording import number, spaced
 from adaptive_flot.runner.commands.estimate import RecordEstimate
 from adaptive_flot.runner.commands.replay import Replay
 from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS
 
-BLOCKS: tuple[Block, ...] = ("fit", "test")
 
-
-def write_estimate_report(result: RecordEstimate, path: Path | str, command: str = "") -> None:
+def write_estimate_report(
+    result: RecordEstimate, path: Path | str, command: str = "", read: Sequence[Path] = ()
+) -> None:
     """Write the report as a single HTML file without external parts.
 
     Parameters
@@ -32,41 +36,51 @@ def write_estimate_report(result: RecordEstimate, path: Path | str, command: str
     path
         File to write, whole or not at all.
     command
-        Command line that made it, for the footer.
+        Command line that made it, for the foot.
+    read
+        Files whose hashes the foot shows.
     """
-    write_text(Path(path), estimate_report(result, command))
+    write_text(Path(path), estimate_report(result, command, read))
 
 
-def estimate_report(result: RecordEstimate, command: str = "") -> str:
+def estimate_report(result: RecordEstimate, command: str = "", read: Sequence[Path] = ()) -> str:
     """Return the page that `write_estimate_report` writes."""
     album = Album()
-    name = result.blocks.name
     outputs = series.measured_outputs(result)
-    parameters = _parameter_picture(result, album)  # first, as it comes first on the page and so in number
-    records = [
-        album.add(figures.time_figure(series.input_panels(result)), f"{name}: inputs, fit block.", "Inputs over time")
+    first = present(answer.fit_matrix(result), _free_run_picture(result, album))
+    record = [_output_picture(result, q, album) for q in outputs]
+    record.append(_input_picture(result, album))
+    fitted: list[Part] = [
+        _fit_table(result),
+        Text(f"Identifiability: {result.batch.identifiability.verdict}."),
+        _parameter_picture(result, album),
     ]
-    for block in BLOCKS:
-        records += [_output_picture(result, q, block, album) for q in outputs]
-    residuals = [_residual_picture(result, q, album) for q in outputs]
     page = Page(
-        title=f"Estimation report: {name}",
+        kind="Estimation report",
+        title=answer.title(result),
         lead=_lead(result),
-        contents=[("errors", "Errors"), ("fit", "Batch fit"), ("record", "Record"), ("residuals", "Residuals")],
-        made=made_by(command, [("Model", result.setup.model.name)]),
+        answer=answer.sentences(result),
+        facts=answer.facts(result),
+        first=first,
+        sections=[
+            Section(
+                "errors",
+                "Errors",
+                "one step ahead and free run",
+                [Bullets(answer.per_output(result)), _error_table(result)],
+            ),
+            Section("fit", "Parameters", "batch fit, and over time", fitted),
+            Section("record", "One step ahead", "predictions, their errors, inputs", record),
+            Section(
+                "residuals",
+                "Residuals",
+                "whiteness, statuses",
+                [*(p for q in outputs for p in _residual_pictures(result, q, album)), _status_table(result)],
+            ),
+        ],
+        made=made_by(command, [("Model", result.setup.model.name), ("Record", result.blocks.name)], read),
     )
-    return render(
-        "estimate.html",
-        page,
-        errors=_error_table(result),
-        findings=_findings(result),
-        fit=_fit_table(result),
-        verdict=result.batch.identifiability.verdict,
-        record=records,
-        parameters=parameters,
-        residuals=residuals,
-        statuses=_status_table(result),
-    )
+    return render(page, album)
 
 
 def _lead(result: RecordEstimate) -> str:
@@ -74,19 +88,21 @@ def _lead(result: RecordEstimate) -> str:
     how = "goes on where the fit block ends" if blocks.continues else "starts from the same initial state"
     driving = ", ".join(name.replace("_", " ") for name in result.setup.outputs)
     return (
-        f"{len(blocks.fit)} rows to fit on, {len(blocks.test)} to test on, one every {blocks.fit.dt:g} s; the test "
-        f"block {how}. Parameters and initial state come from the fit block only. Driving outputs: {driving}."
+        f"Record {blocks.name}: {len(blocks.fit)} rows to fit on, {len(blocks.test)} to test on, one every "
+        f"{blocks.fit.dt:g} s; the test block {how}. Parameters and initial state come from the fit block only. "
+        f"Driving outputs: {driving}."
     )
 
 
 def _error_table(result: RecordEstimate) -> Table:
+    powers = answer.powers(result)
     rows = []
     for replay in result.replays:
         for e in replay.errors:
-            power = exponent(np.array([e.one_step, e.free_run]))
+            power = powers[e.output]
             one, free = (number(v * 10.0**-power, ".4g") for v in (e.one_step, e.free_run))
-            name, unit = e.output.replace("_", " "), unit_text(e.unit, power)
-            rows.append((replay.estimator, e.block, name, unit, one, free, figures.p_text(e.ljung_box_p)))
+            name, unit = spaced(e.output), unit_text(e.unit, power)
+            rows.append((replay.estimator, e.block, name, unit, one, free, p_text(e.ljung_box_p)))
     caption = (
         "Root mean square errors. One step: prediction of a sample before it is used. Free run: simulation with the "
         "parameters that the estimator had at the end of the fit block, never corrected by a measurement. An estimator "
@@ -94,24 +110,8 @@ def _error_table(result: RecordEstimate) -> Table:
         f"{WHITENESS_LAGS} lags."
     )
     header = ("Estimator", "Block", "Output", "Unit", "One step", "Free run", "p")
-    return Table(caption, header, tuple(rows), words=4)
-
-
-def _findings(result: RecordEstimate) -> list[str]:
-    """Sentences from the numbers: who predicts the test block best, and whether something is left."""
-    sentences = []
-    for q in series.measured_outputs(result):
-        tests = {r.estimator: e for r in result.replays for e in r.errors if e.block == "test" and e.output == q.name}
-        name = q.name.replace("_", " ")
-        best = min(tests, key=lambda who: tests[who].free_run)
-        unit = "" if q.unit == "-" else f" {q.unit}"
-        text = f"{name}: {best} has the smallest free-run error on the test block, {tests[best].free_run:.4g}{unit}"
-        p = tests[best].ljung_box_p
-        if np.isfinite(p):
-            left = "something is left that the model does not explain" if p < 0.05 else "they pass for white"
-            text += f"; Ljung–Box p of its innovations there {figures.p_text(p)}: {left}"
-        sentences.append(text + ".")
-    return sentences
+    colours = tuple(answer.colour_name(result, row[0]) for row in rows)
+    return Table(caption, header, tuple(rows), words=4, colours=colours)
 
 
 def _fit_table(result: RecordEstimate) -> Table:
@@ -127,19 +127,36 @@ def _fit_table(result: RecordEstimate) -> Table:
     return Table(caption, header, tuple(rows), words=4)
 
 
-def _output_picture(result: RecordEstimate, q: Quantity, block: Block, album: Album) -> Picture:
-    name = q.name.replace("_", " ")
-    caption = f"{result.blocks.name}, {block} block: {name}, measured and predicted one step ahead; below, the error."
-    figure = figures.time_figure(series.output_panels(result, q, block))
-    return album.add(figure, caption, f"Measured and predicted {name}")
+def _free_run_picture(result: RecordEstimate, album: Album) -> Picture:
+    """The first chart: what was measured, and what the model says without ever seeing it."""
+    caption = (
+        f"{result.blocks.name}: measured values, and free runs of the model with the parameters each estimator had at "
+        "the end of the fit block, never corrected by a measurement."
+        + (" Dotted: where the test block begins." if result.blocks.continues else " Test block.")
+    )
+    chart = Chart(tuple(series.free_run_panels(result)), marks=series.block_marks(result))
+    return album.chart(chart, caption, "Measured outputs over time, and free runs of the model")
+
+
+def _output_picture(result: RecordEstimate, q: Quantity, album: Album) -> Picture:
+    name = spaced(q.name)
+    caption = f"{result.blocks.name}: {name}, measured and predicted one step ahead; below, the error."
+    chart = Chart(tuple(series.output_panels(result, q)), marks=series.block_marks(result))
+    return album.chart(chart, caption, f"Measured and predicted {name}")
+
+
+def _input_picture(result: RecordEstimate, album: Album) -> Picture:
+    chart = Chart(tuple(series.input_panels(result)), marks=series.block_marks(result))
+    return album.chart(chart, f"{result.blocks.name}: inputs.", "Inputs over time")
 
 
 def _parameter_picture(result: RecordEstimate, album: Album) -> Picture:
     caption = f"{result.blocks.name}: parameters with the ±2σ each estimator claims."
-    return album.add(figures.time_figure(series.parameter_panels(result)), caption, "Parameters over time")
+    chart = Chart(tuple(series.parameter_panels(result)), marks=series.block_marks(result))
+    return album.chart(chart, caption, "Parameters over time")
 
 
-def _residual_picture(result: RecordEstimate, q: Quantity, album: Album) -> Picture:
+def _residual_pictures(result: RecordEstimate, q: Quantity, album: Album) -> list[Picture]:
     rows = []
     for replay in result.replays:
         role, index = series.roles(result)[replay.estimator]
@@ -148,12 +165,12 @@ def _residual_picture(result: RecordEstimate, q: Quantity, album: Album) -> Pict
         std = _noise(result, q, replay)
         p = next(e.ljung_box_p for e in replay.errors if e.block == "test" and e.output == q.name)
         rows.append(Residuals(replay.estimator, role, index, own["time_s"].to_numpy(), innovation / std, p))
-    name = q.name.replace("_", " ")
+    name = spaced(q.name)
     caption = (
         f"{result.blocks.name}, test block: innovations of {name} over the noise level of the batch fit (of this block "
-        "where the output did not drive the fit), their autocorrelation and histogram."
+        "where the output did not drive the fit)."
     )
-    return album.add(figures.residual_figure(rows), caption, f"Innovations of {name}")
+    return residual_pictures(rows, caption, f"Innovations of {name}", album)
 
 
 def _noise(result: RecordEstimate, q: Quantity, replay: Replay) -> float:

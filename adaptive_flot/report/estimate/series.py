@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+import pandas as pd
+
+from adaptive_flot.charts.palette import contender_slots
+from adaptive_flot.charts.plotdata import Mark, Panel, Role, Trace
 from adaptive_flot.greybox.model import Quantity
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
+from adaptive_flot.report.kit.wording import spaced
 from adaptive_flot.runner.commands.estimate import RecordEstimate
+from adaptive_flot.runner.commands.replay import Replay
 
 Block = Literal["fit", "test"]
 
@@ -18,39 +24,66 @@ def measured_outputs(result: RecordEstimate) -> list[Quantity]:
 
 
 def roles(result: RecordEstimate) -> dict[str, tuple[Role, int]]:
-    """Role and colour of each estimator: `fixed` is the constant model; the others get a colour each."""
-    role_of: dict[str, tuple[Role, int]] = {}
-    for replay in result.replays:
-        role = Role.CONSTANT if replay.estimator == "fixed" else Role.ESTIMATE
-        role_of[replay.estimator] = role, sum(r is role for r, _ in role_of.values())
-    return role_of
+    """Role and colour of each estimator: `fixed` is the constant model."""
+    slots = contender_slots([("", r.estimator) for r in result.replays])
+    return {
+        who: (Role.CONSTANT if who == "fixed" else Role.ESTIMATE, slots["", who])
+        for who in (r.estimator for r in result.replays)
+    }
 
 
-def input_panels(result: RecordEstimate) -> list[Panel]:
-    """Inputs of the fit block."""
-    record = result.blocks.fit
+def block_marks(result: RecordEstimate) -> tuple[Mark, ...]:
+    """Where the test block begins, if it goes on from the fit block."""
+    return (Mark(float(result.blocks.test.time[0]), "test block"),) if result.blocks.continues else ()
+
+
+def _shown(result: RecordEstimate, replay: Replay, block: Block | None = None) -> pd.DataFrame:
+    """Rows of a block; without one both blocks where they follow each other in time, else the test block."""
+    if block is None and result.blocks.continues:
+        return replay.table
+    return replay.table[replay.table["block"] == (block or "test")]
+
+
+def free_run_panels(result: RecordEstimate) -> list[Panel]:
+    """Each measured output: measured values, and the free run of each estimator's model."""
     panels = []
-    for j, q in enumerate(result.setup.model.inputs):
-        trace = Trace("input", record.time, record.inputs[:, j], Role.ESTIMATE, held=True)
-        panels.append(Panel(q.name.replace("_", " "), q.unit, (trace,), height=0.7))
+    for q in measured_outputs(result):
+        first = _shown(result, result.replays[0])
+        time = first["time_s"].to_numpy()
+        traces = [Trace("measured", time, first[f"{q.column}_measured"].to_numpy(), Role.TRUTH)]
+        for replay in result.replays:
+            role, index = roles(result)[replay.estimator]
+            values = _shown(result, replay)[f"{q.column}_free_run"].to_numpy()
+            traces.append(Trace(replay.estimator, time, values, role, index))
+        panels.append(Panel(spaced(q.name), q.unit, tuple(traces), height=1.2))
     return panels
 
 
-def output_panels(result: RecordEstimate, q: Quantity, block: Block) -> list[Panel]:
-    """One output over one block: measured and predicted one step ahead, and below the error of each prediction."""
-    first = result.replays[0].table
-    rows = first[first["block"] == block]
-    time = rows["time_s"].to_numpy()
-    traces = [Trace("measured", time, rows[f"{q.column}_measured"].to_numpy(), Role.TRUTH)]
+def input_panels(result: RecordEstimate) -> list[Panel]:
+    """Inputs of the blocks shown."""
+    blocks = result.blocks
+    records = (blocks.fit, blocks.test) if blocks.continues else (blocks.test,)
+    time, inputs = (np.concatenate([getattr(r, name) for r in records]) for name in ("time", "inputs"))
+    panels = []
+    for j, q in enumerate(result.setup.model.inputs):
+        panels.append(Panel(spaced(q.name), q.unit, (Trace("", time, inputs[:, j], Role.TRUTH, held=True),), 0.7))
+    return panels
+
+
+def output_panels(result: RecordEstimate, q: Quantity, block: Block | None = None) -> list[Panel]:
+    """One output: measured and predicted one step ahead, and below the error of each prediction."""
+    first = _shown(result, result.replays[0], block)
+    time = first["time_s"].to_numpy()
+    traces = [Trace("measured", time, first[f"{q.column}_measured"].to_numpy(), Role.TRUTH)]
     errors = []
     for replay in result.replays:
         role, index = roles(result)[replay.estimator]
-        own = replay.table[replay.table["block"] == block]
+        own = _shown(result, replay, block)
         traces.append(Trace(replay.estimator, time, own[f"{q.column}_predicted"].to_numpy(), role, index))
         errors.append(Trace(replay.estimator, time, -own[f"{q.column}_innovation"].to_numpy(), role, index))
     zoom = any(t.role is Role.ESTIMATE for t in errors)
     return [
-        Panel(q.name.replace("_", " "), q.unit, tuple(traces), height=1.2),
+        Panel(spaced(q.name), q.unit, tuple(traces), height=1.2),
         Panel("predicted − measured", q.unit, tuple(errors), zoom=zoom),
     ]
 

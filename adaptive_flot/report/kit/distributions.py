@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from adaptive_flot.charts.plotdata import Role
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.kit import style
 from adaptive_flot.report.kit.figures import legend_above, look
-from adaptive_flot.report.kit.plotdata import Role, Spread
+from adaptive_flot.report.kit.plotdata import Spread
 
 MARKERS = ("o", "s", "^", "D", "v", "P")
 MANY_POINTS = 200

@@ -11,25 +11,26 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from adaptive_flot.charts.palette import colour
+from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
+from adaptive_flot.charts.thinning import kept_rows
+from adaptive_flot.charts.units import exponent, time_unit, unit_text
 from adaptive_flot.report.kit import style
-from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Trace
+from adaptive_flot.report.kit.strips import draw_strips, strip_height
 
 LABEL_WIDTH = 20
 """Letters of an axis label that fit beside a low panel; a longer one is broken between words."""
 LEGEND_WIDTH = 90
 """Letters that fit beside each other in a legend as wide as a figure."""
-ACF_LAGS = 40
-"""Lags of the autocorrelation shown."""
-WHITE_BAND = 1.96
-"""Half width of the 95 % band of the autocorrelation of white noise, times the root of the number of samples."""
+MOST_POINTS = 4000
+"""Points of a line; of more, the lowest and highest of each group are drawn."""
 
 _TIME_STEPS = (1, 3, 6, 10)
 """Ticks fall on whole minutes: 300 s, 600 s."""
 
 
-@style.styled
 def time_figure(panels: Sequence[Panel]) -> Figure:
-    """Stack panels over a common time axis [s].
+    """Stack panels over a common time axis.
 
     Parameters
     ----------
@@ -41,45 +42,37 @@ def time_figure(panels: Sequence[Panel]) -> Figure:
     Figure
         7.2 inch wide; one legend above the panels unless there is but one line a panel.
     """
-    heights = [p.height for p in panels]
-    figure = Figure(figsize=(style.WIDTH, 0.75 + 1.85 * sum(heights)))
-    grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)
-    axes: list[Axes] = list(grid[:, 0])
-    for ax, panel in zip(axes, panels, strict=True):
-        _draw_panel(ax, panel)
-    axes[-1].set_xlabel("time [s]")
-    axes[-1].set_xlim(_time_limits([t for p in panels for t in p.traces if t.role is not Role.PLAN]))
-    axes[-1].xaxis.set_major_locator(MaxNLocator(7, steps=_TIME_STEPS))
-    figure.align_ylabels(axes)
-    if any(len(p.traces) > 1 or p.limits for p in panels):
-        legend_above(figure, axes)
-    return figure
+    return chart_figure(Chart(tuple(panels)))
 
 
 @style.styled
-def residual_figure(rows: Sequence[Residuals]) -> Figure:
-    """Normalised innovations: over time, their autocorrelation and their histogram.
-
-    Parameters
-    ----------
-    rows
-        One estimator a row. Missing samples (NaN) are left out.
+def chart_figure(chart: Chart) -> Figure:
+    """Draw a chart as a figure that does not move: its panels, and below them its strips.
 
     Returns
     -------
     Figure
-        Three panels a row: trace with the +-2 lines, autocorrelation with the 95 % band of white noise, histogram
-        with the standard normal density.
+        7.2 inch wide. States shorter than 0.4 % of the axis are drawn that wide.
     """
-    figure = Figure(figsize=(style.WIDTH, 0.3 + 1.95 * len(rows)))
-    grid = figure.subplots(len(rows), 3, squeeze=False, width_ratios=(1.8, 1.2, 1.0))
-    for (trace, correlation, histogram), row in zip(grid, rows, strict=True):
-        _draw_residuals(trace, row)
-        _draw_autocorrelation(correlation, row)
-        _draw_histogram(histogram, row)
-    for ax, label in zip(grid[-1], ("time [s]", "lag [samples]", "innovation / std [–]"), strict=True):
-        ax.set_xlabel(label)
-    figure.align_ylabels(grid[:, 0])
+    heights = [1.85 * p.height for p in chart.panels] + ([strip_height(chart.strips)] if chart.strips else [])
+    figure = Figure(figsize=(style.WIDTH, 0.85 + sum(heights)))
+    grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
+    axes: list[Axes] = list(grid[:, 0])
+    begin, end = chart.limits()
+    unit, seconds = time_unit(end - begin) if chart.over_time else (unit_text(chart.x_unit), 1.0)
+    for ax, panel in zip(axes, chart.panels, strict=False):
+        _draw_panel(ax, panel, seconds)
+    if chart.strips:
+        draw_strips(axes[-1], chart.strips, seconds)
+    for ax in axes:
+        for mark in chart.marks:
+            ax.axvline(mark.time / seconds, color=style.LIMIT, ls=":", lw=1.1, zorder=1)
+    axes[-1].set_xlabel(f"{chart.x_label} [{unit}]")
+    axes[-1].set_xlim(begin / seconds, end / seconds)
+    axes[-1].xaxis.set_major_locator(MaxNLocator(7, steps=_TIME_STEPS if seconds == 1.0 and chart.over_time else None))
+    figure.align_ylabels(axes)
+    if chart.strips or any(len(p.traces) > 1 or p.limits for p in chart.panels):
+        legend_above(figure, axes)
     return figure
 
 
@@ -88,54 +81,41 @@ def look(role: Role, index: int) -> dict[str, Any]:
     if role is Role.TRUTH:
         return {"color": style.TRUTH, "lw": 1.1, "zorder": 3, "ls": ("-", "--", ":", "-.")[index % 4]}
     if role is Role.CONSTANT:
-        return {"color": style.CONSTANT, "lw": 1.5, "zorder": 2, "ls": (0, (5, 1.5))}
+        return {"color": colour(index), "lw": 1.5, "zorder": 2, "ls": (0, (5, 1.5))}
     if role is Role.KNOWING:
         return {"color": style.TRUTH, "lw": 1.1, "zorder": 6, "ls": (0, (4, 3))}
     if role is Role.FOLLOWED:
-        return {"color": style.colour(index), "lw": 1.0, "zorder": 3, "ls": ":"}
+        return {"color": colour(index), "lw": 1.0, "zorder": 3, "ls": ":"}
     if role is Role.PLAN:
         return {"color": style.PLAN, "lw": 1.1, "zorder": 5, "marker": "o", "ms": 3.5, "markevery": [0]}
-    return {"color": style.colour(index), "zorder": 4}
+    return {"color": colour(index), "zorder": 4}
 
 
-def _draw_panel(ax: Axes, panel: Panel) -> None:
-    followed = [t for t in panel.traces if t.role is Role.ESTIMATE] if panel.zoom else []
-    power = style.exponent(*(t.values for t in followed or panel.traces), np.array(panel.limits))
+def _draw_panel(ax: Axes, panel: Panel, seconds: float) -> None:
+    zoom = panel.zoom_limits()
+    power = exponent(*(t.values for t in panel.followed() or panel.traces), np.array(panel.limits))
     factor = 10.0**-power
     if panel.band is not None:
         ax.axhspan(-panel.band * factor, panel.band * factor, color="#ededed", lw=0, label=panel.band_label)
     for limit in panel.limits:
         ax.axhline(limit * factor, color=style.LIMIT, lw=1.0, ls=(0, (6, 2)), zorder=2.5, label="limit")
     for trace in panel.traces:
-        _draw_trace(ax, trace, factor)
-    if followed:
-        ax.set_ylim(_zoom_limits(panel, followed, factor))
-    ax.set_ylabel(f"{fill(panel.label, LABEL_WIDTH)}\n[{style.unit_text(panel.unit, power)}]")
+        _draw_trace(ax, trace, factor, seconds)
+    if zoom is not None:
+        ax.set_ylim(zoom[0] * factor, zoom[1] * factor)
+    ax.set_ylabel(f"{fill(panel.label, LABEL_WIDTH)}\n[{unit_text(panel.unit, power)}]")
     ax.yaxis.set_major_locator(MaxNLocator(5))
 
 
-def _time_limits(traces: Sequence[Trace]) -> tuple[float, float]:
-    """From the start of the first interval (values belong to its end) to the last time."""
-    time = min((t.time for t in traces), key=lambda t: float(t[0]))
-    return float(time[0] - (time[1] - time[0] if len(time) > 1 else 1.0)), max(float(t.time[-1]) for t in traces)
-
-
-def _zoom_limits(panel: Panel, followed: Sequence[Trace], factor: float) -> tuple[float, float]:
-    half = 1.5 * (panel.band or 0.0)
-    low = min(float(np.nanmin(t.values, initial=-half)) for t in followed) * factor
-    high = max(float(np.nanmax(t.values, initial=half)) for t in followed) * factor
-    room = 0.08 * (high - low) or 1.0
-    return low - room, high + room
-
-
-def _draw_trace(ax: Axes, trace: Trace, factor: float) -> None:
+def _draw_trace(ax: Axes, trace: Trace, factor: float, seconds: float) -> None:
     line = look(trace.role, trace.index)
-    values = trace.values * factor
-    ax.plot(trace.time, values, drawstyle="steps-pre" if trace.held else "default", label=trace.label, **line)
+    rows = kept_rows([trace.values], MOST_POINTS)
+    time, values = trace.time[rows] / seconds, trace.values[rows] * factor
+    ax.plot(time, values, drawstyle="steps-pre" if trace.held else "default", label=trace.label, **line)
     if trace.std is not None and np.any(np.nan_to_num(trace.std) > 0):
-        half = 2.0 * trace.std * factor
+        half = 2.0 * trace.std[rows] * factor
         band = {"color": line["color"], "alpha": 0.22, "lw": 0, "zorder": 1}
-        ax.fill_between(trace.time, values - half, values + half, label=f"{trace.label}, ±2σ", **band)
+        ax.fill_between(time, values - half, values + half, label=f"{trace.label}, ±2σ", **band)
 
 
 def legend_above(figure: Figure, axes: Sequence[Axes]) -> None:
@@ -159,35 +139,6 @@ def legend_columns(labels: Sequence[str]) -> int:
     return max(1, -(-len(labels) // max(1, rows)))
 
 
-def _draw_residuals(ax: Axes, row: Residuals) -> None:
-    color = look(row.role, row.index)["color"]
-    ax.plot(row.time, row.values, color=color, lw=0.5)
-    for level in (-2.0, 2.0):
-        ax.axhline(level, color="black", lw=0.8, ls=(0, (4, 2)))
-    ax.set_ylabel("innovation / std [–]")
-    ax.set_title(row.label)
-    ax.xaxis.set_major_locator(MaxNLocator(4, steps=_TIME_STEPS))
-    ax.margins(x=0)
-
-
-def _draw_autocorrelation(ax: Axes, row: Residuals) -> None:
-    from statsmodels.tsa.stattools import acf
-
-    finite = row.values[np.isfinite(row.values)]
-    ax.set_title(f"Ljung–Box p {p_text(row.p_value)}")
-    ax.set_ylabel("autocorrelation [–]")
-    if len(finite) < 3 or np.ptp(finite) == 0:
-        ax.text(0.5, 0.5, "too few samples", ha="center", transform=ax.transAxes)
-        return
-    r = acf(row.values, nlags=min(ACF_LAGS, len(finite) - 1), fft=False, missing="conservative")[1:]
-    half = WHITE_BAND / np.sqrt(len(finite))
-    ax.axhspan(-half, half, color="#dddddd", lw=0)
-    ax.vlines(np.arange(1, len(r) + 1), 0.0, r, color=look(row.role, row.index)["color"], lw=1.6)
-    ax.axhline(0.0, color="black", lw=0.8)
-    low, high = min(0.0, float(np.min(r)), -half), max(float(np.max(r)), half)
-    ax.set_ylim(low - 0.12 * (high - low), high + 0.12 * (high - low))
-
-
 def p_text(p: float) -> str:
     """Return a p value as text: small ones as a bound, NaN as a dash.
 
@@ -197,14 +148,3 @@ def p_text(p: float) -> str:
     if np.isnan(p):
         return "–"
     return "< 0.001" if p < 0.001 else f"= {p:.2g}"
-
-
-def _draw_histogram(ax: Axes, row: Residuals) -> None:
-    finite = row.values[np.isfinite(row.values)]
-    bars = {"color": look(row.role, row.index)["color"], "alpha": 0.55}
-    if len(finite):
-        ax.hist(finite, bins=30, density=True, **bars)
-    x = np.linspace(-4.0, 4.0, 161)
-    ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="black", lw=1.1)
-    ax.set_title("histogram, N(0, 1)")
-    ax.set_ylabel("density [–]")

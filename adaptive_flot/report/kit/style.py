@@ -1,4 +1,4 @@
-"""The look of every figure, units for axis labels, and figures as data URIs. No pyplot: no global state, no display."""
+"""The look of every figure, and figures as data URIs. No pyplot: no global state, no display."""
 
 from __future__ import annotations
 
@@ -12,23 +12,20 @@ from typing import Any, ParamSpec
 from urllib.parse import quote
 
 import matplotlib
-import numpy as np
 from matplotlib.figure import Figure
 
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.charts.palette import GREY, NAMED, colour
 
 P = ParamSpec("P")
 
 WIDTH = 7.2
 """Width of every figure [inch]; the page shows it at about this size, so that text in figures keeps its size."""
-TRUTH = "#000000"
-CONSTANT = "#7f7f7f"
-PLAN = "#d55e00"
-LIMIT = "#b2182b"
-ESTIMATES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Okabe and Ito's palette without its yellow: told apart with every common colour vision."""
-LARGEST_SVG = 300_000
+CONSTANT = colour(GREY)
+TRUTH, PLAN, LIMIT, USUAL = (NAMED[name][0] for name in ("truth", "plan", "limit", "usual"))
+LARGEST_SVG = 120_000
 """Size [bytes] from which a figure is embedded as PNG: a run of a day would otherwise make a page of many megabytes."""
+SMALL_DPI = 90
+"""Dots per inch of a picture that only readers without scripts see."""
 
 _PATH = re.compile(rb' d="[^"]*"')
 _DIGITS = re.compile(rb"(\.\d\d)\d+")
@@ -78,53 +75,6 @@ def _look() -> AbstractContextManager[None]:
     return matplotlib.rc_context(settings)
 
 
-def colour(index: int) -> str:
-    """Colour of the estimator at a place in the list; they repeat after six.
-
-    >>> colour(0) == colour(6)
-    True
-    """
-    return ESTIMATES[index % len(ESTIMATES)]
-
-
-def exponent(*series: FloatArray) -> int:
-    """Power of ten to take out of an axis: 0 for sizes that read well as they are.
-
-    >>> exponent(np.array([9.05e-4, 2.17e-3])), exponent(np.array([0.3])), exponent(np.array([np.nan]))
-    (-3, 0, 0)
-    """
-    largest = max((float(np.max(np.abs(s[np.isfinite(s)]), initial=0.0)) for s in series), default=0.0)
-    if largest == 0.0 or 0.01 <= largest < 1e4:
-        return 0
-    return int(np.floor(np.log10(largest)))
-
-
-def unit_text(unit: str, power: int = 0) -> str:
-    """Return a unit as the axis shows it, with the power of ten taken out of the numbers.
-
-    >>> unit_text("m3/s", -3), unit_text("-"), unit_text("m^n/s"), unit_text("-", -3)
-    ('10⁻³ m³/s', '–', 'mⁿ/s', '10⁻³')
-    """
-    raised = str.maketrans("0123456789-n.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ⁿ·")
-    text = "" if unit == "-" else unit
-    for base in ("m", "s", "V"):
-        for old in ("2", "3", "^n", "^0.5"):
-            text = text.replace(base + old, base + old.lstrip("^").translate(raised))
-    factor = f"10{str(power).translate(raised)}" if power else ""
-    return " ".join(filter(None, (factor, text))) or "–"
-
-
-def amount(value: float, unit: str) -> str:
-    """Value and unit as text.
-
-    >>> amount(1.67e-4, "m3/s"), amount(0.5, "-")
-    ('1.67 × 10⁻⁴ m³/s', '0.5')
-    """
-    power = exponent(np.array([value]))
-    scaled = f"{value * 10.0**-power:.4g}" + (" ×" if power else "")
-    return scaled if unit == "-" and not power else f"{scaled} {unit_text(unit, power)}"
-
-
 def svg_uri(figure: Figure) -> str:
     """Return a figure as an SVG data URI, for the `src` of an image."""
     return _svg_uri(_saved(figure, "svg"))
@@ -135,8 +85,10 @@ def png_uri(figure: Figure, dpi: int = 160) -> str:
     return "data:image/png;base64," + base64.b64encode(_saved(figure, "png", dpi=dpi)).decode("ascii")
 
 
-def data_uri(figure: Figure) -> str:
-    """SVG where that is small enough (sharp at any size), else PNG."""
+def data_uri(figure: Figure, small: bool = False) -> str:
+    """SVG where that is small enough (sharp at any size), else PNG; always coarse where it must be `small`."""
+    if small:
+        return "data:image/webp;base64," + base64.b64encode(_saved(figure, "webp", dpi=SMALL_DPI)).decode("ascii")
     svg = _saved(figure, "svg")
     return _svg_uri(svg) if len(svg) <= LARGEST_SVG else png_uri(figure)
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from adaptive_flot.charts.plotdata import Panel, Role, Strip, Trace
 from adaptive_flot.greybox.quantities import FloatArray
 from adaptive_flot.records.grid import MEASURED, STATUSES, Codes
 from adaptive_flot.records.importing import Imported
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
-from adaptive_flot.report.kit.strips import Strip
 
-MOST_POINTS = 4000
-"""Points of a line; of more, the lowest and highest of each group are drawn."""
 MOST_SPELLS = 600
 """Parts of a strip, beyond which the most frequent status of each part is drawn."""
 
@@ -24,8 +21,7 @@ def panels(imported: Imported) -> list[Panel]:
     for c in imported.cleaned:
         name = c.quantity.name
         t, values = _broken(time, rows.values[name], rows.stretch)
-        t, values = thinned(t, values)
-        trace = Trace("record", t, values, Role.ESTIMATE, held=imported.is_input(name))
+        trace = Trace("", t, values, Role.ESTIMATE, held=imported.is_input(name))
         found.append(Panel(name.replace("_", " "), c.quantity.unit, (trace,), height=0.6))
     return found
 
@@ -49,26 +45,6 @@ def _broken(
     """Times and values with an empty value at each gap, so that no line crosses it."""
     gaps = np.flatnonzero(np.diff(stretch)) + 1
     return np.insert(time, gaps, (time[gaps - 1] + time[gaps]) / 2), np.insert(values, gaps, np.nan)
-
-
-def thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """At most MOST_POINTS points that show the same line: of each group the lowest and the highest, in their order.
-
-    >>> t, y = thinned(np.arange(100_000.0), np.sin(np.arange(100_000.0)))
-    >>> len(t) <= 4000, bool(y.max() > 0.999)
-    (True, True)
-    """
-    if len(time) <= MOST_POINTS:
-        return time, values
-    edges = np.linspace(0, len(time), MOST_POINTS // 2 + 1).astype(int)
-    chosen: list[int] = []
-    for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        part = values[a:b]
-        if np.isfinite(part).any():
-            chosen += sorted({a + int(np.nanargmin(part)), a + int(np.nanargmax(part))})
-        else:
-            chosen.append(a)
-    return time[chosen], values[chosen]
 
 
 def _most_frequent(status: Codes, size: int) -> list[int]:

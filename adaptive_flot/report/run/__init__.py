@@ -3,12 +3,15 @@
 Map
 ---
 page.py                 The page.
+answer.py               The answer in open loop; in closed loop it is that of `compare`.
+chapter.py              What is told of one scenario and controller, topic by topic.
 findings.py             Sentences, each made from the numbers of the runs.
 tables.py               Fits, errors, innovations, statuses.
 series.py               From runs to what the figures draw.
+pictures.py             Charts of inputs, parameters, outputs, residuals.
 cramer_rao_limit.py     What the measurements say at best.
 closed_loop.py          Operation, plans against what happened, who decided.
-closed_loop_figures.py  Figures of the closed loop.
+closed_loop_figures.py  Charts of the closed loop.
 inquiries.py            Effects that were searched for while the loop ran.
 fault_table.py          Faults that were injected.
 unsolved.py             Optimisations without a valid solution.

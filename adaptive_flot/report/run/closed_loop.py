@@ -7,18 +7,22 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from adaptive_flot.charts.palette import GREY
+from adaptive_flot.charts.plotdata import Panel, Role, Strip, Trace
 from adaptive_flot.contracts import Limits
 from adaptive_flot.greybox.model import Quantity
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
-from adaptive_flot.report.kit.strips import Strip
 from adaptive_flot.report.run.series import CaseRuns, changes
 from adaptive_flot.runner.commands.comparison import ORACLE
 from adaptive_flot.runner.commands.run_result import Run
 
+OWN = "its own controller"
+"""Word for who decides as it should."""
+
 
 def colours(case: CaseRuns) -> dict[str, tuple[Role, int]]:
     """A colour for each estimator, whether its estimates move or not: here it stands for a time series of the plant."""
-    return {who: (Role.KNOWING if who == ORACLE else Role.ESTIMATE, j) for j, who in enumerate(case.first)}
+    role = {who: Role.KNOWING if who == ORACLE else Role.ESTIMATE for who in case.first}
+    return {who: (role[who], case.slots[case.controller, who]) for who in case.first}
 
 
 def operation_panels(case: CaseRuns) -> list[Panel]:
@@ -73,17 +77,35 @@ def _disturbance_panels(case: CaseRuns, limits: Limits) -> list[Panel]:
     for name, unit, true, known in disturbances:
         traces = [Trace("truth", time, table[true].to_numpy(), Role.TRUTH, held=True)]
         if known:
-            traces.append(Trace("measured", time, table[known].to_numpy(dtype=float), Role.CONSTANT, held=True))
+            traces.append(Trace("measured", time, table[known].to_numpy(dtype=float), Role.CONSTANT, GREY, held=True))
         panels.append(Panel(name.replace("_", " ").replace(".", " "), unit, tuple(traces), height=0.75))
     return panels
 
 
 def _true_output(case: CaseRuns, q: Quantity, height: float, limits: tuple[float, ...]) -> Panel:
+    return Panel(q.name.replace("_", " "), q.unit, tuple(true_traces(case, q)), height=height, limits=limits)
+
+
+def true_traces(case: CaseRuns, q: Quantity, with_controller: bool = False) -> list[Trace]:
+    """True values of an output, a line an estimator; named with the controller where several are shown together."""
     traces = []
     for who, (role, j) in colours(case).items():
         table = case.shown(case.first[who])
-        traces.append(Trace(who, table["time_s"].to_numpy(), table[f"{q.column}_true"].to_numpy(), role, j))
-    return Panel(q.name.replace("_", " "), q.unit, tuple(traces), height=height, limits=limits)
+        label = f"{case.controller}, {who}" if with_controller else who
+        traces.append(Trace(label, table["time_s"].to_numpy(), table[f"{q.column}_true"].to_numpy(), role, j))
+    return traces
+
+
+def deciders(case: CaseRuns, with_controller: bool = False) -> list[Strip]:
+    """Who decided in each interval, a strip an estimator; the controller of the case is the usual one."""
+    strips = []
+    for who, run in case.first.items():
+        table = case.shown(run)
+        decided = table["decided_by"].astype(str).replace(case.controller, OWN)
+        label = f"{case.controller}, {who}" if with_controller else who
+        usual = OWN if (decided == OWN).any() else str(decided.mode().iloc[0])
+        strips.append(Strip(label, table["time_s"].to_numpy(), decided.tolist(), usual))
+    return strips
 
 
 def plan_panels(case: CaseRuns, run: Run) -> list[Panel]:

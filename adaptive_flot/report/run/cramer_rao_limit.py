@@ -8,12 +8,14 @@ from itertools import combinations
 
 import numpy as np
 
+from adaptive_flot.charts.palette import GREY
+from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.contracts.batch import INSEPARABLE, WELL_IDENTIFIED
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
-from adaptive_flot.report.kit import figures
-from adaptive_flot.report.kit.page import Album, Picture, Table, number, seed_list
-from adaptive_flot.report.kit.plotdata import Panel, Role, Trace
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.parts import Picture, Table
+from adaptive_flot.report.kit.wording import number, seed_list
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
@@ -59,7 +61,7 @@ def limit_part(case: CaseRuns, album: Album) -> LimitPart | None:
         + ("; below, the correlation of the two smallest errors" if len(case.labels) > 1 else "")
         + f". Seed {first.seed}."
     )
-    picture = album.add(figures.time_figure(panels), caption, f"Errors of {names} over time beside their bounds")
+    picture = album.chart(Chart(tuple(panels)), caption, f"Errors of {names} over time beside their bounds")
     return LimitPart(picture, _table(case, runs, bounds), _sentences(case, runs, bounds, sensors))
 
 
@@ -92,12 +94,12 @@ def _panels(case: CaseRuns, bound: _Bounds, first: Run) -> list[Panel]:
             if role is Role.ESTIMATE and _error(case, case.first[who], label).any()
         ]
         traces.append(Trace("bound", time, np.sqrt(bound.alone[:, i, i]), Role.KNOWING))
-        traces.append(Trace("bound, more sensors", time, np.sqrt(bound.more[:, i, i]), Role.CONSTANT))
+        traces.append(Trace("bound, more sensors", time, np.sqrt(bound.more[:, i, i]), Role.CONSTANT, GREY))
         unit = model.parameters[model.index("parameters", name)].unit
         panels.append(Panel(f"|error| of {label}", unit, tuple(traces)))
     if len(case.labels) > 1:
         lines = (("bound", bound.alone, Role.KNOWING), ("bound, more sensors", bound.more, Role.CONSTANT))
-        traces = [Trace(label, time, _correlation(P, 0, 1), role) for label, P, role in lines]
+        traces = [Trace(label, time, _correlation(P, 0, 1), role, GREY) for label, P, role in lines]
         panels.append(Panel("correlation at the bound", "-", tuple(traces), height=0.7))
     return panels
 

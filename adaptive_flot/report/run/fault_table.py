@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adaptive_flot.report.kit.page import Table, number
+from adaptive_flot.report.kit.parts import Table
+from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.scenario.faults import Fault, Stuck
 

@@ -7,11 +7,11 @@ from itertools import combinations
 
 import numpy as np
 
+from adaptive_flot.charts.plotdata import Role
 from adaptive_flot.contracts.batch import INSEPARABLE
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
-from adaptive_flot.report.kit.page import number
-from adaptive_flot.report.kit.plotdata import Role
+from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.series import CaseRuns, residuals
 from adaptive_flot.report.run.tables import SIGNIFICANT, coverage, median, quantities, relative_error
 from adaptive_flot.runner.commands.run_result import Run

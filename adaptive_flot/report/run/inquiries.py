@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from adaptive_flot.charts.plotdata import Chart, Mark, Panel, Trace
+from adaptive_flot.charts.units import amount
 from adaptive_flot.greybox.model import FloatArray, Quantity
-from adaptive_flot.report.kit import figures, style
-from adaptive_flot.report.kit.page import Album, Picture, Table, number
-from adaptive_flot.report.kit.plotdata import Panel, Trace
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.figures import p_text
+from adaptive_flot.report.kit.parts import Picture, Table
+from adaptive_flot.report.kit.wording import joined, number, spaced
 from adaptive_flot.report.run.closed_loop import colours
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
@@ -36,9 +39,9 @@ def watch_section(case: CaseRuns, which: str, album: Album) -> Watch | None:
     caption = (
         f"{case.scenario.name}: error of the predicted {case.outputs[0].name.replace('_', ' ')}, root mean square over "
         f"{SMOOTHED_S:g} s (top: one sample ahead; below: predicted minus true at the end of each move that the "
-        "controller decided). Lines: alarm (dotted), start of the search (dashed), model extended (solid). " + which
+        "controller decided). Dotted lines: alarm, start of the search, and where the model was extended. " + which
     )
-    picture = album.add(_figure(case), caption, "Prediction errors over time, before and after the model was extended")
+    picture = album.chart(_chart(case), caption, "Prediction errors over time, before and after the model was extended")
     return Watch(_sentences(case), _prediction_table(case), picture)
 
 
@@ -55,11 +58,11 @@ def _sentences(case: CaseRuns) -> list[str]:
 
 def _sentence(case: CaseRuns, i: Inquiry) -> str:
     units = {q.name: q.unit for q in case.scenario.model.outputs}
-    tests = ", ".join(f"{name.replace('_', ' ')} (p {figures.p_text(p)})" for name, p in i.p_values.items())
+    tests = ", ".join(f"{name.replace('_', ' ')} (p {p_text(p)})" for name, p in i.p_values.items())
     began, ended = (number(t, "g") for t in i.record_s)
     changes = [
         f"the one-step error of {name.replace('_', ' ')}, noise included, goes from "
-        f"{style.amount(before, units[name])} to {style.amount(after, units[name])}"
+        f"{amount(before, units[name])} to {amount(after, units[name])}"
         for name, (before, after) in i.errors.items()
     ]
     held_out = f"the held-out rows from {ended} to {number(i.judged_s, 'g')} s"
@@ -115,20 +118,46 @@ def _offsets(case: CaseRuns, who: str, label: str) -> FloatArray:
     return ratios[np.isfinite(ratios)] if np.isfinite(ratios).any() else np.full(1, np.nan)
 
 
-def _figure(case: CaseRuns) -> Figure:
-    output = case.outputs[0]
-    panels = [_step_panel(case, output)]
+def _chart(case: CaseRuns) -> Chart:
+    panels = [_step_panel(case, case.outputs[0])]
     if any(not run.plans.empty for run in case.first.values()):
         panels.append(_move_panel(case))
-    figure = figures.time_figure(panels)
+    marks = []
     for run in case.first.values():
         for i in run.inquiries or ():
-            for ax in figure.axes:
-                for time, dashes in ((i.alarm_s, ":"), (i.record_s[1], "--")):
-                    ax.axvline(time, color=style.LIMIT, ls=dashes, lw=1.0, zorder=1)
-                if i.extended:
-                    ax.axvline(i.judged_s, color=style.LIMIT, lw=1.2, zorder=1)
-    return figure
+            marks += [Mark(i.alarm_s, "alarm"), Mark(i.record_s[1], "search")]
+            marks += [Mark(i.judged_s, "extended")] if i.extended else []
+    return Chart(tuple(panels), marks=tuple(marks))
+
+
+def told_at_the_top(cases: Sequence[CaseRuns]) -> list[str]:
+    """What a search in the loop found, in a sentence each: for the first lines of page and console."""
+    said = []
+    for case in cases:
+        units = {q.name: q.unit for q in case.scenario.model.outputs}
+        for run in case.runs:
+            for i in run.inquiries or ():
+                kept = "the model in use was extended" if i.extended else f"the model in use was kept ({i.why})"
+                errors = "; ".join(
+                    f"one-step error of {spaced(name)}: {amount(before, units[name])} before, "
+                    f"{amount(after, units[name])} after"
+                    for name, (before, after) in i.errors.items()
+                )
+                said.append(
+                    f"{run.estimator}, seed {run.seed}: at {number(i.judged_s, 'g')} s the search {_found(i)}; {kept}"
+                    + (f"; {errors}." if errors else ".")
+                )
+    return said
+
+
+def _found(i: Inquiry) -> str:
+    """What a search found, without sizes."""
+    if i.verdict is None:
+        return "failed"
+    effects = [f"{spaced(e.effect.site)} depends on {spaced(e.effect.driver)}" for e in i.verdict.effects]
+    if effects:
+        return f"found that {joined(effects)}, which the model lacks ({i.verdict.word})"
+    return f"named nothing (verdict {i.verdict.word})"
 
 
 def _step_panel(case: CaseRuns, output: Quantity) -> Panel:

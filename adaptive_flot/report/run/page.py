@@ -3,53 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from adaptive_flot.files import write_text
-from adaptive_flot.report.compare import page as compare
-from adaptive_flot.report.kit import distributions, figures
-from adaptive_flot.report.kit.page import Album, Page, Picture, Table, made_by, render, seed_list
-from adaptive_flot.report.kit.plotdata import Panel
-from adaptive_flot.report.run import series, tables
-from adaptive_flot.report.run.closed_loop_figures import Sections, closed_loop_sections
-from adaptive_flot.report.run.cramer_rao_limit import LimitPart, limit_part
-from adaptive_flot.report.run.fault_table import fault_table
-from adaptive_flot.report.run.findings import below_published, candidates, findings
-from adaptive_flot.report.run.inquiries import Watch, watch_section
+from adaptive_flot.report.compare import answer as compared
+from adaptive_flot.report.compare.page import comparison_parts
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.page import Page, made_by, render
+from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Section, Text, present
+from adaptive_flot.report.kit.wording import seed_list
+from adaptive_flot.report.run import answer, series
+from adaptive_flot.report.run.chapter import Topic, spread_picture, title, topics
+from adaptive_flot.report.run.closed_loop_figures import contenders_picture
+from adaptive_flot.report.run.findings import below_published, candidates
+from adaptive_flot.report.run.inquiries import told_at_the_top
+from adaptive_flot.report.run.pictures import parameter_picture
 from adaptive_flot.report.run.series import CaseRuns
-from adaptive_flot.report.run.unsolved import unsolved_table
-from adaptive_flot.runner.commands.comparison import compare_runs
+from adaptive_flot.runner.commands.comparison import Comparison, compare_runs
+from adaptive_flot.runner.commands.fingerprint import conditions
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
-
-@dataclass(frozen=True)
-class Chapter:
-    """One scenario (and controller) as the template shows it."""
-
-    anchor: str
-    title: str
-    description: str
-    source: str
-    fits: Table
-    findings: list[str]
-    spread: Picture | None
-    time_series: Sections
-    watch: Watch | None
-    parameters: Picture
-    parameter_table: Table
-    limit: LimitPart | None
-    outputs: Picture
-    residuals: list[Picture]
-    innovation_table: Table
-    initial: Table
-    statuses: Table
-    faults: Table | None
-    unsolved: Table | None
+Results = Sequence[tuple[Scenario, Sequence[Run]]]
 
 
-def write_run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], path: Path | str, command: str = "") -> None:
+def write_run_report(results: Results, path: Path | str, command: str = "") -> None:
     """Write the report of one or several scenarios as a single HTML file without external parts.
 
     Parameters
@@ -59,151 +37,107 @@ def write_run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], path: Pa
     path
         File to write, whole or not at all.
     command
-        Command line that made the runs, for the footer.
+        Command line that made the runs, for the foot.
     """
     write_text(Path(path), run_report(results, command))
 
 
-def run_report(results: Sequence[tuple[Scenario, Sequence[Run]]], command: str = "") -> str:
+def run_report(results: Results, command: str = "") -> str:
     """Return the page that `write_run_report` writes."""
-    cases = series.cases(results)
-    album = Album()
-    closed_loops = _closed_loops(results, album)  # first, as they come first on the page and so in number
-    overview = [_spread(case, album) for case in cases]
-    chapters = [
-        _chapter(case, f"case-{i}", album, spread)
-        for i, (case, spread) in enumerate(zip(cases, overview, strict=True), 1)
-    ]
+    cases, album = series.cases(results), Album()
+    loops = [(compare_runs(s, runs), [c for c in cases if c.scenario is s]) for s, runs in results if _earned(runs)]
+    opened = [c for c in cases if not c.closed_loop]
+    discovered = told_at_the_top(cases)
     names = list(dict.fromkeys(c.scenario.name for c in cases))
     page = Page(
-        title=f"Run report: {', '.join(names)}",
-        lead=_lead(cases),
-        contents=[
-            *((c.anchor, f"Closed loop: {c.title}") for c in closed_loops),
-            ("fits", "Fits"),
-            *((c.anchor, c.title) for c in chapters),
-        ],
-        made=made_by(command, _made(cases)),
+        kind="Run report",
+        title=compared.title(loops[0][0]) if loops else answer.title(opened),
+        lead=_lead(cases, names),
+        answer=[*discovered, *(s for c, _ in loops for s in compared.sentences(c)), *answer.sentences(opened)],
+        facts=_facts(loops[0][0], discovered) if loops else answer.facts(opened),
+        first=_first(loops, opened, album),
+        sections=[*_compared(loops, album), *_sections(cases, album)],
+        made=made_by(command, _made(cases), dict.fromkeys(c.scenario.path for c in cases)),
     )
-    return render(
-        "run.html",
-        page,
-        closed_loops=closed_loops,
-        chapters=chapters,
-        candidates=candidates(cases),
-        below=[c.title for c, case in zip(chapters, cases, strict=True) if below_published(case)],
-    )
+    return render(page, album)
 
 
-def _lead(cases: Sequence[CaseRuns]) -> str:
+def _earned(runs: Sequence[Run]) -> bool:
+    return any(run.account for run in runs)
+
+
+def _lead(cases: Sequence[CaseRuns], names: Sequence[str]) -> str:
     estimators = list(dict.fromkeys(who for case in cases for who in case.roles))
     runs = sum(len(case.runs) for case in cases)
-    return f"{runs} simulated {'run' if runs == 1 else 'runs'} with the estimators {', '.join(estimators)}."
+    what = f"{runs} simulated {'run' if runs == 1 else 'runs'}"
+    descriptions = dict.fromkeys(f"{case.scenario.file.description}." for case in cases)
+    return f"{', '.join(names)}: {what} with {', '.join(estimators)}. {' '.join(descriptions)}"
+
+
+def _facts(comparison: Comparison, discovered: Sequence[str]) -> list[Fact]:
+    found = Fact("Discovery in the loop", str(len(discovered)), "see the first lines", "bad") if discovered else None
+    return [*compared.facts(comparison), *filter(None, [found])]
+
+
+def _first(loops: Sequence[tuple[Comparison, list[CaseRuns]]], opened: Sequence[CaseRuns], album: Album) -> list[Part]:
+    """What shows the answer: a matrix and a picture for each closed loop and each case in open loop."""
+    parts: list[Part] = []
+    for comparison, cases in loops:
+        parts += present(compared.matrix(comparison), contenders_picture(cases, album))
+    for case in opened:
+        heading = [Heading(title(case))] if len(opened) > 1 else []
+        parts += [*heading, answer.fit_matrix(case), parameter_picture(case, album)]
+    return parts
+
+
+def _compared(loops: Sequence[tuple[Comparison, list[CaseRuns]]], album: Album) -> list[Section]:
+    several = len(loops) > 1
+    return [
+        Section(
+            f"closed-loop-{i}",
+            "Money, limit and statuses" + (f": {comparison.scenario}" if several else ""),
+            "tables, distributions, paired differences",
+            comparison_parts(comparison, album),
+        )
+        for i, (comparison, _) in enumerate(loops, 1)
+    ]
+
+
+def _sections(cases: Sequence[CaseRuns], album: Album) -> list[Section]:
+    """The topics of each case: a chapter each where there is one case, else one chapter a case."""
+    sections = []
+    for i, case in enumerate(cases, 1):
+        found = [_fits(case, album), *topics(case, album)]
+        if len(cases) == 1:
+            sections += [Section(f"part-{k}", t.title, t.inside, t.parts) for k, t in enumerate(found, 1)]
+            continue
+        parts = [part for t in found for part in (Heading(t.title), *t.parts)]
+        sections.append(Section(f"case-{i}", title(case), ", ".join(case.roles), parts))
+    return sections
+
+
+def _fits(case: CaseRuns, album: Album) -> Topic:
+    """Fits beside the published ones, and what the runs themselves say."""
+    parts = present(answer.fits_of(case), Bullets(answer.findings_of(case)), spread_picture(case, album))
+    published = case.scenario.file.published
+    if published is not None:
+        parts.append(Text(f"Published values: {published.source}."))
+    causes = candidates([case])
+    if below_published(case) and causes:
+        parts.append(Heading("Why fits may stay below the published ones"))
+        parts.append(
+            Text(
+                "The following are candidates: scenario and model say that they are there. These runs do not say how "
+                "much each of them costs."
+            )
+        )
+        parts.append(Bullets(causes))
+    return Topic("Fits", "over the seeds, beside published ones" if published else "over the seeds", parts)
 
 
 def _made(cases: Sequence[CaseRuns]) -> list[tuple[str, str]]:
-    seeds = {case.scenario.path.name: seed_list(case.seeds) for case in cases}
-    return [(f"Seeds of {name}", text) for name, text in seeds.items()]
-
-
-def _closed_loops(results: Sequence[tuple[Scenario, Sequence[Run]]], album: Album) -> list[compare.Chapter]:
-    """Controllers and estimators side by side for each scenario with economics."""
-    chapters = []
-    for i, (scenario, runs) in enumerate(results, 1):
-        if any(run.account for run in runs):
-            chapters.append(compare.compare_chapter(compare_runs(scenario, runs), f"closed-loop-{i}", album))
-    return chapters
-
-
-def _chapter(case: CaseRuns, anchor: str, album: Album, spread: Picture | None) -> Chapter:
-    published = case.scenario.file.published
-    title = f"{case.scenario.name}, controller {case.controller}" if case.several_controllers else case.scenario.name
-    time_series = (
-        closed_loop_sections(case, _first(case), album)
-        if case.closed_loop
-        else [("Inputs", [_add(album, *_inputs(case))])]
-    )
-    watch = watch_section(case, _first(case), album)
-    parameters, outputs = (_add(album, *made) for made in (_parameters(case), _outputs(case)))
-    return Chapter(
-        anchor=anchor,
-        title=title,
-        description=case.scenario.file.description,
-        source=published.source if published else "",
-        fits=tables.fits_table(case),
-        findings=findings(case),
-        time_series=time_series,
-        watch=watch,
-        parameters=parameters,
-        parameter_table=tables.parameter_table(case),
-        limit=limit_part(case, album),
-        outputs=outputs,
-        residuals=_residuals(case, album),
-        spread=spread,
-        innovation_table=tables.innovation_table(case),
-        initial=tables.initial_table(case),
-        statuses=tables.status_table(case),
-        faults=fault_table(case),
-        unsolved=unsolved_table(case.runs),
-    )
-
-
-_Made = tuple[list[Panel], str, str]
-
-
-def _add(album: Album, panels: list[Panel], caption: str, alt: str) -> Picture:
-    return album.add(figures.time_figure(panels), caption, alt)
-
-
-def _first(case: CaseRuns) -> str:
-    """Say which seed a time series shows; with one seed there is nothing to tell apart."""
-    return f"Seed {case.seeds[0]}, the first of {len(case.seeds)}." if len(case.seeds) > 1 else f"Seed {case.seeds[0]}."
-
-
-def _inputs(case: CaseRuns) -> _Made:
-    panels, still = series.input_panels(case)
-    constant = f" Constant: {', '.join(still)}." if still else ""
-    names = ", ".join(p.label for p in panels)
-    return panels, f"{case.scenario.name}: inputs. {_first(case)}{constant}", f"Inputs over time: {names}"
-
-
-def _parameters(case: CaseRuns) -> _Made:
-    names = ", ".join(case.labels)
-    caption = f"{case.scenario.name}: adapted parameters {names}, with the ±2σ the estimator claims. {_first(case)}"
-    return series.parameter_panels(case), caption, f"Truth and estimates over time of {names}"
-
-
-def _outputs(case: CaseRuns) -> _Made:
-    names = ", ".join(q.name.replace("_", " ") for q in case.outputs)
-    caption = (
-        f"{case.scenario.name}: {names}, true and predicted before each sample is used; below, the error on its own "
-        f"scale (constant parameters leave the panel where they are worse). {_first(case)}"
-    )
-    return series.output_panels(case), caption, f"True and predicted {names} over time, and the errors"
-
-
-def _residuals(case: CaseRuns, album: Album) -> list[Picture]:
-    pictures = []
-    for q in case.outputs:
-        rows = [series.residuals(case, run, q) for run in case.first.values()]
-        name = q.name.replace("_", " ")
-        caption = (
-            f"{case.scenario.name}: innovations of {name} over the standard deviation the estimator expects (dashed: "
-            "±2), their autocorrelation with the 95 % band of white noise, and their histogram with the standard "
-            f"normal density. {_first(case)}"
-        )
-        pictures.append(album.add(figures.residual_figure(rows), caption, f"Innovations of {name}"))
-    return pictures
-
-
-def _spread(case: CaseRuns, album: Album) -> Picture | None:
-    spreads = series.spreads(case)
-    if not spreads:
-        return None
-    caption = (
-        f"{case.scenario.name}: fits over {tables.seeds_text(case)}, one point a seed; box from quartile to quartile "
-        "with the median, whiskers to the extremes, diamond at the published value."
-    )
-    return album.add(
-        distributions.spread_figure(spreads, case.roles), caption, "Distribution of the fits over the seeds"
-    )
+    lines = []
+    for case in {c.scenario.name: c for c in cases}.values():
+        lines.append((f"Seeds of {case.scenario.path.name}", seed_list(case.seeds)))
+        lines.append((f"Conditions of {case.scenario.name}", conditions(case.scenario)))
+    return lines

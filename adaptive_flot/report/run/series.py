@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
+from adaptive_flot.charts.palette import contender_slots
+from adaptive_flot.charts.plotdata import Panel, Role, Trace
+from adaptive_flot.charts.units import amount
 from adaptive_flot.greybox.model import FloatArray, Quantity
-from adaptive_flot.report.kit.plotdata import Panel, Residuals, Role, Spread, Trace
-from adaptive_flot.report.kit.style import amount
+from adaptive_flot.report.kit.plotdata import Residuals, Spread
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.whiteness import ljung_box_p
 from adaptive_flot.runner.scenario.scenario import Scenario
@@ -27,6 +29,8 @@ class CaseRuns:
     scenario: Scenario
     controller: str
     runs: tuple[Run, ...]
+    slots: Mapping[tuple[str, str], int]
+    """Colour of each (controller, estimator) of the page."""
 
     @cached_property
     def seeds(self) -> tuple[int, ...]:
@@ -57,7 +61,7 @@ class CaseRuns:
         for name, run in self.first.items():
             moves = any(changes(run.table[f"{x}_estimate"].to_numpy()) for x in self.labels)
             role = Role.ESTIMATE if moves else Role.CONSTANT
-            role_of[name] = (role, sum(r is role for r, _ in role_of.values()))
+            role_of[name] = (role, self.slots[self.controller, name])
         return role_of
 
     @property
@@ -90,8 +94,9 @@ class CaseRuns:
 
 def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[CaseRuns]:
     """Split results into one case for each scenario and controller, in the order run."""
+    slots = contender_slots((r.controller, r.estimator) for _, runs in results for r in runs)
     return [
-        CaseRuns(scenario, controller, tuple(r for r in runs if r.controller == controller))
+        CaseRuns(scenario, controller, tuple(r for r in runs if r.controller == controller), slots)
         for scenario, runs in results
         for controller in dict.fromkeys(r.controller for r in runs)
     ]

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from adaptive_flot.report.kit.page import Table, number
+from adaptive_flot.report.kit.parts import Table
+from adaptive_flot.report.kit.wording import number
 from adaptive_flot.runner.commands.run_result import Run
 
 MOST_ROWS = 10

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from adaptive_flot import provenance
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.runner.commands.fingerprint import conditions
@@ -44,10 +45,29 @@ def plain(value: Any) -> Any:
 
 def run_summary(scenario: Scenario, runs: Sequence[Run]) -> dict[str, Any]:
     """JSON summary of a scenario; with economics also what `compare` must know to compare like with like."""
-    head: dict[str, Any] = {"scenario": scenario.name}
+    head: dict[str, Any] = {"scenario": scenario.name, "code": provenance.code()}
     if scenario.limits is not None and scenario.prices is not None:
         head |= {"conditions": conditions(scenario), "grade_limit": scenario.limits.outputs["concentrate_grade"][0]}
-    return {**head, "runs": [run.summary() for run in runs]}
+    return {**head, "runs": [{**run.summary(), "options": _options(scenario, run)} for run in runs]}
+
+
+def _options(scenario: Scenario, run: Run) -> dict[str, dict[str, str]]:
+    """Options of estimator and controller of a run that are not at their default, as text."""
+    plugins = {
+        "estimator": scenario.file.estimators.get(run.estimator),
+        "controller": scenario.file.controllers.get(run.controller),
+    }
+    return {
+        who: {key: str(value) for key, value in plugin.options.items()}
+        for who, plugin in plugins.items()
+        if plugin is not None and plugin.options
+    }
+
+
+def time_series_file(folder: Path, estimator: str, controller: str, seed: int) -> Path | None:
+    """The time series that `write_runs` wrote of a run; None where there is none."""
+    stem = _stem_of(estimator, controller, seed)
+    return next((p for suffix in (".csv", ".parquet") if (p := folder / f"{stem}{suffix}").is_file()), None)
 
 
 def write_runs(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[Path]:
@@ -72,4 +92,8 @@ def run_files(runs: Sequence[Run], folder: Path, suffix: str = ".csv") -> list[P
 
 
 def _stem(run: Run) -> str:
-    return f"{run.estimator}_{run.controller}_seed{run.seed}".replace(":", "-").replace("/", "-")
+    return _stem_of(run.estimator, run.controller, run.seed)
+
+
+def _stem_of(estimator: str, controller: str, seed: int) -> str:
+    return f"{estimator}_{controller}_seed{seed}".replace(":", "-").replace("/", "-")

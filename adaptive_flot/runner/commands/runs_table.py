@@ -16,7 +16,7 @@ from adaptive_flot.errors import ResultError
 KEYS = ("scenario", "controller", "estimator", "seed")
 """Columns that name a run; every table of runs has them."""
 SUMMARY = "summary.json"
-WORDS = ("run", "outcome", "message", "conditions")
+WORDS = ("run", "outcome", "message", "conditions", "code", "options")
 """Further columns of words; all others are numbers."""
 TIMINGS = "timings"
 """End of the names of the files in which a study keeps times."""
@@ -34,20 +34,23 @@ def run_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     -------
     list of dict
         For each run `scenario`, `controller`, `estimator`, `seed`, `seconds`, `fit_<quantity>` [%] and
-        `status_<name>` (samples by status of the estimator); where the scenario has economics also `conditions`,
-        `grade_limit`, the entries of `account`, `solves`, `solve_median_s`, `solve_p99_s`, `control_<status>`
-        (decisions by status), `decided_<who>` (intervals by who decided) and `fault_<name>` (intervals it changed).
+        `status_<name>` (samples by status of the estimator), `code` and `options` that made it; where the scenario
+        has economics also `conditions`, `grade_limit`, the entries of `account`, `solves`, `solve_median_s`,
+        `solve_p99_s`, `control_<status>` (decisions by status), `decided_<who>` (intervals by who decided) and
+        `fault_<name>` (intervals it changed).
 
     Raises
     ------
     ResultError
         The summary lacks a key.
     """
-    head = {key: summary[key] for key in ("conditions", "grade_limit") if key in summary}
+    head = {key: summary[key] for key in ("conditions", "grade_limit", "code") if key in summary}
     rows = []
     for run in summary["runs"]:
         row: dict[str, Any] = {"scenario": summary["scenario"], **{key: run[key] for key in KEYS[1:]}, **head}
         row["seconds"] = run.get("seconds")
+        if "options" in run:
+            row["options"] = _text(run["options"])
         control = run.get("control", {})
         row |= {f"fit_{key}": value for key, value in run.get("fit", {}).items()} | run.get("account", {})
         row |= {key: control[key] for key in ("solves", "solve_median_s", "solve_p99_s") if key in control}
@@ -60,6 +63,12 @@ def run_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
             row |= {f"{prefix}_{key}": count for key, count in counts.items()}
         rows.append(row)
     return rows
+
+
+def _text(options: Mapping[str, Mapping[str, str]]) -> str:
+    """Options of a run in words: "controller: horizon 3; estimator: forgetting 0.995"."""
+    parts = (f"{who}: {', '.join(f'{k} {v}' for k, v in given.items())}" for who, given in sorted(options.items()))
+    return "; ".join(parts)
 
 
 def read_runs(results: Sequence[Path]) -> pd.DataFrame:

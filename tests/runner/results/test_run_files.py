@@ -134,9 +134,10 @@ def test_runs_are_written_by_estimator_controller_and_seed(runs: list[Run], tmp_
 
 def test_summary_has_exactly_the_agreed_keys(scenario: Scenario, runs: list[Run]) -> None:
     summary = plain(run_summary(scenario, runs))
-    assert list(summary) == ["scenario", "runs"] and summary["scenario"] == "short" and len(summary["runs"]) == 4
+    assert list(summary) == ["scenario", "code", "runs"] and summary["scenario"] == "short"
+    assert len(summary["runs"]) == 4
     for entry in summary["runs"]:
-        assert list(entry) == ["estimator", "controller", "seed", "fit", "status_counts", "seconds"]
+        assert list(entry) == ["estimator", "controller", "seed", "fit", "status_counts", "seconds", "options"]
         assert list(entry["fit"]) == ["n", "C", "concentrate_grade"]
     json.dumps(summary, allow_nan=False)
 

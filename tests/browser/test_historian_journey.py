@@ -1,4 +1,4 @@
-"""A journey: a historian's export of a heated tank, imported, and asked what the model lacks."""
+"""A journey: a historian's export of a heated tank, imported, asked what the model lacks, and the pages read."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tests.browser.conftest import Check
 from tests.cli.conftest import Call
 from tests.discovery.heated import DT, tank_record
 
@@ -34,7 +35,7 @@ def historian_export(folder: Path) -> Path:
     return file
 
 
-def test_from_a_historian_to_the_physics_that_the_model_lacks(call: Call, tmp_path: Path) -> None:
+def test_from_a_historian_to_the_physics_that_the_model_lacks(call: Call, tmp_path: Path, right: Check) -> None:
     """The loss by the fan is named; the hole splits the record, and the page says which part was used."""
     file = historian_export(tmp_path)
     (tmp_path / "my_tank.py").write_text(MODEL)
@@ -48,9 +49,12 @@ def test_from_a_historian_to_the_physics_that_the_model_lacks(call: Call, tmp_pa
     record = tank_record(rows=450)
     assert np.allclose(table["power_W"][:300], record.inputs[:300, 0], rtol=1e-8)
 
-    found = call("discover", "tank.parquet", *model, "--processes", 1, "--out", "found", "--no-report")
+    found = call("discover", "tank.parquet", *model, "--processes", 1, "--out", "found")
     assert found.code == 0, found.err
     verdict = json.loads((tmp_path / "found" / "verdict.json").read_text())
     assert verdict["verdict"] == "named"
     assert [(e["site"], e["driver"]) for e in verdict["effects"]] == [("heat_loss", "fan_speed")]
     assert any("stretch 1 is used, the longest" in note for note in verdict["notes"])
+    title = "<h1>Heat loss depends on fan speed, which the model lacks</h1>"
+    assert title in (tmp_path / "found" / "report.html").read_text()
+    right(tmp_path / "tank.quality.html", tmp_path / "found" / "report.html")
