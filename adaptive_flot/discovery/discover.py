@@ -23,10 +23,12 @@ from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
 from adaptive_flot.discovery.search.search import search
-from adaptive_flot.discovery.test_design.experiment import leading, plan_experiment
+from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
+from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
 from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import conclude, insufficient, report_errors
-from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN, held_up, judge, undecided_rivals
+from adaptive_flot.discovery.verdict.judge import held_up, judge, least_separation, undecided_rivals
+from adaptive_flot.discovery.verdict.outputs import certain_words
 from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,
@@ -206,7 +208,8 @@ def heed_report(state: State) -> State:
         )
     if against:
         judgement = replace(judgement, word="abstain", members=())
-    return replace(state, error=error, judgement=judgement, contradiction=against)
+    certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
+    return replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
 
 
 def plan_test(state: State) -> State:
@@ -219,7 +222,15 @@ def plan_test(state: State) -> State:
         replace(a, fit=Fitter(problem).with_intervals(a.fit))
         for a in leading(judgement.best, result.alternatives, judgement.margin)
     ]
-    experiment = plan_experiment(problem, compared, LEAST_MARGIN, state.limits, state.processes)
+    if len(compared) < 2:
+        return state
+    held = held_inputs(state.model, problem.record, tuple(state.limits or ()))
+    needed = least_separation(result, problem, TEST_ROWS)
+    experiment = plan_experiment(problem, compared, needed, state.limits, state.processes, held)
+    if experiment is None:
+        said = "no test of the inputs is proposed: none may be moved, or none moves in this record"
+        said += f"; left alone: {held_words(held)}" if held else ""
+        state = replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
     return replace(state, experiment=experiment)
 
 

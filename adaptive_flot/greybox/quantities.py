@@ -36,6 +36,8 @@ class Quantity:
     usual
         Lowest and highest value of ordinary operation, in the unit: tells a wrong unit where the physical range can
         not. None where nobody knows.
+    movable
+        Whether a test may move it, as an input: False for one that is only measured, as the weather.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Quantity:
     upper: float = np.inf
     scale: float = 1.0
     usual: tuple[float, float] | None = None
+    movable: bool = True
 
     @property
     def column(self) -> str:

@@ -11,6 +11,9 @@ from adaptive_flot.greybox.model import FloatArray
 
 WATCHING = "no move"
 
+ENOUGH = 0.8
+"""Share of simulated tests that must tell the truth for a test to be worth its price."""
+
 Names = tuple[tuple[str, str], ...]
 
 
@@ -57,6 +60,10 @@ class Experiment:
         Every test, best first; "no move" is what watching alone would tell.
     needed
         Separation from which the verdict would tell two apart.
+    power
+        Share of simulated tests in which each compared alternative, if it is the truth, is told from all others.
+    held
+        Inputs that the test leaves alone, and why.
     """
 
     name: str
@@ -69,11 +76,13 @@ class Experiment:
     pairs: tuple[Pair, ...]
     tried: tuple[Tried, ...]
     needed: float
+    power: tuple[float, ...]
+    held: tuple[tuple[str, str], ...] = ()
 
     @property
     def tells(self) -> bool:
-        """Whether it separates every pair by more than the verdict needs."""
-        return self.pairs[0].separation >= self.needed
+        """Whether, whichever alternative is the truth, it is told in most simulated tests."""
+        return min(self.power) >= ENOUGH
 
     def moves(self) -> list[tuple[float, FloatArray]]:
         """(time since the start of the test [s], inputs (nu,) from then on) of each move."""
@@ -84,10 +93,13 @@ class Experiment:
         closest = self.pairs[0]
         said = "A test that would tell" if self.tells else "No test tried would tell them all apart; the best"
         said += f": {self.name}, {self.dt * len(self.inputs):g} s"
+        told = ", ".join(f"{_words(n)} in {100 * p:.0f} %" for n, p in zip(self.compared, self.power, strict=True))
+        alone = f" Left alone: {', '.join(f'{n} ({why})' for n, why in self.held)}." if self.held else ""
+        pair = f"{_words(closest.one)} and {_words(closest.other)}"
         return (
-            f"{said}. The closest two, {_words(closest.one)} and {_words(closest.other)}, would then differ by about "
-            f"{closest.separation:.0f} in their criterion; {self.needed:.0f} is the least that tells two apart, and "
-            f"watching without a move would give {self.watching:.0f}."
+            f"{said}. Simulated with each alternative as the truth, it tells the right one: {told}. The closest two, "
+            f"{pair}, would differ by about {closest.separation:.0f} in their criterion, where {self.needed:.0f} is "
+            f"needed. Watching without a move would give {self.watching:.0f}.{alone}"
         )
 
     @property
@@ -106,6 +118,8 @@ class Experiment:
             "test": self.name,
             "duration_s": self.dt * len(self.inputs),
             "tells_apart": self.tells,
+            "power": [{"true": pairs(n), "told": round(p, 3)} for n, p in zip(self.compared, self.power, strict=True)],
+            "left_alone": dict(self.held),
             "separation_needed": round(self.needed, 1),
             "moves": [{"time_s": t, **{n: float(v) for n, v in zip(names, u, strict=True)}} for t, u in self.moves()],
             "pairs": [

@@ -48,6 +48,8 @@ class State:
         Error of each output on the report rows, before and after.
     contradiction
         What these rows say against a name, in words; empty where they do not.
+    certain
+        What is certain although the record is not told, in words.
     experiment
         Input moves that would tell the leading alternatives apart.
     """
@@ -68,6 +70,7 @@ class State:
     after: Fit | None = None
     error: tuple[OutputChange, ...] = ()
     contradiction: str = ""
+    certain: str = ""
     experiment: Experiment | None = None
 
     @property

@@ -13,6 +13,7 @@ import numpy as np
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import SURE, Alternative, Experiment, Pair, Tried
+from adaptive_flot.discovery.test_design.power import power
 from adaptive_flot.discovery.test_design.separation import predictions, separation
 from adaptive_flot.discovery.test_design.signals import candidate_tests, input_range, watching
 
@@ -28,6 +29,7 @@ def plan_experiment(
     needed: float,
     limits: Mapping[str, tuple[float, float]] | None = None,
     processes: int = 1,
+    held: Mapping[str, str] | None = None,
 ) -> Experiment | None:
     """Choose among steps, square waves and binary sequences the test that separates the leading alternatives best.
 
@@ -50,6 +52,8 @@ def plan_experiment(
         Ranges of inputs by name, where they are not those of the record.
     processes
         Alternatives that are simulated at once.
+    held
+        Inputs that must not be moved, by name, and why.
 
     Returns
     -------
@@ -65,7 +69,9 @@ def plan_experiment(
     if len(compared) < 2:
         return None
     quantities = compared[0].fit.model.inputs
-    where = input_range(problem.record.inputs, quantities, limits)
+    where = input_range(problem.record.inputs, quantities, limits).without_moves(
+        [j for j, q in enumerate(quantities) if held and q.name in held]
+    )
     rows = min(TEST_ROWS, len(problem.record) - 1)
     tests = [*candidate_tests([q.name for q in quantities], where, rows), watching(problem.record.inputs[-1], rows)]
     if len(tests) == 1:
@@ -97,6 +103,8 @@ def plan_experiment(
         tuple(sorted(separations, key=lambda pair: pair.separation)),
         tuple(Tried(tests[k].name, float(closest[k])) for k in order),
         needed,
+        power([run[best] for run in runs], needed),
+        tuple((held or {}).items()),
     )
 
 

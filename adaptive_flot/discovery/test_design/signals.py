@@ -42,6 +42,12 @@ class Range:
     rest: FloatArray
     high: FloatArray
 
+    def without_moves(self, held: Sequence[int]) -> Range:
+        """The same, with some inputs kept at rest."""
+        low, high = self.low.copy(), self.high.copy()
+        low[list(held)] = high[list(held)] = self.rest[list(held)]
+        return Range(low, self.rest, high)
+
 
 def input_range(
     inputs: FloatArray, quantities: Sequence[Quantity], limits: Mapping[str, tuple[float, float]] | None = None

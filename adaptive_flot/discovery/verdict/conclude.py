@@ -42,7 +42,9 @@ def conclude(state: State) -> Verdict:
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
     return Verdict(
         word=judgement.word,
-        reason=reason_words(judgement, result, effects, drift, state.contradiction),
+        reason=" ".join(
+            filter(None, (reason_words(judgement, result, effects, drift, state.contradiction), state.certain))
+        ),
         effects=effects,
         members=judgement.members,
         error=state.error,

@@ -86,6 +86,16 @@ def undecided_rivals(result: SearchResult) -> tuple[Alternative, ...]:
     return near if any(not a.near(best, LEAST_MARGIN * result.rows_per_effective_sample) for a in near) else ()
 
 
+def least_separation(result: SearchResult, problem: Problem, rows: int) -> float:
+    """Difference in the criterion that tells two alternatives apart in a test of so many rows.
+
+    The margin of this record (see `judge`); what the best alternative leaves unexplained is there in a test as well, in
+    proportion to its length.
+    """
+    unexplained = (result.left - result.left_threshold) * rows / max(int(problem.rows("estimate").sum()), 1)
+    return max(LEAST_MARGIN * result.rows_per_effective_sample, unexplained)
+
+
 def _margin(result: SearchResult) -> float:
     return max(LEAST_MARGIN * result.rows_per_effective_sample, result.left - result.left_threshold)
 

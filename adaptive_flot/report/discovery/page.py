@@ -11,6 +11,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.discovery.verdict.report_veto import AT_NOISE
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
 from adaptive_flot.report.discovery.answer import WORDS, error_facts
@@ -24,7 +25,7 @@ from adaptive_flot.report.kit.residuals import residual_pictures
 from adaptive_flot.report.kit.wording import capital, joined, spaced
 
 MOST_RESIDUALS = 3
-"""Outputs whose residuals are drawn: those whose error fell most, in units of their noise."""
+"""Outputs whose residuals are drawn: one that is still wrong, and those whose error fell most by their noise."""
 TITLES = {
     "none": "no effect is missing",
     "named": "a missing effect, by name",
@@ -204,11 +205,14 @@ def _all_outputs(problem: Problem, before: Fit, after: Fit, album: Album) -> Pic
 
 
 def _telling(discovery: Discovery, problem: Problem) -> list[int]:
-    """Places of the outputs whose error fell most, in units of their noise."""
+    """Places of the output that is furthest from its noise after, if any is, and of those whose error fell most."""
     fell = {c.output: (c.before - c.after) / max(c.noise, 1e-300) for c in discovery.verdict.error}
     names = [discovery.model.outputs[c].name for c in problem.columns]
     ranked = sorted(range(len(names)), key=lambda j: -fell.get(names[j], 0.0))
-    return ranked[:MOST_RESIDUALS]
+    left = {c.output: c.after / max(c.noise, 1e-300) for c in discovery.verdict.error}
+    worst = max(range(len(names)), key=lambda j: left.get(names[j], 0.0))
+    first = [worst] if left.get(names[worst], 0.0) > AT_NOISE else []
+    return [*first, *(j for j in ranked if j not in first)][:MOST_RESIDUALS]
 
 
 def _residuals(discovery: Discovery, problem: Problem, j: int, album: Album) -> list[Picture]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results import SURE, Alternative, Discovery
+from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.parts import Table
@@ -152,6 +153,18 @@ def absorbed_table(discovery: Discovery) -> Table:
     return Table(caption, ("Parameter", "Unit", "Without", "With", "Absorbed [%]"), tuple(rows), words=2)
 
 
+def least_difference(discovery: Discovery, a: Alternative) -> tuple[float, str]:
+    """Difference in the criterion that tells an alternative from the best one, and why it is as large as that."""
+    judged, search = discovery.judgement, discovery.search
+    assert judged is not None and search is not None  # an alternative was judged
+    chance = SURE * a.loglik_difference_sd
+    if chance >= judged.margin:
+        return chance, "twice the standard deviation of that difference"
+    if search.left - search.left_threshold >= judged.margin:
+        return judged.margin, "since the best one itself leaves so much unexplained"
+    return judged.margin, f"{LEAST_MARGIN:.0f} for each effective sample of {search.rows_per_effective_sample:.1f} rows"
+
+
 def not_told_apart(discovery: Discovery) -> list[str]:
     """Sentences on what this record leaves open."""
     judged = discovery.judgement
@@ -161,11 +174,10 @@ def not_told_apart(discovery: Discovery) -> list[str]:
     said = []
     for a in judged.rivals:
         if judged.near(a):
-            least = max(judged.margin, SURE * a.loglik_difference_sd)
+            least, why = least_difference(discovery, a)
             said.append(
                 f"{effect_text(a.names)} explains the record about as well as {effect_text(best.names)}: its criterion "
-                f"differs by {number(a.worse_than(best), '.1f')}, and {least:.0f} is the least that tells them "
-                "apart."
+                f"is worse by {number(a.worse_than(best), '.1f')}, and less than {least:.0f} tells nothing here, {why}."
             )
     if not said and discovery.verdict.experiment is not None:
         said = ["Nothing comes as near as that to the best alternative; the test below is for those next to it."]

@@ -29,6 +29,7 @@ def experiment_chapter(planned: Experiment, model: Model, columns: tuple[int, ..
         Text(f"{planned} It would go on where the record ends."),
         picture,
         _moves(planned),
+        _power(planned),
         _pairs(planned),
         _tried(planned),
     ]
@@ -49,6 +50,15 @@ def _moves(planned: Experiment) -> Table:
 
 def _named(planned: Experiment, powers: list[int]) -> list[tuple[tuple[str, str], int]]:
     return list(zip(planned.quantities, powers, strict=True))
+
+
+def _power(planned: Experiment) -> Table:
+    rows = tuple((effect_text(n), number(100 * p, ".0f")) for n, p in zip(planned.compared, planned.power, strict=True))
+    caption = (
+        "Power of this test: it was simulated with each alternative as the truth, with noise and uncertain parameters. "
+        "Share of these simulations that tell the truth from all others."
+    )
+    return Table(caption, ("If this is true", "told [%]"), rows)
 
 
 def _pairs(planned: Experiment) -> Table:

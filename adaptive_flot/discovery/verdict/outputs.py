@@ -1,0 +1,52 @@
+"""What is certain output by output: which of them an alternative brings down to their noise, and which stay wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.discovery.verdict.report_veto import AT_NOISE
+from adaptive_flot.greybox.model import FloatArray
+
+
+def settled(changes: Sequence[OutputChange], noise: FloatArray) -> tuple[tuple[str, ...], tuple[OutputChange, ...]]:
+    """Outputs that were wrong and are at their noise after, by name; and those that are still wrong.
+
+    Parameters
+    ----------
+    changes
+        Error of each output on the report rows, before and after.
+    noise
+        Noise of each from row to row (m,); where it is not known, that of the fit counts.
+    """
+    known = np.where(noise > 0, noise, [c.noise for c in changes])
+    wrong = [(c, c.before > AT_NOISE * s, c.after > AT_NOISE * s) for c, s in zip(changes, known, strict=True)]
+    return tuple(c.output for c, was, is_ in wrong if was and not is_), tuple(c for c, _, is_ in wrong if is_)
+
+
+def common(judgement: Judgement) -> tuple[tuple[str, str], ...]:
+    """Effects that the best alternative and every one near it have; none where it stands alone."""
+    near = [a for a in judgement.rivals if judgement.near(a)]
+    if judgement.best is None or not near:
+        return ()
+    return tuple(n for n in judgement.best.names if all(n in a.names for a in near))
+
+
+def certain_words(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """What is certain of a record that is not told: sentences, empty where nothing is."""
+    if judgement.best is None:
+        return ""
+    said = []
+    in_all = common(judgement)
+    if in_all:
+        said.append(f"In all that come near: {', '.join(f'{s} by {d}' for s, d in in_all)}.")
+    repaired, wrong = settled(changes, noise)
+    name = " with ".join(f"{s} by {d}" for s, d in judgement.best.names)
+    if repaired:
+        said.append(f"{name} brings {', '.join(repaired)} down to the noise.")
+    if repaired and wrong:
+        still = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in wrong)
+        said.append(f"Still wrong: {still}; look for a further cause there.")
+    return " ".join(said)

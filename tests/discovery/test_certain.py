@@ -1,0 +1,46 @@
+"""What is certain among the outputs is told where the record as a whole is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange
+from adaptive_flot.discovery.verdict.outputs import certain_words, settled
+
+NOISE = np.array([0.1, 0.1, 0.1])
+CHANGES = (
+    OutputChange("level", "m", 1.0, 0.11, 0.1, (0.8, 0.9)),
+    OutputChange("grade", "-", 1.0, 0.9, 0.1, (0.0, 0.2)),
+    OutputChange("flow", "m3/s", 0.1, 0.1, 0.1, (-0.1, 0.1)),
+)
+
+
+def _judged(draught: Discovery, *names: tuple[tuple[str, str], ...]) -> Judgement:
+    assert draught.search is not None
+    own = draught.search.alternatives[0]
+    found = [Alternative(n, (True,) * len(n), replace(own.fit, bic=float(k)), 0.0, -100.0) for k, n in enumerate(names)]
+    return Judgement("abstain", found[0], (), tuple(found[1:]), 10.0)
+
+
+def test_outputs_at_their_noise_are_told_apart_from_those_still_wrong() -> None:
+    repaired, wrong = settled(CHANGES, NOISE)
+    assert repaired == ("level",) and [c.output for c in wrong] == ["grade"]
+
+
+def test_noise_that_is_not_known_from_row_to_row_is_that_of_the_fit() -> None:
+    assert settled(CHANGES, np.array([0.0, 0.0, 0.0]))[0] == ("level",)
+
+
+def test_the_sentence_names_the_outputs_and_what_all_near_alternatives_share(draught: Discovery) -> None:
+    bubbles, lag, flow = ("bubble_size", "air_flow"), ("grade_sensor", "lag"), ("feed_flow", "time")
+    said = certain_words(_judged(draught, (bubbles, lag), (bubbles, flow)), CHANGES, NOISE)
+    assert said.startswith("In all that come near: bubble_size by air_flow. ")
+    assert "bubble_size by air_flow with grade_sensor by lag brings level down to the noise." in said
+    assert said.endswith("Still wrong: grade 1 -> 0.9; look for a further cause there.")
+
+
+def test_nothing_certain_is_no_sentence(draught: Discovery) -> None:
+    worse = tuple(replace(c, after=c.before) for c in CHANGES)
+    assert certain_words(_judged(draught, (("heat_loss", "time"),)), worse, NOISE) == ""
