@@ -5,26 +5,26 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Literal
 
-from rich.box import HORIZONTALS
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 from rich.text import Text
 
+from adaptive_flot.console_tables import print_table
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.kit.parts import Table as Content
 from adaptive_flot.report.kit.wording import number
+from adaptive_flot.report.run.inquiries import told_at_the_top
+from adaptive_flot.report.run.series import cases
 from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
 from adaptive_flot.runner.commands.estimate import RecordEstimate
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
-PIPE_WIDTH = 140
+PIPE_WIDTH = 80
 """Letters a line where standard output is no terminal."""
 
 
@@ -67,13 +67,13 @@ def print_verdict(verdict: Verdict) -> None:
     if verdict.error:
         where = verdict.split if " " in verdict.split else f"{verdict.split} split of the record"
         title = f"Free-run root mean square error, {where}"
-        table = Table(title=title, title_justify="left")
-        for heading in ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval"):
-            table.add_column(heading, justify="left" if heading in ("output", "unit") else "right")
+        rows = []
         for c in verdict.error:
             low, high = (number(100 * r, ".0f") for r in c.reduction95)
-            table.add_row(c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
-        console.print(table)
+            errors = (f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
+            rows.append((c.output, c.unit, *errors))
+        header = ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval")
+        print_table(console, Content("", header, tuple(rows), words=2), title)
     if verdict.experiment is not None:
         console.print(f"{verdict.experiment}", highlight=False)
     console.file.flush()
@@ -81,12 +81,8 @@ def print_verdict(verdict: Verdict) -> None:
 
 def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
     """Print the fits of each scenario and estimator, median [range] over the seeds, beside the published ones."""
-    table = Table(title="Fit in percent: median and range over the seeds, published value in brackets")
-    for heading in ("scenario", "estimator", "seeds"):
-        table.add_column(heading)
     keys = list(dict.fromkeys(key for _, runs in results for run in runs for key in run.fit))
-    for key in keys:
-        table.add_column(key, justify="right")
+    rows = []
     for scenario, runs in results:
         published = scenario.file.published.fits if scenario.file.published else {}
         several = len({run.controller for run in runs}) > 1
@@ -94,9 +90,10 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
             own = [run for run in runs if (run.estimator, run.controller) == (name, controller)]
             cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
             shown = f"{name} ({controller})" if several else name
-            table.add_row(scenario.name, shown, str(len(own)), *cells)
+            rows.append((scenario.name, shown, str(len(own)), *cells))
+    title = "Fit in percent: median and range over the seeds, published value in brackets"
     console = _console()
-    console.print(table)
+    print_table(console, Content("", ("scenario", "estimator", "seeds", *keys), tuple(rows), words=3), title)
     console.file.flush()  # a reader on a pipe sees the result before the report is drawn
 
 
@@ -111,17 +108,25 @@ def _fit_cell(values: Sequence[float], published: float | None) -> str:
 
 def print_estimate(result: RecordEstimate) -> None:
     """Print the errors of each estimator on the fit and the test block, and what the record identifies."""
-    table = Table(title=f"{result.blocks.name}: root mean square errors")
-    for heading in ("estimator", "block", "output", "one step", "free run", "unit", "Ljung-Box p"):
-        table.add_column(heading, justify="right" if heading in ("one step", "free run") else "left")
-    for replay in result.replays:
-        for e in replay.errors:
-            p = f"{e.ljung_box_p:.2g}"
-            table.add_row(replay.estimator, e.block, e.output, f"{e.one_step:.4g}", f"{e.free_run:.4g}", e.unit, p)
+    rows = [
+        (
+            replay.estimator,
+            e.block,
+            e.output,
+            e.unit,
+            f"{e.one_step:.4g}",
+            f"{e.free_run:.4g}",
+            f"{e.ljung_box_p:.2g}",
+        )
+        for replay in result.replays
+        for e in replay.errors
+    ]
+    header = ("estimator", "block", "output", "unit", "one step", "free run", "Ljung-Box p")
     console = _console()
     for note in result.blocks.fit.notes:
         console.print(f"- {note}", highlight=False)
-    console.print(table)
+    title = f"{result.blocks.name}: root mean square errors"
+    print_table(console, Content("", header, tuple(rows), words=4), title)
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
     console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
@@ -136,21 +141,15 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
     comparison = compare_runs(scenario, runs)
     makers = (compare_tables.outcome_table, compare_tables.status_table, compare_tables.time_table)
     found = [*(make(comparison) for make in makers), unsolved_table(runs)]
-    print_comparison([table for table in found if table is not None], findings(comparison))
+    told = told_at_the_top(cases([(scenario, runs)]))
+    print_comparison([table for table in found if table is not None], [*told, *findings(comparison)])
 
 
 def print_comparison(tables: Sequence[Content], sentences: Sequence[str]) -> None:
     """Print the tables of a comparison and what follows from them."""
     console = _console()
     for content in tables:
-        table = Table(caption=content.caption, caption_justify="left", show_lines=True, box=HORIZONTALS)
-        for j, heading in enumerate(content.header):
-            words = " ".join([heading, *(row[j] for row in content.rows)]).split()
-            side: Literal["left", "right"] = "left" if j < content.words else "right"
-            table.add_column(heading, justify=side, min_width=max(map(len, words)))  # never cut a number
-        for row in content.rows:
-            table.add_row(*row)
-        console.print(table)
+        print_table(console, content)
     for sentence in sentences:
         console.print(f"- {sentence}", highlight=False)
     console.file.flush()

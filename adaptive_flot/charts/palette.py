@@ -15,9 +15,11 @@ SLOTS: tuple[tuple[str, str], ...] = (
     ("#8c5a2b", "#cf9f70"),  # brown
     ("#4aa5d8", "#9fd8fa"),  # sky
     ("#7f7f7f", "#a3a3a3"),  # grey
+    ("#2b2b2b", "#e0e0e0"),  # nearly the ink
 )
 """(light, dark) of each slot, after Okabe and Ito (2008): told apart with every common colour vision."""
-GREY = 8
+GREY, INK = 8, 9
+"""Slots that nobody is given by chance: constant parameters, and the oracle."""
 NAMED = {
     "truth": ("#000000", "#f2f2f2"),
     "limit": ("#b2182b", "#ff6b75"),
@@ -37,7 +39,7 @@ STATES = 6
 
 _KNOWN = {"rpem": 0, "ekf": 1, "mhe": 2, "imm": 3, "pem": 4, "rpem_full": 7, "rpem_discovery": 5, "fixed": GREY}
 ORACLE = "oracle"
-"""Estimator that is shown the truth: black, as the truth is."""
+"""Estimator that is shown the truth: nearly black, as the truth is black."""
 _USUAL_CONTROLLERS = ("schedule", "economic_mpc")
 
 
@@ -54,7 +56,7 @@ def contender_slots(contenders: Iterable[tuple[str, str]]) -> dict[tuple[str, st
     slots: dict[tuple[str, str], int] = {}
     for who in sorted(listed, key=lambda c: (not _is_known(c), c)):
         if who[1] == ORACLE:
-            slots[who] = GREY
+            slots[who] = INK
             continue
         wanted = _KNOWN[who[1]] if _is_known(who) else crc32(", ".join(who).encode()) % GREY
         taken = {slot for other, slot in slots.items() if other[1] != ORACLE}
@@ -71,7 +73,7 @@ def _is_known(who: tuple[str, str]) -> bool:
 def colour(slot: int, dark: bool = False) -> str:
     """Colour of a slot; they repeat.
 
-    >>> colour(0) == colour(9)
+    >>> colour(0) == colour(10)
     True
     """
     return SLOTS[slot % len(SLOTS)][dark]

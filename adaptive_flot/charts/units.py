@@ -47,6 +47,21 @@ def amount(value: float, unit: str) -> str:
     return scaled if unit == "-" and not power else f"{scaled} {unit_text(unit, power)}"
 
 
+def with_std(value: float, std: float, unit: str) -> str:
+    """Value and standard deviation in one unit, with two digits of the standard deviation.
+
+    >>> with_std(5.974e-4, 4.54e-6, "m^n/s"), with_std(1.0308, 0.00137, "-")
+    ('(5.974 ± 0.045) × 10⁻⁴ mⁿ/s', '1.0308 ± 0.0014')
+    """
+    power = exponent(np.array([value]))
+    scaled, wide = (v * 10.0**-power for v in (value, std))
+    digits = max(0, 1 - int(np.floor(np.log10(wide)))) if np.isfinite(wide) and wide > 0 else 4
+    both = f"{scaled:.{digits}f} ± {wide:.{digits}f}"
+    if unit == "-" and not power:
+        return both
+    return f"({both}) × {unit_text(unit, power)}" if power else f"({both}) {unit_text(unit)}"
+
+
 def time_unit(span: float) -> tuple[str, float]:
     """Unit of a time axis and its seconds: days from three days on, hours from three hours on.
 

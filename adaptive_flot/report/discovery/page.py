@@ -241,5 +241,8 @@ def _map(discovery: Discovery, album: Album) -> Picture:
         + (" Frame: the best alternative after full fits." if names else "")
     )
     return album.add(
-        heat_map(discovery.search.rounds[0].scores, names), caption, "Map of what would explain the residual"
+        heat_map(discovery.search.rounds[0].scores, names),
+        caption,
+        "Map of what would explain the residual",
+        is_map=True,
     )

@@ -10,9 +10,8 @@ from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results import SURE, Alternative, Discovery
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.parts import Table
-from adaptive_flot.report.kit.wording import number, spaced
+from adaptive_flot.report.kit.wording import number, p_text, spaced
 
 MOST_ROWS = 10
 

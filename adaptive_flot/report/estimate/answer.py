@@ -6,34 +6,42 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adaptive_flot.charts.units import amount, exponent
+from adaptive_flot.charts.units import amount, exponent, with_std
 from adaptive_flot.greybox.model import Quantity
 from adaptive_flot.report.estimate import series
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.parts import Fact, Table
-from adaptive_flot.report.kit.wording import capital, joined, number, spaced
+from adaptive_flot.report.kit.wording import capital, joined, number, p_text, spaced
 from adaptive_flot.runner.commands.estimate import RecordEstimate
 from adaptive_flot.runner.results.replay_table import ReplayErrors
 
 MOST_FACTS = 5
+ABOUT = 0.5
+"""Points of fit within which estimators are said to predict about equally well."""
 NOT_WHITE = 0.05
 """p value below which innovations are called not white."""
 
 
 def title(result: RecordEstimate) -> str:
-    """Who has the smallest free-run error on the test block, for most outputs."""
-    winners = [_best(result, q)[0] for q in series.measured_outputs(result)]
+    """Who predicts the test block best, or who all do so about equally well."""
+    outputs = series.measured_outputs(result)
+    fits = {
+        r.estimator: [_fit(result, q, _error(result, r.estimator, q).free_run) for q in outputs] for r in result.replays
+    }
+    top = np.nanmax(np.array(list(fits.values())), axis=0)
+    near = [who for who, own in fits.items() if np.all(np.array(own) >= top - ABOUT)]
+    if len(near) > 1:
+        return f"{joined(near)} predict about equally well"
+    winners = [_best(result, q)[0] for q in outputs]
     best = max(dict.fromkeys(winners), key=winners.count)
-    outputs = [spaced(q.name) for q, w in zip(series.measured_outputs(result), winners, strict=True) if w == best]
-    of = "all outputs" if len(outputs) == len(winners) > 1 else joined(outputs)
-    return f"{best} predicts {of} best"
+    won = [spaced(q.name) for q, w in zip(outputs, winners, strict=True) if w == best]
+    return f"{best} predicts {'every output' if len(won) == len(outputs) > 1 else joined(won)} best"
 
 
 def sentences(result: RecordEstimate) -> list[str]:
     """Who predicts best and how well, and in which outputs something is left."""
     outputs = series.measured_outputs(result)
     reached = [f"{spaced(q.name)} {number(_fit(result, q, _best(result, q)[1].free_run), '.1f')} %" for q in outputs]
-    parameters = [f"{e.label} = {amount(e.value, e.unit)} ± {amount(e.std, e.unit)}" for e in result.batch.estimates]
+    parameters = [f"{e.label} = {with_std(e.value, e.std, e.unit)}" for e in result.batch.estimates]
     said = [
         f"On rows that fitted nothing, simulated from the inputs alone, the best model reaches a fit of "
         f"{joined(reached)}."

@@ -13,12 +13,11 @@ from adaptive_flot.files import write_text
 from adaptive_flot.greybox.model import Quantity
 from adaptive_flot.report.estimate import answer, series
 from adaptive_flot.report.kit.album import Album
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Bullets, Part, Picture, Section, Table, Text, present
 from adaptive_flot.report.kit.plotdata import Residuals
 from adaptive_flot.report.kit.residuals import residual_pictures
-from adaptive_flot.report.kit.wording import number, spaced
+from adaptive_flot.report.kit.wording import number, p_text, spaced
 from adaptive_flot.runner.commands.estimate import RecordEstimate
 from adaptive_flot.runner.commands.replay import Replay
 from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS

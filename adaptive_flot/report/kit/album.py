@@ -20,11 +20,11 @@ class Album:
     pictures: list[Picture] = field(default_factory=list)
     shown: list[Picture] = field(default_factory=list)
 
-    def add(self, figure: Figure, caption: str, alt: str) -> Picture:
+    def add(self, figure: Figure, caption: str, alt: str, is_map: bool = False) -> Picture:
         """Embed a figure."""
         from adaptive_flot.report.kit.style import data_uri
 
-        return self._kept(Picture(data_uri(figure), caption, alt))
+        return self._kept(Picture(data_uri(figure), caption, alt, is_map=is_map))
 
     def chart(self, chart: Chart, caption: str, alt: str) -> Picture:
         """Embed a chart, and a picture of it for readers without scripts."""

@@ -137,14 +137,3 @@ def legend_columns(labels: Sequence[str]) -> int:
     most = max(1, min(5, LEGEND_WIDTH // widest))
     rows = -(-len(labels) // most)
     return max(1, -(-len(labels) // max(1, rows)))
-
-
-def p_text(p: float) -> str:
-    """Return a p value as text: small ones as a bound, NaN as a dash.
-
-    >>> p_text(0.234), p_text(1e-9), p_text(float("nan"))
-    ('= 0.23', '< 0.001', '–')
-    """
-    if np.isnan(p):
-        return "–"
-    return "< 0.001" if p < 0.001 else f"= {p:.2g}"

@@ -53,7 +53,8 @@ class Table:
 class Picture:
     """A figure of the page: data URI, caption, what it shows for readers who do not see it, and the chart if it is one.
 
-    The data URI of a chart is for readers without scripts.
+    The data URI of a chart is for readers without scripts. The colours of a map mean something: on dark paper it stays
+    as it is, where other figures are inverted.
     """
 
     kind: ClassVar[str] = "picture"
@@ -61,6 +62,7 @@ class Picture:
     caption: str
     alt: str
     chart: Chart | None = None
+    is_map: bool = False
 
 
 @dataclass(frozen=True)

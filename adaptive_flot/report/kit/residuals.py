@@ -9,9 +9,9 @@ import numpy as np
 from adaptive_flot.charts.plotdata import Chart, Panel, Trace
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.kit.album import Album
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.parts import Picture
 from adaptive_flot.report.kit.plotdata import Residuals
+from adaptive_flot.report.kit.wording import p_text
 
 ACF_LAGS = 40
 """Lags of the autocorrelation shown."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 MINUS = "−"
@@ -56,3 +57,14 @@ def joined(words: Iterable[str]) -> str:
     """
     listed = list(words)
     return " and ".join(filter(None, (", ".join(listed[:-1]), *listed[-1:])))
+
+
+def p_text(p: float) -> str:
+    """Return a p value as text: small ones as a bound, NaN as a dash.
+
+    >>> p_text(0.234), p_text(1e-9), p_text(float("nan"))
+    ('= 0.23', '< 0.001', '–')
+    """
+    if math.isnan(p):
+        return "–"
+    return "< 0.001" if p < 0.001 else f"= {p:.2g}"

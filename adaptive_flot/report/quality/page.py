@@ -15,10 +15,9 @@ from adaptive_flot.records.importing import Imported
 from adaptive_flot.records.quality.quality import FEWEST_ROWS, Quality
 from adaptive_flot.records.quality.signals import SignalQuality
 from adaptive_flot.report.kit.album import Album
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Bullets, Code, Fact, Part, Picture, Section, Table, Text, present
-from adaptive_flot.report.kit.wording import joined, number, spaced
+from adaptive_flot.report.kit.wording import joined, number, p_text, spaced
 from adaptive_flot.report.quality import series
 
 

@@ -26,9 +26,11 @@ class Topic:
     parts: Sequence[Part]
 
 
-def title(case: CaseRuns) -> str:
+def title(case: CaseRuns, several_scenarios: bool = True) -> str:
     """Name of a case among others."""
     name = case.scenario.name
+    if not several_scenarios:
+        return f"Controller {case.controller}"
     return f"{name}, controller {case.controller}" if case.several_controllers else name
 
 

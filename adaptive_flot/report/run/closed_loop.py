@@ -112,25 +112,33 @@ def plan_panels(case: CaseRuns, run: Run) -> list[Panel]:
     """A few plans over the inputs and the grade that came; each shown plan starts where the one before ends."""
     limits = case.scenario.limits
     assert limits is not None
-    table = case.shown(run)
+    table, line = case.shown(run), colours(case)[run.estimator]
     shown = chosen_plans(run.plans[run.plans["planned_at_s"] >= table["time_s"].iloc[0]])
     panels = []
     for q in case.scenario.model.inputs:
         if q.column in run.plans:
             plans = _plan_traces(shown, q.column)
-            panels.append(_planned_panel(table, q, acted(table, q.column), plans, limits.inputs.get(q.name, ()), True))
+            panels.append(
+                _planned_panel(table, q, acted(table, q.column), plans, limits.inputs.get(q.name, ()), line, True)
+            )
     grade = next(q for q in case.scenario.model.outputs if q.name == "concentrate_grade")
     plans = _plan_traces(shown, grade.column, table.set_index("time_s")["concentrate_grade_true"])
     panels.append(
-        _planned_panel(table, grade, "concentrate_grade_true", plans, limits.outputs["concentrate_grade"][:1], False)
+        _planned_panel(table, grade, "concentrate_grade_true", plans, limits.outputs["concentrate_grade"][:1], line)
     )
     return panels
 
 
 def _planned_panel(
-    table: pd.DataFrame, q: Quantity, column: str, plans: list[Trace], limits: tuple[float, ...], held: bool
+    table: pd.DataFrame,
+    q: Quantity,
+    column: str,
+    plans: list[Trace],
+    limits: tuple[float, ...],
+    line: tuple[Role, int],
+    held: bool = False,
 ) -> Panel:
-    came = Trace("what happened", table["time_s"].to_numpy(), table[column].to_numpy(), Role.ESTIMATE, held=held)
+    came = Trace("what happened", table["time_s"].to_numpy(), table[column].to_numpy(), *line, held=held)
     return Panel(q.name.replace("_", " "), q.unit, (came, *plans), height=1.2, limits=limits)
 
 

@@ -11,9 +11,8 @@ from adaptive_flot.charts.plotdata import Chart, Mark, Panel, Trace
 from adaptive_flot.charts.units import amount
 from adaptive_flot.greybox.model import FloatArray, Quantity
 from adaptive_flot.report.kit.album import Album
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.parts import Picture, Table
-from adaptive_flot.report.kit.wording import joined, number, spaced
+from adaptive_flot.report.kit.wording import joined, number, p_text, spaced
 from adaptive_flot.report.run.closed_loop import colours
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.adaptation.inquiry import Inquiry

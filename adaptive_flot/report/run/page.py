@@ -75,7 +75,7 @@ def _lead(cases: Sequence[CaseRuns], names: Sequence[str]) -> str:
 
 
 def _facts(comparison: Comparison, discovered: Sequence[str]) -> list[Fact]:
-    found = Fact("Discovery in the loop", str(len(discovered)), "see the first lines", "bad") if discovered else None
+    found = Fact("Discovery in the loop", str(len(discovered)), "see the first lines") if discovered else None
     return [*compared.facts(comparison), *filter(None, [found])]
 
 
@@ -112,7 +112,8 @@ def _sections(cases: Sequence[CaseRuns], album: Album) -> list[Section]:
             sections += [Section(f"part-{k}", t.title, t.inside, t.parts) for k, t in enumerate(found, 1)]
             continue
         parts = [part for t in found for part in (Heading(t.title), *t.parts)]
-        sections.append(Section(f"case-{i}", title(case), ", ".join(case.roles), parts))
+        several = len({c.scenario.name for c in cases}) > 1
+        sections.append(Section(f"case-{i}", title(case, several), ", ".join(case.roles), parts))
     return sections
 
 

@@ -9,9 +9,8 @@ from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.contracts import Status
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
-from adaptive_flot.report.kit.figures import p_text
 from adaptive_flot.report.kit.parts import Table
-from adaptive_flot.report.kit.wording import number, seed_list
+from adaptive_flot.report.kit.wording import number, p_text, seed_list
 from adaptive_flot.report.run.series import CaseRuns, residuals
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS
