@@ -62,7 +62,7 @@ def make_model() -> Model:
         ),
         inputs=(
             Quantity("feed_flow", "-", "feed rate, scaled", 0.0, 1e4, 30.0),
-            Quantity("ph", "-", "pH upstream", 0.0, 14.0, 1.0),
+            Quantity("ph", "-", "pH upstream", 0.0, 14.0, 1.0, movable=False),
             Quantity("copper_sulphate", "-", "copper sulphate added, scaled", 0.0, 1e3, 2.0),
             Quantity("air_flow", "-", "air flow rate, scaled", 0.0, 1e3, 0.1),
         ),

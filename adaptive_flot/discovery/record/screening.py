@@ -7,13 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from adaptive_flot.discovery.record.noise import is_dense
 from adaptive_flot.discovery.record.problem import BoolArray
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.wrong_unit import is_far_outside
 from adaptive_flot.greybox.model import FloatArray, Model
 
 FEWEST_ROWS = 200
 FROZEN_ROWS = 30
 """So many equal values in a row, in a signal that else changes from sample to sample, are a frozen sensor."""
+MOST_FROZEN = 0.3
+"""An input that stands still for a larger share of the record is moved in steps."""
 CLIPPED_SHARE = 0.03
 """Share of a signal that sits exactly at its largest or smallest value from which it counts as clipped."""
 LEAST_MOVE = 5e-3
@@ -28,6 +32,18 @@ QUARTER = 0.3186
 
 
 @dataclass(frozen=True)
+class Suspect:
+    """A part of the record, first and last time [s], in which something is wrong with a sensor."""
+
+    start: float
+    end: float
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.what} from {self.start:g} to {self.end:g} s"
+
+
+@dataclass(frozen=True)
 class Screening:
     """Result of the data screening.
 
@@ -39,11 +55,14 @@ class Screening:
         Why the record says too little; empty when it can be judged.
     notes
         What was left out, in words.
+    suspects
+        Parts of the record in which a sensor says nothing: an event that seems to begin there is doubtful.
     """
 
     record: Dataset
     reasons: tuple[str, ...]
     notes: tuple[str, ...]
+    suspects: tuple[Suspect, ...] = ()
 
     def __str__(self) -> str:
         state = "insufficient: " + "; ".join(self.reasons) if self.reasons else "usable"
@@ -52,12 +71,10 @@ class Screening:
 
 def screen(record: Dataset, model: Model) -> Screening:
     """Check a record: length, gaps, frozen and clipped sensors, outliers, inputs that move."""
-    outputs = record.outputs.copy()
-    notes: list[str] = [*record.notes]
+    record, found, suspects = clean_outputs(record, model)
+    outputs = record.outputs
+    notes: list[str] = [*record.notes, *found]
     reasons: list[str] = []
-    for j, q in enumerate(model.outputs):
-        if np.isfinite(outputs[:, j]).any():
-            notes += _clean(outputs[:, j], q.name, q.name in model.edges)
     measured = [q.name for j, q in enumerate(model.outputs) if np.isfinite(outputs[:, j]).any()]
     usable = int(np.isfinite(outputs).any(axis=1).sum())
     if not measured:
@@ -72,7 +89,43 @@ def screen(record: Dataset, model: Model) -> Screening:
         notes.append(f"{', '.join(still)} hardly moves: no dependence on it can be told")
     if measured and not reasons and all(_flat(outputs[:, j]) for j in range(outputs.shape[1])):
         reasons.append("every measured output is constant")
-    return Screening(replace(record, outputs=outputs), tuple(reasons), tuple(notes))
+    return Screening(record, tuple(reasons), tuple(notes), suspects)
+
+
+def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ...], tuple[Suspect, ...]]:
+    """The record without measurements that can not be used, what was left out in words, and where that was.
+
+    Outputs outside their physical range are kept, with a word: no unit of plants puts them right, or `check_unit` would
+    have refused them, so it may be an offset.
+    """
+    outputs, notes, suspects = record.outputs.copy(), [], []
+    for j, q in enumerate(model.outputs):
+        before = np.isfinite(outputs[:, j])
+        if not before.any():
+            continue
+        if is_far_outside(q, outputs[:, j]):
+            middle = float(np.nanmedian(outputs[:, j]))
+            notes.append(
+                f"{q.name}: the median, {middle:g} {q.unit}, is outside the range [{q.lower:g}, {q.upper:g}] {q.unit}: "
+                "check its unit and its zero"
+            )
+        notes += _clean(outputs[:, j], q.name, q.name in model.edges)
+        suspects += [
+            Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} is missing or left out")
+            for a, b in runs_of(~np.isfinite(outputs[:, j]), FROZEN_ROWS if is_dense(outputs[:, j]) else len(before))
+        ]
+    for q, u in zip(model.inputs, record.inputs.T, strict=True):
+        stopped = _frozen(u) & (u > u.min()) & (u < u.max())  # a valve may stay shut
+        for a, b in runs_of(stopped, FROZEN_ROWS) if stopped.mean() < MOST_FROZEN else ():
+            suspects.append(Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} stands still"))
+            notes.append(f"{suspects[-1]}, where it else changes from row to row: a sensor that had stopped?")
+    return replace(record, outputs=outputs), tuple(notes), tuple(suspects)
+
+
+def runs_of(mask: BoolArray, least: int) -> list[tuple[int, int]]:
+    """First row, and the row after the last, of each run of at least so many rows of a mask (N,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
 
 
 def _moves(u: FloatArray, share: float) -> bool:

@@ -6,6 +6,7 @@ judge.py        One of six words, from the ranked alternatives.
 report_veto.py  What held-out rows contradict is not told as a name.
 outputs.py      What is certain output by output where the record is not told.
 conclude.py     The verdict: that word with errors, tests, intervals and reasons.
+suspects.py     Events that seem to begin where a sensor says nothing.
 wording.py      The verdict in plain words.
 locate.py       Where in the process the missing effect acts.
 curve.py        The curve of a fitted effect with its band.

@@ -13,6 +13,7 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
 from adaptive_flot.discovery.verdict.locate import locate
+from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.discovery.verdict.wording import drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
@@ -56,7 +57,9 @@ def conclude(state: State) -> Verdict:
             k: float(b / a - 1) if a else float("nan")
             for k, b, a in zip(labels, before.values[: len(labels)], values, strict=True)
         },
-        notes=state.screening.notes + _common_nuisance_note(result),
+        notes=state.screening.notes
+        + _common_nuisance_note(result)
+        + suspect_notes([e.effect for e in effects], state.screening.suspects, problem.record.dt),
         detection=state.detection,
         location=locate(state.detection, result.rounds[0].scores) if state.detection else None,
         experiment=state.experiment,

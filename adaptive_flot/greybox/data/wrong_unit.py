@@ -15,6 +15,10 @@ OTHER_UNITS = {
     "kg/s": {"t/h": 1e3 / 3600, "kg/h": 1 / 3600, "g/s": 1e-3},
     "Pa": {"kPa": 1e3, "bar": 1e5},
     "s": {"min": 60.0, "h": 3600.0},
+    "V": {"mV": 1e-3},
+    "A": {"mA": 1e-3},
+    "W": {"kW": 1e3},
+    "1/s": {"1/min": 1 / 60},
 }
 """Units that plants use instead of a model's, and what one of them is in it."""
 FAR = 20.0

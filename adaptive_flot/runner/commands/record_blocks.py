@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from adaptive_flot.described import Described
+from adaptive_flot.discovery.record.screening import clean_outputs
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import Source, named
@@ -41,7 +42,8 @@ def read_blocks(path: Source, model: Model, fit_share: float, tag_map: TagMap | 
         The table can not be used.
     """
     measured = read_measurements(path, model, required_outputs=(model.outputs[0].name,), tag_map=tag_map)
-    record, validation = measured.record, measured.validation
+    record, found, _ = clean_outputs(measured.record, model)
+    record, validation = replace(record, notes=record.notes + found), measured.validation
     if validation is None:
         return cut(record, fit_share, str(named(path)))
     return Blocks(record.name.partition(":")[0], record, validation, continues=False)
