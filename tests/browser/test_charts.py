@@ -24,7 +24,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lines = (Trace("truth", TIME, TIME, Role.TRUTH), Trace("rpem", TIME, 2 * TIME, Role.ESTIMATE, std=np.ones(1000)))
     strip = Strip("decided by", TIME, ["mpc"] * 600 + ["hold"] * 400, "mpc")
     first = album.chart(Chart((Panel("one", "-", lines), Panel("two", "-", lines)), (strip,)), "c", "a")
-    other = album.chart(Chart((Panel("three", "-", lines),), marks=(Mark(500.0, "alarm"),)), "c", "a")
+    later = (Trace("truth", 500 + TIME, TIME, Role.TRUTH),)
+    other = album.chart(Chart((Panel("three", "-", later),), marks=(Mark(600.0, "alarm"),)), "c", "a")
     lags = album.chart(Chart((Panel("four", "-", lines),), x_label="lag", x_unit="samples"), "c", "a")
     table = Table("t", ("Who", "Fit [%]"), (("b", "9.5"), ("a", "−1.0"), ("c", "–"), ("d", "1 200")))
     made = Page(
@@ -76,7 +77,7 @@ def drag(tab: Tab, start: float, end: float) -> None:
 def test_a_folded_chart_is_drawn_when_it_is_unfolded(tab: Tab) -> None:
     assert len(ranges(tab)) == 3, "two panels and the strips of the first chart"
     tab.run(DRAW_ALL)
-    assert len(ranges(tab)) == 5
+    assert ranges(tab) == [[0, 1000]] * 3 + [[500, 1500], [1, 1000]]
 
 
 def test_a_zoom_is_that_of_all_time_axes_and_of_no_other(tab: Tab) -> None:
@@ -87,7 +88,7 @@ def test_a_zoom_is_that_of_all_time_axes_and_of_no_other(tab: Tab) -> None:
     assert over_time[0] == pytest.approx([250, 750], abs=10)
     assert lag == [1, 1000]
     tab.run("document.querySelector('.chart-tools button:last-child').click()")
-    assert ranges(tab)[0] == [0, 1000]
+    assert ranges(tab) == [[0, 1000]] * 3 + [[500, 1500], [1, 1000]], "each shows all of its own"
     assert errors(tab) == []
 
 

@@ -79,7 +79,7 @@ const AdaptiveFlotChart = (() => {
         sync: { key: x.time ? "time" : chart.key, scales: ["x", null], setSeries: false },
         ...more.cursor,
       },
-      scales: { x: { time: false, range: (u, low, high) => (low === null ? x.range : [low, high]) }, y: more.y },
+      scales: { x: { time: false, range: (u, low, high) => (low === null || (low === u.data[0][0] && high === u.data[0].at(-1)) ? chart.spec.x.range : [low, high]) }, y: more.y },
       axes: [across, { ...axis, size: AXIS, space: 26, ...more.axis }],
       series: [{}, ...more.series],
       bands: more.bands,
@@ -96,7 +96,7 @@ const AdaptiveFlotChart = (() => {
   function follow(chart, u) {
     if (linking || !chart.ready) return;
     const { min, max } = u.scales.x;
-    chart.zoom(min, max);
+    if (min !== chart.view[0] || max !== chart.view[1]) chart.zoom(min, max);
   }
 
   function drawMarks(u, chart) {
@@ -139,6 +139,7 @@ const AdaptiveFlotChart = (() => {
       this.key = "chart-" + charts.length;
       this.plots = [];
       this.off = new Set();
+      this.view = spec.x.range;
       this.ready = false;
       host.querySelectorAll(":scope > :not(script):not(noscript)").forEach((old) => old.remove());
       const bar = element("div", "chart-bar");
@@ -230,6 +231,7 @@ const AdaptiveFlotChart = (() => {
     }
 
     show(min, max) {
+      this.view = [min, max];
       linking = true;
       for (const plot of this.plots) plot.batch(() => plot.setScale("x", { min, max }));
       linking = false;

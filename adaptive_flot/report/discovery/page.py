@@ -149,7 +149,8 @@ def _measured_against_model(discovery: Discovery, problem: Problem, before: Fit,
     panels = run_panels(problem, before, after)
     shown = _telling(discovery, problem)
     if len(shown) < len(panels):
-        caption += f" Outputs whose error changed most; all {len(panels)} are in the next chapter."
+        which = "Outputs whose error changed most" if after is not before else f"{len(shown)} of the outputs"
+        caption += f" {which}; all {len(panels)} are in the next chapter."
     chart = Chart(tuple(panels[j] for j in shown))
     return album.chart(chart, caption, "Measured outputs over time, and free runs of the model")
 

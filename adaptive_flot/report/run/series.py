@@ -30,7 +30,7 @@ class CaseRuns:
     controller: str
     runs: tuple[Run, ...]
     slots: Mapping[tuple[str, str], int]
-    """Colour of each (controller, estimator) of the page."""
+    """Colour of each (controller, estimator) of the scenario."""
 
     @cached_property
     def seeds(self) -> tuple[int, ...]:
@@ -94,12 +94,15 @@ class CaseRuns:
 
 def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[CaseRuns]:
     """Split results into one case for each scenario and controller, in the order run."""
-    slots = contender_slots((r.controller, r.estimator) for _, runs in results for r in runs)
     return [
-        CaseRuns(scenario, controller, tuple(r for r in runs if r.controller == controller), slots)
+        CaseRuns(scenario, controller, tuple(r for r in runs if r.controller == controller), _slots(runs))
         for scenario, runs in results
         for controller in dict.fromkeys(r.controller for r in runs)
     ]
+
+
+def _slots(runs: Sequence[Run]) -> dict[tuple[str, str], int]:
+    return contender_slots((r.controller, r.estimator) for r in runs)
 
 
 def input_panels(case: CaseRuns) -> tuple[list[Panel], list[str]]:
