@@ -16,6 +16,7 @@ from adaptive_flot.errors import PluginError, near_match
 
 # Addresses, not imports: the core never imports a plug-in.
 ESTIMATORS: Mapping[str, str] = {
+    "adaptive_imm": "estimators.adaptive_imm:AdaptiveImm",
     "ekf": "estimators.ekf:Ekf",
     "fixed": "estimators.fixed:Fixed",
     "imm": "estimators.imm:Imm",

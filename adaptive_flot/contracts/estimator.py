@@ -99,6 +99,9 @@ class Estimate:
         Model state (nx,) at the time of the sample.
     status
         What happened.
+    discrepancy
+        How far each output is off from the model (ny,), in its unit, as the estimator sees it: part of `prediction`.
+        None where the prediction is the model's alone.
     delayed
         Innovations of the delayed values that were used: output, time taken, measured minus predicted then.
     """
@@ -112,6 +115,7 @@ class Estimate:
     state: FloatArray
     status: Status
     delayed: tuple[DelayedValue, ...] = ()
+    discrepancy: FloatArray | None = None
 
 
 class Estimator(Protocol[State]):

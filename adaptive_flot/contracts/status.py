@@ -14,6 +14,7 @@ class Status(Enum):
     TOO_OLD = "delayed value without a sample of its time among those kept: not used"
     PROJECTED = "estimate projected onto its bounds"
     LOW_INFORMATION = "the data say too little about some direction: the estimate is held along it"
+    MODEL_ERROR = "the parameters take up something else: the model lacks an effect, or a constant is wrong"
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
     NOT_CONVERGED = "search stopped before it converged: best values so far"
     RETRIED = "solved at the second try, from a cold start"

@@ -44,10 +44,11 @@ class OutputBias:
         return bias
 
     def _newest(self, estimate: Estimate) -> float:
-        """The newest innovation that comes with an estimate; NaN where none does."""
+        """Measured minus what the model alone predicted, the newest of an estimate; NaN where there is none."""
         innovation = float(estimate.innovation[self.index])
         delayed = [v.value for v in estimate.delayed if v.output == self.output]
-        return delayed[-1] if delayed and not np.isfinite(innovation) else innovation
+        newest = delayed[-1] if delayed and not np.isfinite(innovation) else innovation
+        return newest if estimate.discrepancy is None else newest + float(estimate.discrepancy[self.index])
 
     def _filtered(self, bias: float, heard: float, time: float, innovation: float) -> tuple[float, float]:
         """One innovation later; after a gap, one value counts for the time since the last one, NaN for nothing."""

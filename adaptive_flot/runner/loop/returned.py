@@ -35,6 +35,8 @@ def checked_estimate(estimator: AnyEstimator, returned: Any) -> tuple[Any, Estim
     }
     for name, shape in shapes.items():
         _check_shape(made, "update", f"Estimate.{name}", getattr(estimate, name), shape)
+    if estimate.discrepancy is not None:
+        _check_shape(made, "update", "Estimate.discrepancy", estimate.discrepancy, (outputs,))
     return returned[0], estimate
 
 

@@ -1,0 +1,48 @@
+"""Fits of a run, and the share of the time in which its 95 % region holds the parameters that it should."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import chi2
+
+from adaptive_flot.metrics import normalised_error_squared
+from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.scenario import Scenario
+from benchmarks.kinds_of_change.best_fit import best_fit
+from benchmarks.kinds_of_change.truths import Truth
+
+ESTIMATORS = ("rpem", "rpem_full", "ekf", "imm", "adaptive_imm")
+LABELS = ("n", "C")
+
+
+def held(scenario: Scenario, run: Run, wanted: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> float:
+    """Share of the time of the fits in which the region of n and C together holds `wanted` (N, 2)."""
+    rows = (run.table["time_s"] > scenario.fits_after + 1e-9).to_numpy()
+    table = run.table[rows]
+    std = table[[f"{x}_std" for x in LABELS]].to_numpy()
+    if not (std > 0).all():
+        return float("nan")
+    error = (table[[f"{x}_estimate" for x in LABELS]].to_numpy() - wanted[rows]) / std
+    between = np.clip(table["n_C_correlation"].to_numpy(), -1 + 1e-9, 1 - 1e-9)
+    correlation = np.array([[np.ones_like(between), between], [between, np.ones_like(between)]]).transpose(2, 0, 1)
+    return float(np.mean(normalised_error_squared(error, correlation) <= chi2.ppf(0.95, 2)))
+
+
+def figures(truth: Truth, key: str, seed: int, estimators: tuple[str, ...], folder: Path) -> pd.DataFrame:
+    """A row for each estimator: fits in percent, and the share of the time that is held."""
+    scenario = truth.scenario(folder, key)
+    realisation = Realisation(scenario, seed)
+    columns = scenario.plant_model.indices("parameters", scenario.setup.parameters)
+    wanted = realisation.parameters[:, columns] if truth.has_true_parameters else best_fit(realisation).parameters
+    return pd.DataFrame(
+        [
+            {"truth": key, "seed": seed, "estimator": run.estimator, **run.fit, "held": held(scenario, run, wanted)}
+            | {"model_error": run.status_counts.get("model_error", 0) / len(run.table)}
+            for run in run_scenario(scenario, estimators, seeds=[seed])
+        ]
+    )

@@ -1,0 +1,15 @@
+"""Interacting multiple models for every kind of change, with noise, outliers and errors of the model itself.
+
+Map
+---
+estimator.py  `AdaptiveImm`: the estimator.
+modes.py      The modes, and how the process goes from one to another.
+interval.py   Prediction over an interval, linearised at a lagged estimate of the parameters.
+bank.py       Mixing, correction and combination of the filters, as expressions over all modes.
+step.py       One interval of it all as one compiled function.
+noise.py      The noise level, from what the corrected estimate leaves.
+"""
+
+from estimators.adaptive_imm.estimator import AdaptiveImm
+
+__all__ = ["AdaptiveImm"]

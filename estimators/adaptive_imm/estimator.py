@@ -1,0 +1,243 @@
+"""Adaptive interacting multiple models: one estimator for every kind of change, that says when the model is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles
+from estimators.adaptive_imm.modes import KINDS, Changes, Modes, transitions
+from estimators.adaptive_imm.noise import NoiseLevel
+from estimators.adaptive_imm.step import Step, combination
+from estimators.imm.modes import stationary
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import first_estimate, layout, parameters_of
+from estimators.shared.measured import driving_outputs
+
+
+@dataclass(frozen=True)
+class AdaptiveImmState:
+    """What the next step needs, for M modes of n entries z = (x, c, v, b).
+
+    Attributes
+    ----------
+    time
+        Time of z [s].
+    z, P
+        Mean of each mode (n, M), and lower triangle of its covariance (n (n + 1) / 2, M), in columns.
+    probability
+        Probability of each mode (M,).
+    lagged
+        Parameter coordinates at which the model is linearised (q,).
+    noise
+        Noise of the driving outputs.
+    """
+
+    time: float
+    z: FloatArray
+    P: FloatArray
+    probability: FloatArray
+    lagged: FloatArray
+    noise: NoiseLevel
+
+
+class AdaptiveImm:
+    """Joint Kalman filters, one for each kind of change, that share one linearisation and what they know.
+
+    The modes are: rest; one parameter drifts; all drift, each at a rate of its own; one jumps; all do a random walk.
+    Beside them stand rest and walk with a *discrepancy*: each driving output is off by an amount that comes and goes,
+    which no parameter explains. Noise has outliers, and its level is estimated. See the modules of this package for the
+    equations, and `interval.py` for why the point of linearisation lags behind the estimate.
+
+    The status is `Status.MODEL_ERROR` while the modes with a discrepancy are more likely than not, or a parameter is
+    farther than `plausible` from its nominal value, by more than two standard deviations. Then the parameters take up
+    what the model lacks; `discover` looks for it.
+
+    Parameters
+    ----------
+    setup
+        Model, sampling interval, adapted parameters (q) and driving outputs (m).
+    modes
+        Kinds of change: of `rest`, `drift`, `joint_drift`, `jump`, `walk`.
+    rate_per_hour, joint_rate_per_hour, rate_change_per_hour, jump, walk_per_hour, background_per_hour, state_noise
+        How far parameters move, see `Changes`.
+    change_s, jump_s, walk_s
+        Mean duration of rest and of a drift, of a jump, and of a random walk [s].
+    shares
+        Share of the changes that are a drift of all, a jump, and a walk; the others are drifts of one.
+    outlier_share, outlier_scale
+        Share of the measurements that are outliers, and their standard deviation as a multiple of the noise.
+    noise_memory
+        Samples over which the noise level is estimated; 0 takes that of the prior.
+    discrepancies
+        Standard deviations of a discrepancy, as multiples of the noise; none trusts the model.
+    discrepancy_s
+        Time constant with which a discrepancy comes and goes [s].
+    right_s, wrong_s
+        Mean time until the model becomes wrong, and for which it stays so [s].
+    lag_s
+        Time constant with which the point of linearisation follows the estimate [s]; 0 takes the estimate.
+    plausible
+        Distance of a parameter from its nominal value, as a share of it, beyond which it explains something else.
+
+    Raises
+    ------
+    ModelError
+        An option outside its range.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        *,
+        modes: Sequence[str] = KINDS,
+        rate_per_hour: float = 1.0,
+        joint_rate_per_hour: float = 0.5,
+        rate_change_per_hour: float = 0.5,
+        jump: float = 0.05,
+        walk_per_hour: float = 0.1,
+        background_per_hour: float = 0.01,
+        state_noise: float = 0.0,
+        change_s: float = 300.0,
+        jump_s: float = 3.0,
+        walk_s: float = 600.0,
+        shares: Sequence[float] = (0.25, 0.2, 0.2),
+        outlier_share: float = 0.01,
+        outlier_scale: float = 20.0,
+        noise_memory: int = 600,
+        discrepancies: Sequence[float] = (3.0, 20.0),
+        discrepancy_s: float = 200.0,
+        right_s: float = 24000.0,
+        wrong_s: float = 1200.0,
+        lag_s: float = 100.0,
+        plausible: float = 0.5,
+    ) -> None:
+        rates = rate_per_hour, joint_rate_per_hour, rate_change_per_hour
+        changes = Changes(*rates, jump, walk_per_hour, background_per_hour, state_noise)
+        for kind in modes:
+            if kind not in KINDS:
+                raise ModelError(f"adaptive_imm: unknown mode {kind!r}; {near_match(kind, KINDS)}")
+        if not modes:
+            raise ModelError("adaptive_imm: there is no mode; name some, for example rest and walk")
+        _check(
+            {**vars(changes), "lag_s": lag_s, "noise_memory": noise_memory},
+            {"change_s": change_s, "jump_s": jump_s, "walk_s": walk_s, "outlier_scale": outlier_scale}
+            | {"discrepancy_s": discrepancy_s, "right_s": right_s, "wrong_s": wrong_s, "plausible": plausible}
+            | {f"discrepancies[{i}]": level for i, level in enumerate(discrepancies)},
+        )
+        if not (0 <= outlier_share < 1 and len(shares) == 3 and min(shares) >= 0 and sum(shares) <= 1):
+            raise ModelError(
+                "adaptive_imm: outlier_share must lie in [0, 1), and shares be three that add up to 1 at most"
+            )
+        self.setup = setup
+        self.coordinates = Coordinates.of(setup.model, setup.parameters)
+        self.layout = layout(setup, integrated=True)
+        self.modes = Modes.of(setup, self.coordinates, self.layout, modes, changes, discrepancies)
+        joint, jumps, walks = shares
+        matrix = transitions(
+            self.modes,
+            {"rest": change_s, "drift": change_s, "joint_drift": change_s, "jump": jump_s, "walk": walk_s},
+            {"drift": 1 - joint - jumps - walks, "joint_drift": joint, "jump": jumps, "walk": walks},
+            (right_s, wrong_s),
+            setup.dt,
+        )
+        nx, q, n = self.layout.nx, self.layout.q, self.layout.size
+        off = (self.modes.discrepancy > 0).astype(float)
+        self._b = slice(n, n + len(setup.outputs))
+        mixing = Mixing(matrix, self.modes.entry, slice(nx + q, n), self._b, off)
+        fading, follow = np.exp(-setup.dt / discrepancy_s), 1.0 if lag_s == 0 else -np.expm1(-setup.dt / lag_s)
+        parts = Step(self.modes, mixing, Contamination(outlier_share, outlier_scale), float(fading), float(follow))
+        self.transitions, self.noise_memory, self.plausible = matrix, noise_memory, plausible
+        self._off = off
+        self._columns = setup.model.indices("outputs", setup.outputs)
+        self._p = setup.model.parameter_values
+        nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
+        self._nominal = self.coordinates.from_parameters(nominal)
+        names = ("z", "P", "z_next", "P_next", "covariance")
+        self._combined = FastCall(combination(*self.modes.entry.T.shape), matrices=("z", "P", "covariance"))
+        self._step = FastCall(parts.function(setup, self.layout), matrices=names, as_machine_code=setup.model.compiled)
+
+    def init(self, prior: Prior) -> AdaptiveImmState:
+        """Start from a prior, every mode alike and with the share of time that the process spends in it."""
+        first, first_P = first_estimate(prior, self.coordinates, self.layout)
+        scale = np.array([self.setup.model.outputs[j].scale for j in self._columns])
+        noise = NoiseLevel.first(prior.noise_std, scale)
+        size, n, count = self._b.stop, self.layout.size, len(self.modes.kinds)
+        z, P = np.zeros((size, count)), np.zeros((size, size))
+        z[:n], P[:n, :n] = first[:, None], first_P
+        variances = self.modes.entry.T.copy()
+        variances[self._b] = noise.variance[:, None] * self.modes.discrepancy**2
+        shape = Triangles(size)
+        triangles = P[shape.rows, shape.columns][:, None] + shape.on_diagonal(variances)
+        lagged = first[self.layout.coordinates].copy()
+        return AdaptiveImmState(prior.time, z, triangles, stationary(self.transitions), lagged, noise)
+
+    def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
+        """Mix, predict, compare, correct, weigh; see `Estimator.update`."""
+        measured, driving, present = driving_outputs(sample, self._columns, len(self.setup.model.outputs))
+        noise, shape = state.noise, self.layout
+        count = noise.count
+        if self.noise_memory:
+            count = np.minimum(noise.count + present, self.noise_memory)
+        p = self._p if sample.parameters is None else sample.parameters
+        z, P, probability, lagged, level, prediction, std, mean, covariance, projected = self._step(
+            state.z,
+            state.P,
+            state.probability,
+            state.lagged,
+            noise.variance,
+            count,
+            state.time,
+            sample.inputs,
+            p,
+            driving,
+            present,
+        )
+        status = Status.OK if present.any() else Status.MISSING
+        if not (np.isfinite(covariance).all() and np.isfinite(z).all() and np.isfinite(P).all()):
+            z, P, probability, lagged = state.z, state.P, state.probability, state.lagged
+            (mean, covariance), status = self._combined(z, P, probability), Status.NOT_FINITE
+        else:
+            if self.noise_memory:
+                noise = NoiseLevel(np.maximum(level, noise.least), count, noise.least)
+            if projected[0] > 0:
+                status = Status.PROJECTED
+        theta, theta_covariance = parameters_of(mean, covariance, self.coordinates, shape)
+        if status is Status.OK and self._is_wrong(mean, covariance, probability):
+            status = Status.MODEL_ERROR
+        off = np.zeros(len(prediction))
+        off[self._columns] = mean[self._b]
+        estimate = Estimate(
+            time=sample.time,
+            prediction=prediction,
+            innovation=measured - prediction,
+            innovation_std=std,
+            parameters=theta,
+            covariance=theta_covariance,
+            state=mean[: shape.nx].copy(),
+            status=status,
+            discrepancy=off,
+        )
+        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise), estimate
+
+    def _is_wrong(self, mean: FloatArray, covariance: FloatArray, probability: FloatArray) -> bool:
+        if probability @ self._off > 0.5:
+            return True
+        where = self.layout.coordinates
+        far = np.abs(mean[where] - self._nominal) - self.plausible * self.coordinates.scale
+        return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[where])).any())
+
+
+def _check(not_negative: dict[str, float], positive: dict[str, float]) -> None:
+    for name, value in not_negative.items():
+        if not (value >= 0 and np.isfinite(value)):
+            raise ModelError(f"adaptive_imm: {name} = {value:g}; give 0 or a positive number")
+    for name, value in positive.items():
+        if not (value > 0 and np.isfinite(value)):
+            raise ModelError(f"adaptive_imm: {name} = {value:g}; give a positive number")

@@ -1,0 +1,102 @@
+"""One interval of the whole estimator as one compiled function: mix, predict, correct, weigh, carry, combine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from adaptive_flot.contracts import Setup
+from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles, carried, combined, output_variance, widened
+from estimators.adaptive_imm.interval import lagged_interval
+from estimators.adaptive_imm.modes import Modes
+from estimators.adaptive_imm.noise import matched
+from estimators.shared.coordinates import Coordinates
+from estimators.shared.joint_filter import Layout
+
+
+@dataclass(frozen=True)
+class Step:
+    """What an interval depends on, beside the state and the sample.
+
+    Attributes
+    ----------
+    modes, mixing, contamination
+        The parts.
+    fading
+        Share of a discrepancy that is left after an interval.
+    follow
+        Share of the way to the estimate that the point of linearisation goes in an interval.
+    """
+
+    modes: Modes
+    mixing: Mixing
+    contamination: Contamination
+    fading: float
+    follow: float
+
+    def function(self, setup: Setup, shape: Layout) -> ca.Function:
+        """Build the function, for M modes of n entries and m driving outputs.
+
+        Returns
+        -------
+        casadi.Function
+            `(z (n, M), P (n (n + 1) / 2, M), probability (M,), lagged (q,), variance (m,), count (m,), t, u (nu,),
+            p (np,), driving (m,), present (m,)) -> (z, P, probability, lagged, variance, prediction (ny,), std (m,),
+            mean (n,), covariance (n, n), projected)`; `projected` counts the parameters that were set onto their bounds
+            in the most likely mode.
+        """
+        coordinates, columns = (
+            Coordinates.of(setup.model, setup.parameters),
+            setup.model.indices("outputs", setup.outputs),
+        )
+        interval = lagged_interval(setup, shape)
+        modes, m, nz, n = len(self.modes.kinds), len(columns), shape.size, shape.size + len(columns)
+        triangles, where = Triangles(n), shape.coordinates
+        z, P = ca.MX.sym("z", n, modes), ca.MX.sym("P", len(triangles.rows), modes)
+        probability, lagged = ca.MX.sym("probability", modes), ca.MX.sym("lagged", shape.q)
+        variance, count = ca.MX.sym("variance", m), ca.MX.sym("count", m)
+        t, u, p = (ca.MX.sym(name, interval.size1_in(name)) for name in ("t", "u", "p"))
+        driving, present = ca.MX.sym("driving", m), ca.MX.sym("present", m)
+
+        widths = variance @ ca.DM(self.modes.discrepancy[None, :] ** 2)
+        mixed, spread, expected = self.mixing.expressions(z, P, probability, widths)
+        spread += ca.DM(triangles.on_diagonal(self.modes.noise.T)) + widened((1 - self.fading**2) * widths, triangles)
+        point = mixed @ expected
+        followed = lagged + self.follow * (point[where] - lagged)
+        end, outputs, F, H = interval(point[:nz], followed, t, u, p)
+        F, H = ca.diagcat(F, self.fading * ca.DM.eye(m)), ca.horzcat(H[columns, :], ca.DM.eye(m))
+        base = outputs[columns] + point[nz:]
+        away = mixed - ca.repmat(point, 1, modes)
+        expects = output_variance(H, spread, modes) + (H @ away) ** 2
+        after = self.contamination.correct(away, spread, H, driving - base, variance, present)
+        weights = expected * ca.exp(after.log_likelihood.T - ca.mmax(after.log_likelihood))
+        found = weights / ca.sum1(weights)
+        level = matched(variance, count, after, found, H, driving - base, present)
+        ends = ca.repmat(ca.vertcat(end, self.fading * point[nz:]), 1, modes) + F @ after.away
+        c = ends[where, :]
+        low, high = (ca.repmat(ca.DM(bound), 1, modes) for bound in (coordinates.lower, coordinates.upper))
+        inside = ca.fmin(ca.fmax(c, low), high)
+        ends = ca.vertcat(ends[: shape.nx, :], inside, ends[shape.nx + shape.q :, :])
+        projected = ca.sum1(inside != c) @ (found >= ca.mmax(found))
+        covariances = carried(after.P, F, modes)
+        mean, covariance = combined(ends, covariances, found)
+        prediction = ca.MX(outputs)
+        prediction[columns] = base
+        results = [ends, covariances, found, followed, level, prediction, ca.sqrt(expects @ expected + variance)]
+        return ca.Function(
+            "adaptive_imm_step",
+            [z, P, probability, lagged, variance, count, t, u, p, driving, present],
+            [ca.densify(x) for x in (*results, mean, covariance, projected)],
+            ["z", "P", "probability", "lagged", "variance", "count", "t", "u", "p", "driving", "present"],
+            ["z_next", "P_next", "found", "followed", "level", "prediction", "std", "mean", "covariance", "projected"],
+            {"cse": True},
+        )
+
+
+def combination(n: int, modes: int) -> ca.Function:
+    """`(z (n, M), P (n (n + 1) / 2, M), probability (M,)) -> (mean (n,), covariance (n, n))` of the mixture."""
+    z, P = ca.MX.sym("z", n, modes), ca.MX.sym("P", n * (n + 1) // 2, modes)
+    probability = ca.MX.sym("probability", modes)
+    results, names = combined(z, P, probability), (["z", "P", "probability"], ["mean", "covariance"])
+    return ca.Function("combination", [z, P, probability], list(results), *names)
