@@ -10,6 +10,10 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import numpy as np
+
+from adaptive_flot.greybox.quantities import FloatArray
+
 HASH_DIGITS = 16
 _ROOT = Path(__file__).parents[1]
 
@@ -50,6 +54,18 @@ def hashed(files: Iterable[Path]) -> list[tuple[str, str]]:
     """(what, name and hash) of each file that can be read, for the foot of a page."""
     known = ((file, file_hash(file)) for file in dict.fromkeys(files))
     return [(f"SHA-256 of {file.name}", f"{digits} …") for file, digits in known if digits]
+
+
+def values_hash(arrays: Iterable[FloatArray]) -> str:
+    """First digits of the SHA-256 of the values of a record, wherever they came from: the same values, the same hash.
+
+    >>> values_hash([np.zeros(2)]) == values_hash([np.zeros(2)]) != values_hash([np.ones(2)])
+    True
+    """
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return f"{digest.hexdigest()[:HASH_DIGITS]} …"
 
 
 def now() -> str:

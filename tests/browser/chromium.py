@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import json
 import os
 import shutil
-import subprocess
+import signal
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -33,27 +35,18 @@ def found() -> str | None:
 
 
 class Browser:
-    """One browser process. Messages go through two pipes, each ended by a zero byte."""
+    """One browser process, which reads messages from 3 and writes them to 4, each ended by a zero byte."""
 
     def __init__(self, program: str, profile: Path) -> None:
         to_read, self._to = os.pipe()
         self._from, from_write = os.pipe()
-
-        def connect() -> None:  # the browser reads from 3 and writes to 4
-            os.dup2(to_read, 63)
-            os.dup2(from_write, 64)
-            os.dup2(63, 3)
-            os.dup2(64, 4)
-
-        self._process = subprocess.Popen(
-            [program, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            pass_fds=(3, 4),
-            preexec_fn=connect,
-        )
-        os.close(to_read)
-        os.close(from_write)
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (to_read, from_write)]  # out of the way of 3, 4
+        quiet = [(os.POSIX_SPAWN_OPEN, out, os.devnull, os.O_WRONLY, 0) for out in (1, 2)]
+        pipes = [(os.POSIX_SPAWN_DUP2, end, known) for end, known in zip(ends, (3, 4), strict=True)]
+        command = [program, *FLAGS, f"--user-data-dir={profile}", "about:blank"]
+        self._pid = os.posix_spawn(program, command, os.environ, file_actions=[*quiet, *pipes])
+        for end in (to_read, from_write, *ends):
+            os.close(end)
         self._buffer = b""
         self._count = 0
         self.events: list[dict[str, Any]] = []
@@ -61,7 +54,13 @@ class Browser:
     def close(self) -> None:
         """End the browser."""
         self.call("Browser.close")
-        self._process.wait(timeout=30)
+        for _ in range(300):
+            if os.waitpid(self._pid, os.WNOHANG)[0]:
+                break
+            time.sleep(0.1)
+        else:
+            os.kill(self._pid, signal.SIGKILL)
+            os.waitpid(self._pid, 0)
         os.close(self._to)
         os.close(self._from)
 

@@ -37,14 +37,20 @@ def title(comparison: Comparison) -> str:
     winner = best(comparison)
     earned = any(c.has(VALUE) for c in comparison.contenders)
     if winner is not None and earned and len(tied := _tied(comparison, winner)) > 1:
-        return f"{joined(c.label.replace(', ', ' with ', 1) for c in tied)} earn the same"
+        return f"{joined(_short(comparison, c) for c in tied)} earn the same"
     if winner is None:
         return "Nobody keeps the grade limit" if earned else "No fit to compare"
     if len([c for c in comparison.contenders if c.estimator != ORACLE]) == 1:
         value = winner.spread(VALUE if earned else fit_names(comparison)[0]).median
         return f"{winner.label}: {number(value, '.3f')} cu/h" if earned else f"{winner.label}: fit {number(value)} %"
-    name = winner.label.replace(", ", " with ", 1)
+    name = _short(comparison, winner)
     return f"{name} earns most within the limit" if earned else f"{name} fits best"
+
+
+def _short(comparison: Comparison, c: Contender) -> str:
+    """Name of a contender in a title: its controller is left out where all have the same."""
+    same = len({x.controller for x in comparison.contenders}) == 1 and not c.result
+    return c.estimator if same else c.label.replace(", ", " with ", 1)
 
 
 def _tied(comparison: Comparison, winner: Contender) -> list[Contender]:

@@ -47,8 +47,8 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
     page = Page(
         kind="Comparison",
         title=answer.title(one) if len(comparisons) == 1 else f"{len(comparisons)} scenarios compared",
-        lead=f"{', '.join(c.scenario for c in comparisons)}: {runs} runs, {seed_list(seeds_of(comparisons))}. Costs, "
-        "prices and terms are explained in docs/guides/economics.md.",
+        lead=f"{', '.join(c.scenario for c in comparisons)}: {runs} runs, {seed_list(seeds_of(comparisons))}."
+        + (" Costs, prices and terms are explained in docs/guides/economics.md." if _earned(comparisons) else ""),
         answer=[s for c in comparisons for s in _said(c, len(comparisons) > 1)],
         facts=answer.facts(one) if len(comparisons) == 1 else [],
         first=_first(comparisons, album),
@@ -56,6 +56,10 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
         made=made_by(command, [("Results", ", ".join(_results(comparisons)))], _summaries(comparisons)),
     )
     return render(page, album)
+
+
+def _earned(comparisons: Sequence[Comparison]) -> bool:
+    return any(x.has(answer.VALUE) for c in comparisons for x in c.contenders)
 
 
 def _said(comparison: Comparison, several: bool) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.kit.wording import number
-from adaptive_flot.runner.commands.comparison import Comparison, Contender, SeedSpread
+from adaptive_flot.runner.commands.comparison import ORACLE, Comparison, Contender, SeedSpread
 
 MANY_SEEDS = 20
 """Seeds from which a distribution is more than its median and range."""
@@ -92,7 +92,11 @@ def fits_table(comparison: Comparison) -> Table | None:
         f"{comparison.scenario}: fit of the estimates in percent, 100 (1 − ‖truth − estimate‖ / ‖truth‖). "
         f"{spread_text(comparison)}"
     )
-    return _table(comparison, caption, columns)
+    table = _table(comparison, caption, columns)
+    for name, column in zip(names, columns, strict=True):
+        medians = [np.nan if c.estimator == ORACLE else c.spread(name).median for c in comparison.contenders]
+        table = table.with_best(table.header.index(column.heading), np.round(medians, 2))
+    return table
 
 
 def status_table(comparison: Comparison) -> Table:

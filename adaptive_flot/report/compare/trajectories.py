@@ -88,13 +88,17 @@ def _errors(comparison: Comparison, tables: dict[str, pd.DataFrame]) -> list[Pan
     panels = []
     for column, true, name in pairs:
         traces = tuple(
-            Trace(label, table["time_s"].to_numpy(dtype=float), _percent(table[column], table[true]), *looks[label])
+            _error_trace(label, table[table[column].notna()], column, true, looks[label])
             for label, table in tables.items()
             if {"time_s", column, true} <= set(table) and estimators[label] != ORACLE
         )
         if traces:
             panels.append(Panel(f"error of {spaced(name)}", "%", traces, zoom=True))
     return panels
+
+
+def _error_trace(label: str, table: pd.DataFrame, column: str, true: str, look: tuple[Role, int]) -> Trace:
+    return Trace(label, table["time_s"].to_numpy(dtype=float), _percent(table[column], table[true]), *look)
 
 
 def _driving(table: pd.DataFrame, name: str, end: str) -> bool:

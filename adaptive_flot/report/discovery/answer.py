@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adaptive_flot.charts.units import amount
+import numpy as np
+
+from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results.evidence import OutputChange
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.kit.parts import Fact
 from adaptive_flot.report.kit.wording import number, spaced
 
 MOST_FACTS = 4
 """Outputs whose errors are told at the top: those whose error fell most, in units of their noise."""
+LEAST_SHARE = 0.01
+"""Share of an error below which its change is not told at the top."""
 WORDS = {
     "none": "the model explains the record",
     "named": "one effect stands out",
@@ -22,11 +28,11 @@ WORDS = {
 
 
 def error_facts(changes: Sequence[OutputChange]) -> list[Fact]:
-    """Error of the free run of the outputs that changed most, before and after."""
+    """Error of the free run of the outputs that surely changed, before and after, the most first."""
     ranked = sorted(changes, key=lambda c: -(c.before - c.after) / max(c.noise, 1e-300))
-    moved = [c for c in ranked if round(100 * _share(c)) != 0]
+    moved = [c for c in ranked if (c.reduction95[0] > 0 or c.reduction95[1] < 0) and abs(_share(c)) >= LEAST_SHARE]
     if not moved and ranked:
-        return [Fact("Error of each output", "unchanged", "nothing was added to the model")]
+        return [Fact("Error of each output", "no sure change", "between the model as it is and the best one found")]
     return [_error_fact(c) for c in moved[:MOST_FACTS]]
 
 
@@ -38,6 +44,15 @@ def _share(c: OutputChange) -> float:
 def _error_fact(c: OutputChange) -> Fact:
     share = 100 * _share(c)
     low, high = (number(100 * r, ".0f") for r in c.reduction95)
-    note = f"{amount(c.before, c.unit)} to {amount(c.after, c.unit)}; 95 %: {low} to {high} %"
+    power = exponent(np.array([c.before, c.after]))
+    before, after = (number(v * 10.0**-power, ".3g") for v in (c.before, c.after))
+    unit = unit_text(c.unit, power).removesuffix("–")
+    note = f"{before} to {after} {'× ' if power else ''}{unit}".rstrip() + f"; 95 %: {low} to {high} %"
     word = "less" if share > 0 else "more"
     return Fact(f"Error of {spaced(c.output)}", f"{abs(share):.0f} % {word}", note, "good" if share > 0 else "bad")
+
+
+def made_from(model: str, seconds: float, records: Sequence[Dataset]) -> list[tuple[str, str]]:
+    """Lines of the foot: model, time taken, and a hash of the values that were judged."""
+    data = values_hash(array for r in records for array in (r.time, r.inputs, r.outputs))
+    return [("Model", model), ("Time", f"{seconds:.1f} s"), ("SHA-256 of the values read", data)]

@@ -14,7 +14,7 @@ from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.discovery.verdict.report_veto import AT_NOISE
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
-from adaptive_flot.report.discovery.answer import WORDS, error_facts
+from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
 from adaptive_flot.report.discovery.figures import curve_figure, heat_map, residual_panels, run_panels
 from adaptive_flot.report.discovery.test_design import experiment_chapter
 from adaptive_flot.report.kit.album import Album
@@ -75,7 +75,7 @@ def discovery_report(discovery: Discovery, name: str, command: str = "", read: S
         facts=[Fact("Verdict", verdict.word, WORDS[verdict.word]), *error_facts(verdict.error)],
         first=first,
         sections=[*sections, data],
-        made=made_by(command, [("Model", discovery.model.name), ("Time", f"{verdict.seconds:.1f} s")], read),
+        made=made_by(command, made_from(discovery.model.name, verdict.seconds, [record]), read),
     )
     return render(page, album)
 

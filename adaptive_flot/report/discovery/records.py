@@ -13,7 +13,7 @@ from adaptive_flot.discovery.hypotheses.comparison import mean_difference
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.files import write_text
-from adaptive_flot.report.discovery.answer import WORDS, error_facts
+from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Fact, Part, Picture, Section, Table, Text
@@ -87,7 +87,9 @@ def records_report(comparison: Comparison, name: str, command: str = "", read: S
             Section("constants", "Constants", "before and after", [_constants(comparison)]),
         ],
         made=made_by(
-            command, [("Model", comparison.calibration.model.name), ("Time", f"{verdict.seconds:.1f} s")], read
+            command,
+            made_from(comparison.calibration.model.name, verdict.seconds, comparison.rows.records),
+            read,
         ),
     )
     return render(page, album)

@@ -11,6 +11,7 @@ from adaptive_flot.charts.plotdata import Chart
 from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.model import Quantity
+from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.estimate import answer, series
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
@@ -77,9 +78,15 @@ def estimate_report(result: RecordEstimate, command: str = "", read: Sequence[Pa
                 [*(p for q in outputs for p in _residual_pictures(result, q, album)), _status_table(result)],
             ),
         ],
-        made=made_by(command, [("Model", result.setup.model.name), ("Record", result.blocks.name)], read),
+        made=made_by(command, _made(result), read),
     )
     return render(page, album)
+
+
+def _made(result: RecordEstimate) -> list[tuple[str, str]]:
+    blocks = (result.blocks.fit, result.blocks.test)
+    data = values_hash(array for b in blocks for array in (b.time, b.inputs, b.outputs))
+    return [("Model", result.setup.model.name), ("Record", result.blocks.name), ("SHA-256 of the values read", data)]
 
 
 def _lead(result: RecordEstimate) -> str:
