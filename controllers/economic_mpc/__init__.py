@@ -12,6 +12,7 @@ derivatives.py          Derivatives of the problem, stage by stage.
 nlp_solvers.py          The solvers and their options.
 real_time_iteration.py  One iteration a sample.
 verification.py         No solution is used that a simulation does not confirm.
+chance_constraint.py    Back-off from limits for what the estimate leaves open.
 output_bias.py          Correction of the model by the last measured outputs.
 probing.py              Dips of an input that tell parameters apart.
 """

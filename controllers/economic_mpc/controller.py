@@ -22,6 +22,7 @@ from adaptive_flot.contracts import (
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
+from controllers.economic_mpc.chance_constraint import ChanceConstraint
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Bounds, with_further_states
 from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
@@ -63,6 +64,9 @@ class EconomicMpc:
     backoff
         Kept from the limits of outputs, in their units: what changes between two moves, and what the estimate is off
         by. Default a hundredth of each output's scale.
+    limit_probability
+        Probability with which the limits of outputs are to hold, given the covariance of the estimate: they are backed
+        off further by what that asks (`chance_constraint.py`). Default no further back-off.
     bias_time_s
         Time constant of the filters of output biases [s].
     budget_s
@@ -86,6 +90,7 @@ class EconomicMpc:
         move_cost: float | None = None,
         limit_penalty: float | None = None,
         backoff: float | None = None,
+        limit_probability: float | None = None,
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
         probing: Mapping[str, Any] | None = None,
@@ -108,6 +113,9 @@ class EconomicMpc:
         self.solver: Solver = make_solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
         self._limits = self.layout.limit_values(backoff)
+        self._chance: ChanceConstraint | None = None
+        if limit_probability is not None:
+            self._chance = ChanceConstraint(setup, [e.index for e in self.layout.output_limits], limit_probability)
         own = [economics.typical_rate if cost is None else cost for cost in (move_cost, limit_penalty)]
         self._value_scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
         self._prices = self._value_scale * np.array([*economics.prices(), *own])
@@ -182,7 +190,7 @@ class EconomicMpc:
             held[moved],
             theta,
             others,
-            self._limits,
+            self._limits_for(estimate, held, theta),
             np.array(state.bias),
             self._prices,
             estimate.time,
@@ -202,6 +210,14 @@ class EconomicMpc:
         if np.isfinite(held).all():
             return self._apply(state, held, held[moved], Status.HELD, solution)
         return self._apply(state, self.setup.schedule[0], self.setup.schedule[0][moved], Status.SAFE_INPUT, solution)
+
+    def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
+        """Values of the output limits, moved inwards by what the estimate leaves open."""
+        if self._chance is None:
+            return self._limits
+        kept = self._chance.backoff(estimate.time, estimate.state, held, theta, estimate.covariance)
+        inwards = np.array([-1.0 if e.is_upper else 1.0 for e in self.layout.output_limits])
+        return self._limits + inwards * kept
 
     def _solve(
         self, state: MpcState, now: FloatArray, held: FloatArray, estimate: Estimate, theta: FloatArray

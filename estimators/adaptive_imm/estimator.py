@@ -160,8 +160,9 @@ class AdaptiveImm:
         nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
         self._nominal = self.coordinates.from_parameters(nominal)
         names = ("z", "P", "z_next", "P_next", "covariance")
-        self._combined = FastCall(combination(*self.modes.entry.T.shape), matrices=("z", "P", "covariance"))
-        self._step = FastCall(parts.function(setup, self.layout), matrices=names, as_machine_code=setup.model.compiled)
+        code, mixture = setup.model.compiled, combination(*self.modes.entry.T.shape)
+        self._combined = FastCall(mixture, matrices=("z", "P", "covariance"), as_machine_code=code)
+        self._step = FastCall(parts.function(setup, self.layout), matrices=names, as_machine_code=code)
 
     def init(self, prior: Prior) -> AdaptiveImmState:
         """Start from a prior, every mode alike and with the share of time that the process spends in it."""

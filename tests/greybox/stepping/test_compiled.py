@@ -82,8 +82,8 @@ def test_estimates_are_those_of_the_plain_estimator(model: Model, name: str) -> 
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["ekf", "imm"])
-def test_filters_are_those_of_the_plain_filter(clock: Model, name: str) -> None:
+@pytest.mark.parametrize(("name", "functions"), [("ekf", 1), ("imm", 3), ("adaptive_imm", 2)])
+def test_filters_are_those_of_the_plain_filter(clock: Model, name: str, functions: int) -> None:
     """On a small model: with the cell the compiler takes ten seconds."""
     samples = [Sample(0.1 * k, np.array([1.0]), np.array([2.0 * np.sin(0.1 * k) + 0.2 * k])) for k in range(1, 41)]
     prior = Prior(0.0, np.zeros(1), np.array([1.8]), np.array([[0.04]]), np.array([0.01]))
@@ -92,7 +92,7 @@ def test_filters_are_those_of_the_plain_filter(clock: Model, name: str) -> None:
         estimator = load(name, ESTIMATORS, "estimator")(Setup(candidate, 0.1, ("k",), ("y",)))
         assert [f.function.is_a("External") for f in vars(estimator).values() if isinstance(f, FastCall)] == [
             candidate.compiled
-        ] * (1 if name == "ekf" else 3)
+        ] * functions
         runs.append(run_estimator(estimator, estimator.init(prior), samples)[1])
     same_estimates(*runs)
 

@@ -1,0 +1,7 @@
+"""Closed loops with plants that differ from the controller's model: `python -m benchmarks.mismatched_plants`.
+
+Map
+---
+plants.py    Thirty plants, drawn from seeds that were fixed before anything was tuned on them.
+__main__.py  The command.
+"""
