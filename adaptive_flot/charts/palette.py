@@ -37,7 +37,8 @@ NAMED = {
 """(light, dark) of what is no contender."""
 STATES = 6
 
-_KNOWN = {"rpem": 0, "ekf": 1, "mhe": 2, "imm": 3, "pem": 4, "rpem_full": 7, "rpem_discovery": 5, "fixed": GREY}
+_COLOURED = ("rpem", "ekf", "mhe", "imm", "pem", "rpem_discovery", "adaptive_imm", "rpem_full")
+_KNOWN = {name: slot for slot, name in enumerate(_COLOURED)} | {"fixed": GREY}
 ORACLE = "oracle"
 """Estimator that is shown the truth: nearly black, as the truth is black."""
 _USUAL_CONTROLLERS = ("schedule", "economic_mpc")

@@ -13,10 +13,17 @@ TALLEST = 6000
 LARGEST = 2_000_000
 """Size of a page [bytes]."""
 CHECKS = Path(__file__).with_name("checks.js").read_text(encoding="utf-8")
-DRAW_ALL = """
+SETTLED = """
+    new Promise((done) => {
+      const wait = (frames) => requestAnimationFrame(() => (frames ? wait(frames - 1) : setTimeout(done)));
+      wait(4);
+    })
+"""
+"""Four frames on: what observers of sizes and of places on the screen have to do is done by then, however slow."""
+DRAW_ALL = f"""
     document.querySelectorAll('details').forEach((part) => part.open = true);
     if (window.AdaptiveFlotChart) AdaptiveFlotChart.all();
-    new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 50))))
+    {SETTLED}
 """
 
 
@@ -34,7 +41,7 @@ def problems(browser: Browser, page: Path) -> list[str]:
     for width in WIDTHS:
         tab.look(width, 900, dark=False)
         tab.load(page)
-        tab.run("new Promise((done) => setTimeout(done, 50))")
+        tab.run(SETTLED)
         height = tab.run("document.documentElement.scrollHeight")
         found += [f"{width} px wide: {height} px tall"] if height > TALLEST else []
         for dark in (False, True):

@@ -12,7 +12,7 @@ from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Fact, Section, Table
 from tests.browser.chromium import Browser, Tab
-from tests.browser.pages import DRAW_ALL, errors, is_dark, opened
+from tests.browser.pages import DRAW_ALL, SETTLED, errors, is_dark, opened
 
 TIME = np.arange(1.0, 1001.0)
 
@@ -49,7 +49,7 @@ def tab(browser: Browser, page: Path) -> Tab:
     found = opened(browser)
     found.look(1200, 900, dark=False)
     found.load(page)
-    found.run("new Promise((done) => setTimeout(done, 100))")
+    found.run(SETTLED)
     return found
 
 
@@ -71,7 +71,7 @@ def drag(tab: Tab, start: float, end: float) -> None:
     tab.call("Input.dispatchMouseEvent", type="mousePressed", x=x + start * width, **at)
     tab.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + end * width, buttons=1, **at)
     tab.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + end * width, **at)
-    tab.run("new Promise((done) => setTimeout(done, 50))")
+    tab.run(SETTLED)
 
 
 def test_a_folded_chart_is_drawn_when_it_is_unfolded(tab: Tab) -> None:
@@ -99,7 +99,7 @@ def test_the_pointer_tells_every_value_at_its_time(tab: Tab) -> None:
         "(() => { const b = document.querySelector('.u-over').getBoundingClientRect(); return [b.x, b.y, b.width]; })()"
     )
     tab.call("Input.dispatchMouseEvent", type="mouseMoved", x=box[0] + 0.7 * box[2], y=box[1] + 20)
-    tab.run("new Promise((done) => setTimeout(done, 50))")
+    tab.run(SETTLED)
     tips = tab.run("[...document.querySelectorAll('.tip:not([hidden])')].map((tip) => tip.innerText.split(/\\s+/))")
     assert len(tips) == 3, "the panels of a chart, and its strips"
     told = dict(zip(tips[0][3::2], tips[0][4::2], strict=False))
@@ -135,7 +135,7 @@ def test_dark_by_the_system_and_by_the_switch(tab: Tab) -> None:
 def test_the_list_of_contents_opens_a_chapter(tab: Tab) -> None:
     assert not tab.run("document.getElementById('more').open")
     tab.run("document.querySelector('a[href=\"#more\"]').click()")
-    tab.run("new Promise((done) => setTimeout(done, 50))")
+    tab.run(SETTLED)
     assert tab.run("document.getElementById('more').open")
 
 
@@ -157,7 +157,7 @@ def test_print_shows_all_chapters_and_crops_nothing(tab: Tab) -> None:
     tab.call("Emulation.setEmulatedMedia", media="print")
     tab.look(718, 1000, dark=True)
     tab.call("Emulation.setEmulatedMedia", media="print")
-    tab.run("new Promise((done) => setTimeout(done, 100))")
+    tab.run(SETTLED)
     assert tab.run("document.getElementById('more').open") and len(ranges(tab)) == 5
     wide = tab.run("Math.max(...[...document.querySelectorAll('main *')].map((e) => e.getBoundingClientRect().right))")
     assert wide <= 718 and not is_dark(tab)

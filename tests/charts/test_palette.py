@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from adaptive_flot.charts.palette import GREY, NAMED, SLOTS, contender_slots, style_sheet
+from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS
 
 MANY = [("economic_mpc", e) for e in ("rpem", "ekf", "mhe", "fixed", "oracle")] + [("pi", "fixed"), ("hold", "fixed")]
 
@@ -22,6 +23,13 @@ def test_a_shipped_estimator_has_the_same_colour_on_every_page() -> None:
         assert contender_slots([who])[who] == everyone[who]
         assert contender_slots([("", who[1])])["", who[1]] == everyone[who]
     assert everyone["economic_mpc", "fixed"] == GREY
+
+
+def test_every_shipped_estimator_has_a_colour_of_its_own() -> None:
+    shipped = [("", name) for name in (*ESTIMATORS, *BATCH_ESTIMATORS)]
+    slots = contender_slots(shipped)
+    assert len(set(slots.values())) == len(shipped)
+    assert all(contender_slots([who])[who] == slots[who] for who in shipped)
 
 
 def test_no_two_contenders_of_a_page_share_a_colour_and_order_does_not_matter() -> None:
