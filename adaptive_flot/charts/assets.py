@@ -7,7 +7,7 @@ from importlib.resources import files
 
 from adaptive_flot.charts.palette import style_sheet
 
-SCRIPTS = ("uplot/uPlot.iife.min.js", "chart.js", "lines.js", "strips.js")
+SCRIPTS = ("uplot/uPlot.iife.min.js", "text.js", "chart.js", "lines.js", "strips.js")
 STYLES = ("uplot/uPlot.min.css", "chart.css")
 
 

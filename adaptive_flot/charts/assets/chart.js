@@ -8,6 +8,7 @@
  * The block is described in adaptive_flot/charts/__init__.py. No text of it is ever read as HTML. */
 const AdaptiveFlotChart = (() => {
   "use strict";
+  const { element, decode, number, moment } = AdaptiveFlotText;
   const MOST_LIVE = 20000; // points of a line that grows
   const AXIS = 58; // width of the vertical axis [px]
   const STEPS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400];
@@ -18,38 +19,6 @@ const AdaptiveFlotChart = (() => {
   let colours = {};
 
   const colour = (name) => (colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim());
-
-  function element(tag, className, text = "") {
-    const made = document.createElement(tag);
-    made.className = className;
-    made.textContent = text;
-    return made;
-  }
-
-  function decode(c) {
-    const { o, s } = c;
-    if (c.v === undefined) return Array.from({ length: c.n }, (_, k) => o + s * k);
-    return c.v.map((k) => (k === null ? null : o + s * k));
-  }
-
-  function number(value, span = 0) {
-    if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-    const digits = span > 0 ? decimals(span) : null;
-    const text = digits === null ? String(Number(value.toPrecision(5))) : value.toFixed(digits);
-    return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
-  }
-
-  /* Decimals in which steps of a size can be told, as 0.25 needs two. */
-  function decimals(step) {
-    let digits = 0;
-    while (digits < 8 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6 * 10 ** digits * step) digits++;
-    return digits;
-  }
-
-  function moment(x, value) {
-    const own = number(Number((value / x.seconds).toPrecision(6)));
-    return `${x.label} ${own}${x.unit === "–" ? "" : " " + x.unit}`;
-  }
 
   /* The axes and the pointer that panels of lines and of strips have in common. */
   function frame(chart, height, last, more) {
@@ -278,5 +247,5 @@ const AdaptiveFlotChart = (() => {
   }
 
   const all = () => document.querySelectorAll("div.chart").forEach(draw);
-  return { start, make, recolour, all, charts, kinds: {}, parts: { frame, tip, colour, decode, number } };
+  return { start, make, recolour, all, charts, kinds: {}, parts: { frame, tip, colour } };
 })();

@@ -1,7 +1,8 @@
 /* Lines over a common axis: a kind of panel of chart.js. */
 AdaptiveFlotChart.kinds.lines = (chart, spec, last) => {
   "use strict";
-  const { frame, tip, colour, decode, number } = AdaptiveFlotChart.parts;
+  const { frame, tip, colour } = AdaptiveFlotChart.parts;
+  const { decode, number } = AdaptiveFlotText;
   const FAR = 2000; // rows from the pointer within which a value is looked for
   const axes = spec.x.map(decode);
   const tables = axes.map((x) => [x]);

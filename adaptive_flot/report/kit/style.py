@@ -75,11 +75,6 @@ def _look() -> AbstractContextManager[None]:
     return matplotlib.rc_context(settings)
 
 
-def svg_uri(figure: Figure) -> str:
-    """Return a figure as an SVG data URI, for the `src` of an image."""
-    return _svg_uri(_saved(figure, "svg"))
-
-
 def png_uri(figure: Figure, dpi: int = 160) -> str:
     """Return a figure as a PNG data URI; `dpi` in dots per inch."""
     return "data:image/png;base64," + base64.b64encode(_saved(figure, "png", dpi=dpi)).decode("ascii")
