@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
 from adaptive_flot.discovery.assessment.verification import changes
+from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -19,7 +20,7 @@ from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.record.screening import Screening, screen
-from adaptive_flot.discovery.results import Discovery, State, Verdict
+from adaptive_flot.discovery.results import Discovery, Judgement, State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
 from adaptive_flot.discovery.search.search import search
@@ -34,6 +35,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     contradiction_at_the_end,
     last_report_rows,
     noise_from_row_to_row,
+    unexplained,
 )
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.assumed_start import wrong_start
@@ -126,6 +128,7 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
         reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
         return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
+    problem = replace(problem, site_sizes=Responses(problem, base).sizes)
     noise = noise_by_differences(problem.measured)
     start = base.initial_state, parameters_of(base)
     said = wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
@@ -209,6 +212,8 @@ def heed_report(state: State) -> State:
     if against:
         judgement = replace(judgement, word="abstain", members=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
+    if judgement.word == "none" and (left := unexplained(error, noise)):
+        judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
     return replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
 
 

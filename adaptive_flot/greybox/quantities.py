@@ -14,6 +14,8 @@ from adaptive_flot.errors import ModelError, RangeError
 FloatArray = NDArray[np.float64]
 ParameterRole = Literal["fixed", "estimated"]
 Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
+ARBITRARY_ZERO = ("K", "degC", "degF")
+"""Units of temperature: the same record in any of them says the same."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,11 @@ class Quantity:
     scale: float = 1.0
     usual: tuple[float, float] | None = None
     movable: bool = True
+
+    @property
+    def zero_is_arbitrary(self) -> bool:
+        """Whether zero is no less of it than any other value, so that shares of a value mean nothing: a temperature."""
+        return self.unit in ARBITRARY_ZERO
 
     @property
     def column(self) -> str:

@@ -13,6 +13,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,
     last_report_rows,
+    unexplained,
 )
 from adaptive_flot.greybox import Effect
 from tests.discovery.heated import heated_tank
@@ -97,3 +98,24 @@ def test_the_stage_turns_a_contradicted_name_into_an_abstention(draught: Discove
     assert heed_report(state).judged.word == "named"
     exchanged = heed_report(replace(state, before=draught.after, after=draught.before))
     assert exchanged.judged.word == "abstain" and "larger" in exchanged.contradiction
+
+
+def test_none_asks_for_a_residual_at_the_level_of_a_noise_that_no_model_has_fitted() -> None:
+    """A box whose free run was off by 54 times its noise was told to be explained."""
+    far, near = _change(5.77, 5.4, 0.0, 0.1), _change(0.2, 0.2, 0.0, 0.1)
+    assert "5.4 K (54 times)" in unexplained([far], NOISE)
+    assert unexplained([near], NOISE) == "" == unexplained([far], np.array([0.0]))
+
+
+def test_the_stage_turns_a_none_that_explains_nothing_into_an_abstention(draught: Discovery) -> None:
+    """The plain model of a tank in a draught leaves ten times its noise; the extended one nothing but noise."""
+    assert draught.problem is not None and draught.before is not None and draught.after is not None
+    nothing = Judgement("none", None, (), (), 10.0)
+    state = State(
+        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
+        problem=draught.problem, base=draught.before, search=draught.search, judgement=nothing,
+        before=draught.before, after=draught.before,
+    )  # fmt: skip
+    left = heed_report(state)
+    assert left.judged.word == "abstain" and "times)" in left.certain
+    assert heed_report(replace(state, after=draught.after)).judged.word == "none"

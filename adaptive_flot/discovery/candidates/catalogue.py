@@ -11,7 +11,7 @@ from adaptive_flot.discovery.candidates.dynamics import late, limited
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.spline import knots_of, spline_values, through
 from adaptive_flot.discovery.candidates.variant import Variant
-from adaptive_flot.discovery.record.screening import LEAST_RANGE
+from adaptive_flot.discovery.record.screening import LEAST_OF_SCALE, LEAST_RANGE
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -105,7 +105,12 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
     elif driver == "saturation":
         yield from limited(site, responses)
     else:
-        yield from _on_signal(site, driver, responses.drivers[driver], offset, responses.fit.model.names("states"))
+        model = responses.fit.model
+        quantity = next(q for q in (*model.inputs, *model.states, *model.signals) if q.name == driver)
+        if quantity.zero_is_arbitrary:
+            yield from _on_signed(site, driver, responses.drivers[driver], offset, LEAST_OF_SCALE * quantity.scale)
+        else:
+            yield from _on_signal(site, driver, responses.drivers[driver], offset, model.names("states"))
 
 
 def _otherwise(variant: Variant, site: Site) -> Variant:
@@ -152,7 +157,7 @@ def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states
     reference = float(np.median(values))
     spread = float(np.quantile(values, 0.98) - np.quantile(values, 0.02))
     if not reference > 0:
-        yield from _on_signed(site, driver, values, offset)
+        yield from _on_signed(site, driver, values, offset, LEAST_RANGE * float(np.mean(np.abs(values))))
         return
     if not spread > LEAST_RANGE * reference:
         return
@@ -168,10 +173,13 @@ def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states
         yield from _spills(site, driver, values)
 
 
-def _on_signed(site: Site, driver: str, values: FloatArray, offset: bool) -> Iterator[Variant]:
-    """A straight line and a curve over a signal that is off most of the time, or changes its sign: no power law."""
+def _on_signed(site: Site, driver: str, values: FloatArray, offset: bool, least: float) -> Iterator[Variant]:
+    """A straight line and a curve over a signal of which no power makes sense, if it spreads by more than the `least`.
+
+    It is off most of the time, changes its sign, or is a temperature.
+    """
     low, high = (float(q) for q in np.quantile(values, [0.02, 0.98]))
-    if not high - low > LEAST_RANGE * float(np.mean(np.abs(values))):
+    if not high - low > least:
         return
     yield _curve(site, driver, values, (low, high), offset)
     knots = _knots(values)

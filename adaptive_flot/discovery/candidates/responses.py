@@ -8,6 +8,7 @@ zero this is exact: a driver's own feedback is of second order.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -125,9 +126,31 @@ class Responses:
         self.site_values = {s.name: values[j] for j, s in enumerate(model.sites)}
 
     def usual(self, site: str) -> float:
-        """Typical size of the value at a site: the median, or the mean of what is off most of the time."""
+        """Typical size of the value at a site: the median, or the mean of what is off most of the time.
+
+        Of a site whose own value is zero, what moves the outputs by as much as they move (see `sizes`).
+        """
         size = np.abs(self.site_values[site])
-        return float(np.median(size)) or float(np.mean(size))
+        return float(np.median(size)) or float(np.mean(size)) or self.sizes[site]
+
+    @cached_property
+    def sizes(self) -> dict[str, float]:
+        """Ordinary size of a change at each site, in its unit: what moves an output by as much as it moves.
+
+        With the responses r_j (N,) of the outputs y_j to a constant change by one unit::
+
+            size = min over j of sd(y_j) / rms(r_j)
+
+        It knows nothing of where a scale has its zero, nor of its unit; zero where no output responds.
+        """
+        ones = np.ones(len(self.problem.record))
+        responses = self.of([TimeProfile(s, ones, True) for s in self.sites])
+        spread = np.nan_to_num(np.nanstd(self.problem.measured, axis=0))[:, None]
+        size = np.sqrt(np.mean(responses**2, axis=0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            each = np.where((size > 0) & (spread > 0), spread / size, np.inf)
+        least = np.min(each, axis=0)
+        return dict(zip(self.sites, np.where(np.isfinite(least), least, 0.0).tolist(), strict=True))
 
     def _nuisance(self) -> FloatArray:
         directions = self.fit.directions

@@ -56,7 +56,8 @@ class Unknowns:
         self.base = np.array([start.get(p.name, p.value) for p in model.parameters])
         self.x0 = self._first_state(like)
         self.q = len(self.names)
-        self.scale = np.array([p.scale for p in parameters])
+        sized = coefficient_scales(model, problem.site_sizes)
+        self.scale = np.array([sized.get(p.name, p.scale) for p in parameters])
         low = [max(p.lower, bounds.get(p.name, (-np.inf, np.inf))[0]) for p in parameters]
         high = [min(p.upper, bounds.get(p.name, (-np.inf, np.inf))[1]) for p in parameters]
         shapes = {e.parameter(c.name) for e in model.effects for c in e.terms if c.is_shape}
@@ -132,6 +133,21 @@ class Unknowns:
     def initial_gradient(self) -> FloatArray:
         """Derivative of the initial state by z (nx, q + r)."""
         return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
+
+
+def coefficient_scales(model: Model, sizes: Mapping[str, float]) -> dict[str, float]:
+    """Scale of each coefficient that is given in the unit of its site, by full name: an ordinary change there.
+
+    A form knows neither its site nor its unit: a tenth of a kelvin may be much, a tenth of a watt is nothing.
+    """
+    modes = {site.name: site.mode for site in model.sites}
+    scales = {}
+    for effect in model.effects:
+        offset, size = (effect.mode or modes[effect.site]) == "offset", sizes.get(effect.site, 0.0)
+        for c in effect.terms:
+            if size > 0 and (c.unit == "value" or (c.unit == "g" and offset)):
+                scales[effect.parameter(c.name)] = size
+    return scales
 
 
 def _along(scales: Sequence[float]) -> FloatArray:

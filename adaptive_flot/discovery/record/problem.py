@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -46,6 +46,8 @@ class Problem:
     whiten
         Whether residuals are whitened and clipped. Not where model error outweighs the noise by far: there a noise
         model would explain the error away, and its largest values are the physics that is looked for.
+    site_sizes
+        Ordinary size of a change at each site, in its unit (see `Responses.sizes`); empty before the first fit.
     nodes
         Rows that a search simulates, where that makes no difference to speak of; None for all.
     """
@@ -58,6 +60,7 @@ class Problem:
     floor: FloatArray
     whiten: bool = True
     nodes: Nodes | None = None
+    site_sizes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def clip(self) -> float:

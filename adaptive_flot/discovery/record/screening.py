@@ -11,7 +11,7 @@ from adaptive_flot.discovery.record.noise import is_dense
 from adaptive_flot.discovery.record.problem import BoolArray
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.wrong_unit import is_far_outside
-from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
 FEWEST_ROWS = 200
 FROZEN_ROWS = 30
@@ -24,6 +24,8 @@ LEAST_MOVE = 5e-3
 """Where no input spreads by this share of its mean, nothing moves."""
 LEAST_RANGE = 0.02
 """One that spreads by less than this share of its mean tells nothing about a dependence."""
+LEAST_OF_SCALE = 0.1
+"""The same for a temperature, as a share of its scale: shares of its value depend on the unit."""
 OUTLIER_SHARE = 0.15
 """Share of samples far outside from which a signal is an outlier storm."""
 NEIGHBOURS = 9
@@ -81,8 +83,9 @@ def screen(record: Dataset, model: Model) -> Screening:
         reasons.append("no output has a usable measurement")
     elif usable < FEWEST_ROWS:
         reasons.append(f"only {usable} usable samples; {FEWEST_ROWS} are needed")
-    moving = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if _moves(u, LEAST_MOVE)]
-    still = [q.name for q, u in zip(model.inputs, record.inputs.T, strict=True) if not _moves(u, LEAST_RANGE)]
+    inputs = list(zip(model.inputs, record.inputs.T, strict=True))
+    moving = [q.name for q, u in inputs if _moves(u, LEAST_MOVE, q)]
+    still = [q.name for q, u in inputs if not _moves(u, LEAST_RANGE, q)]
     if not moving:
         reasons.append(f"no input moves ({', '.join(still)}): nothing that depends on them can be told from a constant")
     elif still:
@@ -128,8 +131,10 @@ def runs_of(mask: BoolArray, least: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
 
 
-def _moves(u: FloatArray, share: float) -> bool:
+def _moves(u: FloatArray, share: float, quantity: Quantity) -> bool:
     spread = float(np.quantile(u, 0.98) - np.quantile(u, 0.02))
+    if quantity.zero_is_arbitrary:
+        return spread > LEAST_OF_SCALE * quantity.scale
     return spread > share * max(float(np.mean(np.abs(u))), 1e-300)
 
 

@@ -139,14 +139,15 @@ def fixed_coefficients(effect: Effect) -> dict[str, float]:
 
 
 def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:
-    """Start values inside their ranges, and a change at a site of at most a factor of two and a half."""
+    """Start values inside their ranges, and a change at a site by at most a factor of two and a half."""
     inside = {}
+    factor = (effect.mode or next(s.mode for s in model.sites if s.name == effect.site)) == "factor"
     for c in effect.terms:
         name = effect.parameter(c.name)
         if name in start:
             parameter = model.parameters[model.index("parameters", name)]
             value = float(np.clip(start[name], parameter.lower, parameter.upper))
-            inside[name] = float(np.clip(value, -0.9, 0.9)) if c.is_level else value
+            inside[name] = float(np.clip(value, -0.9, 0.9)) if c.is_level and factor else value
     return inside
 
 

@@ -21,6 +21,9 @@ WORSE = 0.02
 """Share by which an error may grow without being worse, where chance could explain it."""
 MUCH_WORSE = 0.1
 """Share by which an error is worse whatever its interval: a wide interval does not excuse it."""
+FAR_FROM_NOISE = 5.0
+"""An error of so many times the noise is not explained, whatever the noise model says. Noise that is allowed to be
+coloured has up to three times what its differences show."""
 AT_NOISE = 1.25
 """An error of so many times the noise is the noise: what it does there contradicts nothing."""
 
@@ -50,6 +53,17 @@ def contradiction(judgement: Judgement, changes: Sequence[OutputChange], noise: 
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""
+
+
+def unexplained(changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """Outputs whose error after is far from their noise from row to row, in words; empty where none is.
+
+    A record is not explained because its noise model has swallowed what is wrong: the noise by differences knows no
+    model. Arguments are as in `contradiction`.
+    """
+    far = [(c, s) for c, s in zip(changes, noise, strict=True) if s > 0 and c.after > FAR_FROM_NOISE * s]
+    said = ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({c.after / s:.0f} times)" for c, s in far)
+    return f"The error is far above the noise from row to row: {said}." if far else ""
 
 
 def _is_worse(change: OutputChange, noise: float) -> bool:

@@ -52,6 +52,8 @@ def reason_words(
             "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
             "noise would, or what it removes does not stand on rows that did not choose it."
         )
+    if judgement.word == "abstain" and judgement.best is None:
+        return "Something is missing, and no effect at any site, with any driver, explains it."
     evidence = f"{result.verification}" if result.verification else ""
     said = "; and ".join(
         f"{e.effect.site} depends on {e.effect.driver}" + (f" ({e.meaning})" if e.meaning else "") for e in effects
