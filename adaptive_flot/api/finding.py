@@ -186,6 +186,7 @@ def discover(
     limits: Mapping[str, tuple[float, float]] | None = None,
     tag_map: AnyMap | None = None,
     processes: int | None = None,
+    budget: float | None = None,
     progress: bool = False,
 ) -> Finding: ...
 
@@ -222,6 +223,7 @@ def discover(
     limits: Mapping[str, tuple[float, float]] | None = None,
     tag_map: AnyMap | None = None,
     processes: int | None = None,
+    budget: float | None = None,
     progress: bool = False,
 ) -> Finding | Change:
     """Find what physical effect a model lacks, from a measured record; or what has changed since a reference.
@@ -241,6 +243,8 @@ def discover(
         Map file (or `TagMap`) of exports: from their tags to the model's quantities.
     processes
         Fits that run at once; default as many as there are cores.
+    budget
+        Seconds after which the search in a single record ends with what it has come to.
     progress
         Show the stages in a terminal.
 
@@ -263,6 +267,8 @@ def discover(
     several = len(records) > 1 or bool(references)
     if several and limits:
         raise ModelError("limits: no test is proposed for several records; leave them out")
+    if several and budget is not None:
+        raise ModelError("budget: several records are judged as a whole; leave it out")
     made, origin = read_model(model)
     sources = (*(file for r in (*records, *references) for file in record_files(r, tag_map)), *origin.files)
     tags = read_map(tag_map)
@@ -274,7 +280,9 @@ def discover(
             return Change(name, compared, origin, sources)
         one = records[0]
         if isinstance(one, Dataset):
-            searched = search_record(made, one, limits=limits, processes=workers, progress=advance)
+            searched = search_record(made, one, limits=limits, processes=workers, budget=budget, progress=advance)
         else:
-            searched = discover_file(one, made, limits=limits, tag_map=tags, processes=workers, progress=advance)
+            searched = discover_file(
+                one, made, limits=limits, tag_map=tags, processes=workers, budget=budget, progress=advance
+            )
     return Finding(name, searched, origin, sources)

@@ -36,6 +36,9 @@ def discover(
             "default where the record has been."
         ),
     ] = None,
+    budget: Annotated[
+        float | None, typer.Option(min=1.0, help="Seconds after which the search ends with what it has come to.")
+    ] = None,
     report: Annotated[bool, typer.Option(help="Draw the report page too; a batch of records may do without.")] = True,
 ) -> None:
     """Find what physical effect a model lacks, from a measured record, and show the error before and after.
@@ -61,6 +64,8 @@ def discover(
     limits, several = read_limits(limit or ()), bool(references) or len(data) > 1
     if several and limits:
         raise ModelError("--limit: no test is proposed for several records; leave it out")
+    if several and budget is not None:
+        raise ModelError("--budget: several records are judged as a whole; leave it out")
     tag_map = None if map_ is None else load_tag_map(map_)
     made = make_model(model, cell=cell, folder=first.parent)
     workers, page = processes or available_processes(), folder / "report.html"
@@ -70,7 +75,9 @@ def discover(
             compared = discover_records(data, made, references, tag_map=tag_map, processes=workers, progress=progress)
             verdict = compared.verdict
         else:
-            searched = discover_file(first, made, limits=limits, tag_map=tag_map, processes=workers, progress=progress)
+            searched = discover_file(
+                first, made, limits=limits, tag_map=tag_map, processes=workers, budget=budget, progress=progress
+            )
             verdict = searched.verdict
     for target in filter(None, (folder / "verdict.json", json)):
         write_json(target, verdict.as_dict())

@@ -42,6 +42,9 @@ from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
+SEARCH_SHARE = 0.7
+"""Share of a budget that the search may take; the rest is for the last fits, the report and the proposed test."""
+
 
 @one_thread()
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a run that leaves all bounds is no fit
@@ -53,6 +56,7 @@ def discover(
     report_record: Dataset | None = None,
     limits: Mapping[str, tuple[float, float]] | None = None,
     processes: int = 1,
+    budget: float | None = None,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
     """Find what physical effect a model lacks, from a measured record.
@@ -73,8 +77,10 @@ def discover(
         stays where the record has been.
     processes
         Fits that run at once.
+    budget
+        Seconds after which the search ends with what it has come to; None for as long as it takes.
     progress
-        Called with a word for each stage.
+        Called with a word for each stage and each fit.
 
     Returns
     -------
@@ -93,6 +99,9 @@ def discover(
         input_range(record.inputs, model.inputs, limits)  # a wrong limit is refused before the search
     names = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
     state = State(model, names, report_record, limits, processes, progress, Screening(record, (), ()))
+    if budget is not None:
+        now = time.monotonic()
+        state = replace(state, ends=now + budget, search_ends=now + SEARCH_SHARE * budget)
     for stage in STAGES:
         outcome = stage(state)
         if isinstance(outcome, Verdict):
@@ -117,7 +126,7 @@ def split_rows(state: State) -> State:
     state.progress("fit the model as it is")
     cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
     problem, screening = split_record(state.screening, state.model, state.adapted, cycle)
-    return replace(state, problem=problem, screening=screening)
+    return replace(state, problem=replace(problem, deadline=state.search_ends), screening=screening)
 
 
 def fit_model_as_it_is(state: State) -> State | Verdict:
@@ -168,7 +177,7 @@ def search_at_once(state: State) -> State:
 def compare_with_common_nuisance(state: State) -> State:
     """Compare the leading alternatives anew, with what all of them lack added to each."""
     problem, result = state.searched
-    rivals = undecided_rivals(result) if problem.whiten else ()
+    rivals = undecided_rivals(result) if problem.whiten and not problem.time_is_up else ()
     if not rivals:
         return state
     state.progress("compare with a common nuisance")
@@ -179,13 +188,20 @@ def judge_alternatives(state: State) -> State:
     """Turn the ranking into one of six words; what is named must itself stand on the confirm split."""
     problem, result = state.searched
     result, judgement = held_up(problem, result, judge(result))
-    return replace(state, search=result, judgement=judgement)
+    said = state.screening.notes
+    if problem.time_is_up:
+        said = (*said, "the budget ended the search: further effects and freer forms were not all tried")
+    if not result.rounds[0].compared:
+        judgement = replace(judgement, word="abstain", members=())
+    screening = replace(state.screening, notes=said)
+    return replace(state, screening=screening, search=result, judgement=judgement)
 
 
 def fit_without_report(state: State) -> State:
     """Fit the plain model and the best alternative to all rows but the report split, run at every row."""
     state.progress("fit once more, without the report split")
     problem, base = state.fitted
+    problem = replace(problem, deadline=state.ends)
     splits = ("estimate", "confirm")
     fitter, every = Fitter(problem, splits), Fitter(replace(problem, nodes=None), splits)
 
@@ -220,7 +236,7 @@ def heed_report(state: State) -> State:
 def plan_test(state: State) -> State:
     """Choose the input moves that would tell the leading alternatives apart, where there are several."""
     judgement, (problem, result) = state.judged, state.searched
-    if judgement.best is None or judgement.word == "none":
+    if judgement.best is None or judgement.word == "none" or time.monotonic() > state.ends:
         return state
     state.progress("plan a test")
     compared = [

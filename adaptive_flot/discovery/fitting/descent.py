@@ -156,6 +156,8 @@ class Descent:
         shaped = self.unknowns.shaped
         damping, exact = SHAPE_DAMPING if shaped else FIRST_DAMPING, True
         for _ in range(steps):
+            if self.problem.time_is_up:
+                break
             A, b = self._system(z, predicted, slope, noise)
             gain_step = self._tried(z, value, noise, self._step(z, A, b), damping)
             if gain_step is None and exact:

@@ -74,6 +74,8 @@ class Fitter:
         Coloured noise explains a slow misfit away, and a search may rest there; each start is with white noise again.
         """
         for _ in range(MOST_RESTARTS):
+            if self.problem.time_is_up:
+                return fit
             again = self.fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2)
             if again is None or again.loss > fit.loss - least:
                 return fit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -48,6 +49,8 @@ class Problem:
         model would explain the error away, and its largest values are the physics that is looked for.
     site_sizes
         Ordinary size of a change at each site, in its unit (see `Responses.sizes`); empty before the first fit.
+    deadline
+        When searches and fits are to end, by `time.monotonic` [s]: they keep what they have come to.
     nodes
         Rows that a search simulates, where that makes no difference to speak of; None for all.
     """
@@ -61,6 +64,12 @@ class Problem:
     whiten: bool = True
     nodes: Nodes | None = None
     site_sizes: Mapping[str, float] = field(default_factory=dict)
+    deadline: float = float("inf")
+
+    @property
+    def time_is_up(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.monotonic() > self.deadline
 
     @property
     def clip(self) -> float:

@@ -75,11 +75,14 @@ class Round:
         Penalised score that noise alone passes once in a hundred records.
     alternatives
         Full fits, best first.
+    compared
+        Whether every finalist was fitted to the end, before the time was up.
     """
 
     scores: tuple[Score, ...]
     threshold: float
     alternatives: tuple[Alternative, ...]
+    compared: bool = True
 
 
 @dataclass(frozen=True)

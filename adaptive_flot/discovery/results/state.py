@@ -36,6 +36,8 @@ class State:
         Called with a word for each stage.
     screening
         The record, and from the first stage on what in it can not be used.
+    ends, search_ends
+        When everything, and when the search, is to end, by `time.monotonic` [s].
     problem, base
         The record in splits, and the fit of the model as it is to the estimation split.
     detection
@@ -61,6 +63,8 @@ class State:
     processes: int
     progress: Callable[[str], None]
     screening: Screening
+    ends: float = float("inf")
+    search_ends: float = float("inf")
     problem: Problem | None = None
     base: Fit | None = None
     detection: Detection | None = None

@@ -73,6 +73,8 @@ class JointFits:
             if not wanted:
                 break
             ranked = self._fits(list(wanted.values()), done)
+            if not ranked:
+                break  # the time is up
             ranked_rounds.append([a for a, _ in ranked])
             kept = [c for _, c in ranked[:BEAM]]
         return ranked_rounds
@@ -111,6 +113,8 @@ class JointFits:
         return variants
 
     def _from_start(self, combination: Combination, k: int, steps: int) -> Fit | None:
+        if self.problem.time_is_up:
+            return None
         variants = self._variants(combination, k)
         rng = np.random.default_rng([k, 7])
         effects = [v.variant.effect for v in variants]

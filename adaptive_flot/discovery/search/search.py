@@ -76,7 +76,7 @@ def search(
         progress("what is left")
         scorer, _ = scorer_of(problem, best.fit)
         left = what_is_left(scorer, threshold_of(scorer))
-        if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left):
+        if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left) or problem.time_is_up:
             break
         beam = _beam(rounds[-1], best, BEAM)
         rounds.append(_round(problem, fitter, base, [scorer], beam, processes, progress))
@@ -154,6 +154,7 @@ def _round(
     threshold = max(map(threshold_of, scorers))
     scores = tuple(scorers[0].scores())
     alternatives: list[Alternative] = []
+    compared = True
     for k, before in enumerate(beam):
         if before is not None and k:
             scorers = [scorer_of(problem, before.fit)[0]]
@@ -165,13 +166,15 @@ def _round(
             wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
             linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")
-        alternatives += refit(fitter, base, linearisations, before, processes, lambda: progress("fit"))
-    if alternatives and beam[0] is not None:
+        fitted, all_of_them = refit(fitter, base, linearisations, before, processes, lambda s: progress(f"fit {s}"))
+        alternatives += fitted
+        compared = compared and all_of_them
+    if alternatives and beam[0] is not None and not problem.time_is_up:
         alternatives += simpler(fitter, base, min(alternatives, key=lambda a: a.fit.bic))
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
     for a in sorted(alternatives, key=lambda a: a.fit.bic):
         unique.setdefault(frozenset(a.names), a)
-    return Round(scores, threshold, _without_flat(problem, base, list(unique.values())))
+    return Round(scores, threshold, _without_flat(problem, base, list(unique.values())), compared)
 
 
 def _without_flat(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tuple[Alternative, ...]:

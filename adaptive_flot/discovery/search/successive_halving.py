@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
@@ -63,22 +64,25 @@ def refit(
     linearisations: Sequence[ScoredLinearisation],
     before: Alternative | None = None,
     processes: int = 1,
-    done: Callable[[], None] = lambda: None,
-) -> list[Alternative]:
-    """Fit each shortlisted candidate on top of `before` (the base model by default), best first.
+    done: Callable[[str], None] = lambda what: None,
+) -> tuple[list[Alternative], bool]:
+    """Fit each shortlisted candidate on top of `before` (the base model by default), best first; and whether all were.
+
+    They were not where the time was up before every finalist had been fitted to the end.
 
     A candidate may start from several linearisations; only that in which it comes furthest in the first rung goes on.
     """
     halving = _SuccessiveHalving(fitter, base, linearisations, before, processes, done)
     first = halving.first()
     last = halving.last(first)
+    compared = not fitter.problem.time_is_up
     followers = halving.followers(last)
     bent = halving.bent(followers, last)
     best = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
     best = best_of_each([*halving.trimmed(best[:MOST_FREED]), *best])
     ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(best, last), *best])]
     exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
-    return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic)
+    return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic), compared
 
 
 class _SuccessiveHalving:
@@ -91,7 +95,7 @@ class _SuccessiveHalving:
         linearisations: Sequence[ScoredLinearisation],
         before: Alternative | None,
         processes: int,
-        done: Callable[[], None],
+        done: Callable[[str], None],
     ) -> None:
         self.fitter, self.base, self.before, self.processes, self.done = fitter, base, before, processes, done
         self.linearisations = [
@@ -104,9 +108,16 @@ class _SuccessiveHalving:
     def _run(self, jobs: list[Job], steps: int = MOST_STEPS) -> list[FittedJob]:
         def work(k: int) -> Fit | None:
             job = jobs[k]
+            if self.fitter.problem.time_is_up:
+                return None
             return fit_variant(self.fitter, self._start(job.linearisation), job.score, steps, job.warm, job.drawn)
 
-        fits = parallel_map(work, range(len(jobs)), self.processes, self.done)
+        ended = count(1)
+
+        def tell() -> None:
+            self.done(f"{next(ended)} of {len(jobs)}: {_words(jobs)}")
+
+        fits = parallel_map(work, range(len(jobs)), self.processes, tell)
         done = [
             FittedJob(
                 job.linearisation,
@@ -198,6 +209,12 @@ class _SuccessiveHalving:
         bound = {fitted.alternative.names: fitted.alternative.fit for fitted in best}
         problem = self.fitter.problem
         return [r for r in free if worth_its_freedom(problem, bound[r.alternative.names], r.alternative.fit)]
+
+
+def _words(jobs: Sequence[Job], most: int = 2) -> str:
+    """Names of what a rung fits, the first few of them."""
+    names = list(dict.fromkeys(" by ".join(job.score.candidate.name) for job in jobs))
+    return ", ".join(names[:most]) + (" ..." if len(names) > most else "")
 
 
 def _close(alternatives: list[Alternative]) -> list[Alternative]:

@@ -23,6 +23,7 @@ def discover_file(
     limits: Mapping[str, tuple[float, float]] | None = None,
     tag_map: TagMap | None = None,
     processes: int = 1,
+    budget: float | None = None,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
     """Read a measured record and find what physical effect the model lacks.
@@ -39,6 +40,8 @@ def discover_file(
         From the tags of an export to the model's quantities.
     processes
         Fits that run at once.
+    budget
+        Seconds after which the search ends with what it has come to.
     progress
         Called with a word for each stage and each fit.
 
@@ -49,7 +52,13 @@ def discover_file(
     """
     measured = read_measurements(path, model, tag_map=tag_map)
     return discover(
-        model, measured.record, report_record=measured.validation, limits=limits, processes=processes, progress=progress
+        model,
+        measured.record,
+        report_record=measured.validation,
+        limits=limits,
+        processes=processes,
+        budget=budget,
+        progress=progress,
     )
 
 

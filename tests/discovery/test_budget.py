@@ -1,0 +1,35 @@
+"""A search that is ended by its budget never names what it has not compared; one that had time is the same as ever."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.results import Discovery
+from tests.discovery.heated import heated_tank, tank_record
+
+
+def test_a_budget_that_is_spent_at_once_gives_a_verdict_without_a_name() -> None:
+    found = discover(heated_tank(), tank_record(), budget=1e-6)
+    assert found.verdict.word == "abstain" and found.verdict.effects == ()
+    assert found.verdict.reason.startswith("The budget ended the search before the rivals had been compared")
+    assert any("budget ended the search" in note for note in found.verdict.notes)
+
+
+def test_a_budget_that_suffices_changes_nothing_and_each_fit_tells_what_is_tried(draught: Discovery) -> None:
+    said: list[str] = []
+    found = discover(heated_tank(), tank_record(), budget=1e6, progress=said.append)
+    assert any("heat_loss by fan_speed" in word for word in said) and "score" in said
+    plain = {**draught.verdict.as_dict(), "seconds": 0}
+    assert {**found.verdict.as_dict(), "seconds": 0} == plain
+
+
+def test_a_fit_whose_time_is_up_stays_where_it_began(draught: Discovery) -> None:
+    assert draught.problem is not None and draught.before is not None
+    late = Fitter(replace(draught.problem, deadline=time.monotonic() - 1.0))
+    fit = late.fit(heated_tank(), like=draught.before, start={"loss": 100.0})
+    assert fit is not None and fit.values[1] == 100.0 and np.isfinite(fit.loss)
