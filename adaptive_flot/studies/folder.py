@@ -37,7 +37,7 @@ COUNTS = ("status_", "control_", "decided_", "fault_")
 """Columns that count; a run without such a status has none of it."""
 NEEDED = ("run", "scenario", "controller", "estimator", "seed", "outcome", "message")
 """Columns that every table of runs has."""
-TEXTS = ("run", "scenario", "controller", "estimator", "outcome", "message", "conditions", "code", "options")
+TEXTS = ("run", "scenario", "controller", "estimator", "outcome", "message", "conditions", "options")
 """Columns of text; all others but the seed are numbers."""
 
 

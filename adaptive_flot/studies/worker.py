@@ -124,6 +124,7 @@ def run(
             realisation = Realisation(prepared.scenario, seed)
             finished = run_one(prepared, estimator, controller, realisation, {} if start is None else {"fit": start})
             row = run_rows(plain(run_summary(prepared.scenario, [finished])))[0]
+            del row["code"]  # a study that goes on after a commit gives the same table to the byte
     except (PluginError, StudyError):
         raise
     except (Exception, SystemExit) as error:
