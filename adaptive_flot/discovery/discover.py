@@ -137,14 +137,15 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
         reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
         return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
-    problem = replace(problem, site_sizes=Responses(problem, base).sizes)
+    responses = Responses(problem, base)
+    problem = replace(problem, site_sizes=responses.sizes)
     noise = noise_by_differences(problem.measured)
     start = base.initial_state, parameters_of(base)
     said = wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
     if not state.adapted:
         said += ("no parameter has the role 'estimated': all keep the values of the model",)
     screening = replace(state.screening, notes=state.screening.notes + said)
-    return replace(state, screening=screening, problem=problem, base=base)
+    return replace(state, screening=screening, problem=problem, base=base, responses=responses)
 
 
 def check_explained(state: State) -> State | Verdict:
@@ -162,7 +163,10 @@ def examine_residual(state: State) -> State:
 def search_one_by_one(state: State) -> State:
     """Add one effect after the other, as long as each brings evidence and substance; confirm the best."""
     problem, base = state.fitted
-    return replace(state, search=search(problem, base, state.model, processes=state.processes, progress=state.progress))
+    found = search(
+        problem, base, state.model, responses=state.responses, processes=state.processes, progress=state.progress
+    )
+    return replace(state, search=found, responses=None)
 
 
 def search_at_once(state: State) -> State:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
@@ -40,6 +41,8 @@ class State:
         When everything, and when the search, is to end, by `time.monotonic` [s].
     problem, base
         The record in splits, and the fit of the model as it is to the estimation split.
+    responses
+        Linear responses along that fit, until the search has used them.
     detection
         What the residual of that fit shows.
     search, judgement
@@ -67,6 +70,7 @@ class State:
     search_ends: float = float("inf")
     problem: Problem | None = None
     base: Fit | None = None
+    responses: Responses | None = None
     detection: Detection | None = None
     search: SearchResult | None = None
     judgement: Judgement | None = None

@@ -45,6 +45,7 @@ def search(
     base: Fit,
     nominal: Model,
     *,
+    responses: Responses | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> SearchResult:
@@ -56,6 +57,8 @@ def search(
         The record and the fit of the model as it is, on the estimation split.
     nominal
         The model with the parameter values it came with.
+    responses
+        Responses along the base fit, where they are known already.
     processes
         Fits that run at once.
     progress
@@ -63,7 +66,7 @@ def search(
     """
     fitter = Fitter(problem)
     progress("score")
-    scorer, sites = scorer_of(problem, base)
+    scorer, sites = scorer_of(problem, base, responses)
     near = _near(fitter, base, nominal)
     scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
     rounds = [_round(problem, fitter, base, scorers, [None], processes, progress)]
@@ -121,9 +124,12 @@ def _best_bic(rounds: list[Round]) -> float:
     return min(a.fit.bic for r in rounds for a in r.alternatives)
 
 
-def scorer_of(problem: Problem, fit: Fit) -> tuple[Scorer, tuple[str, ...]]:
-    """Scores along a fit, and the sites whose constant change is that of an adapted parameter."""
-    responses = Responses(problem, fit)
+def scorer_of(problem: Problem, fit: Fit, responses: Responses | None = None) -> tuple[Scorer, tuple[str, ...]]:
+    """Scores along a fit, and the sites whose constant change is that of an adapted parameter.
+
+    `responses` are those along this fit, where they are known already.
+    """
+    responses = responses or Responses(problem, fit)
     return Scorer(problem, fit, responses, catalogue(fit.model, responses)), responses.adapted_sites()
 
 
