@@ -16,6 +16,7 @@ from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.kit.parts import Table as Content
 from adaptive_flot.report.kit.wording import number
+from adaptive_flot.report.run.absorbed import absorbed
 from adaptive_flot.report.run.inquiries import told_at_the_top
 from adaptive_flot.report.run.series import cases
 from adaptive_flot.report.run.unsolved import unsolved_table
@@ -82,7 +83,7 @@ def print_verdict(verdict: Verdict) -> None:
 def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
     """Print the fits of each scenario and estimator, median [range] over the seeds, beside the published ones."""
     keys = list(dict.fromkeys(key for _, runs in results for run in runs for key in run.fit))
-    rows = []
+    rows, told = [], []
     for scenario, runs in results:
         published = scenario.file.published.fits if scenario.file.published else {}
         several = len({run.controller for run in runs}) > 1
@@ -91,9 +92,12 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
             cells = [_fit_cell([r.fit[k] for r in own if k in r.fit], published.get(name, {}).get(k)) for k in keys]
             shown = f"{name} ({controller})" if several else name
             rows.append((scenario.name, shown, str(len(own)), *cells))
+            told += absorbed(shown, own)
     title = "Fit in percent: median and range over the seeds, published value in brackets"
     console = _console()
     print_table(console, Content("", ("scenario", "estimator", "seeds", *keys), tuple(rows), words=3), title)
+    for sentence in told:
+        console.print(f"- {sentence}", highlight=False)
     console.file.flush()  # a reader on a pipe sees the result before the report is drawn
 
 

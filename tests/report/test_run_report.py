@@ -15,6 +15,7 @@ from adaptive_flot.charts.palette import GREY
 from adaptive_flot.charts.plotdata import Role
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.run import series
+from adaptive_flot.report.run.absorbed import absorbed
 from adaptive_flot.report.run.findings import below_published, candidates, findings, swing_share
 from adaptive_flot.report.run.page import run_report, write_run_report
 from adaptive_flot.report.run.tables import fits_table, status_table
@@ -109,6 +110,18 @@ def test_findings_follow_the_numbers(result: Result) -> None:
     assert below_published(poor)
     assert any("rpem, C: 90.00, 6.86 below 96.86" in s for s in findings(poor))
     assert any("0.995" in s and "200 s" in s for s in candidates([poor]))
+
+
+def test_parameters_that_take_up_something_else_are_told(result: Result) -> None:
+    """The share counts the samples of the estimator, not those of the record before it; nothing is said below 1 %."""
+    _, runs = result
+    before, few, many = (
+        [replace(r, status_counts={"initialising": 900, "ok": 100 - n, "model_error": n}) for r in runs]
+        for n in (0, 1, 25)
+    )
+    assert absorbed("imm", before) == []
+    assert absorbed("imm", few)[0].startswith("imm: in 1% of the samples")
+    assert absorbed("imm", many)[0].startswith("imm: in 25% of the samples")
 
 
 def test_constant_differs_only_outside_our_range(result: Result) -> None:

@@ -6,6 +6,7 @@ page.py                 The page.
 answer.py               The answer in open loop; in closed loop it is that of `compare`.
 chapter.py              What is told of one scenario and controller, topic by topic.
 findings.py             Sentences, each made from the numbers of the runs.
+absorbed.py             Parameters that take up what the model lacks.
 tables.py               Fits, errors, innovations, statuses.
 series.py               From runs to what the figures draw.
 pictures.py             Charts of inputs, parameters, outputs, residuals.

@@ -12,6 +12,7 @@ from adaptive_flot.contracts.batch import INSEPARABLE
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit.wording import number
+from adaptive_flot.report.run.absorbed import absorbed
 from adaptive_flot.report.run.series import CaseRuns, residuals
 from adaptive_flot.report.run.tables import SIGNIFICANT, coverage, median, quantities, relative_error
 from adaptive_flot.runner.commands.run_result import Run
@@ -97,7 +98,8 @@ def _against_constant(case: CaseRuns, who: str, other: str) -> list[str]:
 
 
 def _statistics(case: CaseRuns, who: str) -> list[str]:
-    return [*_whiteness(case, who), _coverage(case, who), *_swings(case, who), *_tied(case, who)]
+    told = absorbed(who, case.of(who))
+    return [*_whiteness(case, who), _coverage(case, who), *_swings(case, who), *_tied(case, who), *told]
 
 
 def _whiteness(case: CaseRuns, who: str) -> list[str]:
