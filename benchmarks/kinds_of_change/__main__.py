@@ -50,7 +50,7 @@ def main() -> None:
         told = float(of[of["estimator"] == ESTIMATORS[-1]]["model_error"].mean())
         cells = [shown(of[of["estimator"] == name]) for name in ESTIMATORS]
         table.add_row(TRUTHS[key].words, *cells, f"{told:.0%}")
-    Console(width=None if Console().is_terminal else 190).print(table)
+    Console(width=None if Console().is_terminal else 220).print(table)
 
 
 if __name__ == "__main__":
