@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 
 from adaptive_flot.errors import ModelError, near_match
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Mode
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode
 from adaptive_flot.greybox.lookup import Lookup
 from adaptive_flot.greybox.quantities import KnownEffect, Parameter, ParameterRole, Quantity
 from adaptive_flot.greybox.scope import Role, Site
@@ -36,6 +36,7 @@ class Checks(Lookup):
     late_drivers: tuple[str, ...]
     known_effects: tuple[KnownEffect, ...]
     edges: tuple[str, ...]
+    effects: tuple[Effect, ...]
 
     @property
     def sites(self) -> tuple[Site, ...]:
@@ -77,7 +78,10 @@ class Checks(Lookup):
         for site in self.sites:
             self._known(f"site {site.name!r}, role", [site.role], get_args(Role))
             self._known(f"site {site.name!r}, mode", [site.mode], get_args(Mode))
-        for p in self.parameters:
+        searched = {
+            e.parameter(c.name) for e in self.effects for c in e.terms
+        }  # a search narrows their ranges as it goes
+        for p in (p for p in self.parameters if p.name not in searched):
             self._known(f"parameter {p.name!r}, role", [p.role], get_args(ParameterRole))
             if not p.lower <= p.value <= p.upper:
                 raise ModelError(

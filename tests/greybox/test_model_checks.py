@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox import KnownEffect, Model, Parameter, Quantity, Scope
+from adaptive_flot.greybox import Effect, KnownEffect, Model, Parameter, Quantity, Scope
 
 
 def box(site: tuple[str, str] = ("process", "factor"), role: str = "estimated", **changes: Any) -> Model:
@@ -58,3 +59,10 @@ def test_what_a_model_has_not_is_one_line_with_the_nearest(changes: dict[str, An
 def test_known_effects_of_time_and_constants_name_no_quantity_of_the_model() -> None:
     words = ("time", "constant", "lag", "own_value")
     assert box(known_effects=tuple(KnownEffect("loss", word, "x") for word in words)).known_effects
+
+
+def test_the_range_of_a_coefficient_may_be_narrowed_beyond_its_value() -> None:
+    """A search does so with the time constant of a lag in a record of a few rows: its start is put inside later."""
+    model = box().with_effects([Effect("loss", "time", "step", {"amplitude": 0.1, "onset": 30.0})])
+    narrowed = [replace(p, upper=6.0) if p.name.endswith("onset") else p for p in model.parameters]
+    assert replace(model, parameters=tuple(narrowed)).parameters[-1].upper == 6.0
