@@ -13,7 +13,10 @@ assessment/   What a fit is worth: residual tests, verification on rows to which
 search/       Which combination it is: successive halving, rounds, joint search, common nuisance.
 test_design/  Which input moves would tell the leading alternatives apart.
 verdict/      The word, its reasons, and how they are put.
+hypotheses/   Named hypotheses about several records: what has changed since a reference.
+innovations/  A second opinion with process noise: when something happened, and what it may be.
 discover.py   The stages, one after the other.
+changes.py    What has changed since a reference, events too.
 
 Where a statistic is computed
 -----------------------------

@@ -17,6 +17,7 @@ from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import one_thread
+from adaptive_flot.discovery.innovations.second_opinion import second_opinion
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.record.screening import Screening, screen
@@ -273,6 +274,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     judge_alternatives,
     fit_without_report,
     heed_report,
+    second_opinion,
     plan_test,
     conclude,
 )

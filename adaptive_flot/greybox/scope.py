@@ -106,11 +106,11 @@ class Scope:
         before = self.sites.get(name, Site(name, role, mode, 0, unit, tuple(self.signals)))
         self.sites[name] = replace(before, passed=before.passed + 1)
         self.site_values.setdefault(name, value)
-        for effect in self._effects:
-            if effect.site == name:
-                if before.passed and effect.states():
-                    raise ModelError(f"{effect.label}: form {effect.form!r} has states, but the site has components")
-                value = apply(effect, self, value, self._driver(effect), effect.mode or mode)
+        at_site = (effect for effect in self._effects if effect.site == name)
+        for effect in sorted(at_site, key=lambda e: e.family.is_beside):
+            if before.passed and effect.states():
+                raise ModelError(f"{effect.label}: form {effect.form!r} has states, but the site has components")
+            value = apply(effect, self, value, self._driver(effect), effect.mode or mode)
         return value
 
     def _driver(self, effect: Effect) -> ca.SX:

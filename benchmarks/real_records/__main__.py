@@ -10,9 +10,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import available_processes
-from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.discovery.results import Verdict
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
 
@@ -42,7 +42,7 @@ def faulted_days(folder: Path) -> Iterator[Judged]:
     unit = air_handling_unit
     model, days = unit.make_model(), unit.days(folder)
     for day, (part, fault) in unit.TRUTH.items():
-        verdict = compare(model, [days[day]], [days[unit.REFERENCE]], processes=available_processes()).verdict
+        verdict = find_changes(model, [days[day]], [days[unit.REFERENCE]], processes=available_processes()).verdict
         sites = {unit.SAME_PART.get(site, site) for site in told(verdict)}
         worth = "open" if not sites else "right" if part in sites and len(sites) <= LARGEST_CLASS else "wrong"
         yield Judged(f"air handling {day}", f"{part} {fault}".replace("_", " "), verdict, worth)
@@ -50,7 +50,7 @@ def faulted_days(folder: Path) -> Iterator[Judged]:
 
 def drives(folder: Path) -> Iterator[Judged]:
     """Five records of one plant together, without a reference."""
-    verdict = compare(
+    verdict = find_changes(
         electric_drives.make_model(), electric_drives.records(folder), processes=available_processes()
     ).verdict
     right = told(verdict) == {electric_drives.TRUTH[0]} and "absolute value" in verdict.reason

@@ -15,7 +15,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
-Kind = Literal["stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "depends", "store"]
+Kind = Literal["switch", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "depends", "store"]
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -181,11 +181,20 @@ def _lag(site: Site, size: float, dt: float, longest: float) -> Hypothesis:
     return Hypothesis(site.name, "lag", "lag", effect, ("time_constant",), starts, limits)
 
 
+def span_limits(spread: float) -> dict[str, tuple[float, float]]:
+    """Range of a calibration error at a site whose value has been seen over `spread`."""
+    return {"slope": (-WIDEST_SPAN, WIDEST_SPAN), "offset": (-WIDEST_OFFSET * spread, WIDEST_OFFSET * spread)}
+
+
+def offset_limits(spread: float) -> dict[str, tuple[float, float]]:
+    """Range of a constant error at a site whose value has been seen over `spread`."""
+    return {"amplitude": (-WIDEST_OFFSET * spread, WIDEST_OFFSET * spread)}
+
+
 def _span(site: Site, middle: float, spread: float) -> Hypothesis:
     effect = Effect(site.name, "own_value", "span", settings={"middle": middle})
     starts = tuple({"offset": o * spread, "slope": s} for o in (-0.3, 0.3) for s in (-0.2, 0.2))
-    limits = {"slope": (-WIDEST_SPAN, WIDEST_SPAN), "offset": (-WIDEST_OFFSET * spread, WIDEST_OFFSET * spread)}
-    return Hypothesis(site.name, "own_value", "span", effect, ("offset", "slope"), starts, limits)
+    return Hypothesis(site.name, "own_value", "span", effect, ("offset", "slope"), starts, span_limits(spread))
 
 
 def _gain(site: Site) -> Hypothesis:
@@ -196,8 +205,7 @@ def _gain(site: Site) -> Hypothesis:
 def _offset(site: Site, spread: float) -> Hypothesis:
     effect = Effect(site.name, "constant", "shift", mode="offset")
     starts = tuple({"amplitude": s * spread} for s in (-0.3, 0.3))
-    limits = {"amplitude": (-WIDEST_OFFSET * spread, WIDEST_OFFSET * spread)}
-    return Hypothesis(site.name, "constant", "offset", effect, ("amplitude",), starts, limits)
+    return Hypothesis(site.name, "constant", "offset", effect, ("amplitude",), starts, offset_limits(spread))
 
 
 def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:

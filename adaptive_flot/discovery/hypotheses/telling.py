@@ -129,7 +129,7 @@ def _effects(model: Model, judged: Judged) -> tuple[NamedEffect, ...]:
         for t in judged.alike
         if t.hypothesis is not None
     )
-    return (NamedEffect(effect, words_of(model, best), interval, others),)
+    return (NamedEffect(effect, words_of(model, best.hypothesis, best.fit.value), interval, others),)
 
 
 def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[OutputChange]) -> str:
@@ -152,8 +152,8 @@ def _part_in_words(model: Model, judged: Judged, best: Tested) -> str:
     assert best.hypothesis is not None  # the model as it is has no part
     same = [t for t in judged.alike if t is not best and t.hypothesis and t.hypothesis.site == best.hypothesis.site]
     site = best.hypothesis.site.replace("_", " ")
-    others = [words_of(model, t).removeprefix(f"{site} ") for t in same]
-    return words_of(model, best) + (f" (or {', or '.join(others)})" if others else "")
+    others = [words_of(model, t.hypothesis, t.fit.value).removeprefix(f"{site} ") for t in same if t.hypothesis]
+    return words_of(model, best.hypothesis, best.fit.value) + (f" (or {', or '.join(others)})" if others else "")
 
 
 def _one_of(said: Sequence[str]) -> str:

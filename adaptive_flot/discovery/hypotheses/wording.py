@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.cross_validation import Tested
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 
+MOST_TIMES = 6
+"""Times that a sentence lists at most."""
+FOREVER = 1e7
+"""Duration [s] of what is switched on and stays on."""
 
-def words_of(model: Model, tested: Tested) -> str:
-    """One sentence without its full stop: what is the matter and by how much."""
-    h = tested.hypothesis
-    assert h is not None  # the model as it is has no words
-    values = dict(zip(h.free, (tested.fit.value(name) for name in h.parameters), strict=True))
+
+def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
+    """One sentence without its full stop: what is the matter and by how much.
+
+    `value` gives the fitted value of a parameter by its full name.
+    """
+    values = dict(zip(h.free, (value(name) for name in h.parameters), strict=True))
     site = next(s for s in model.sites if s.name == h.site)
     name, unit = site.name.replace("_", " "), f" {site.unit}" if site.unit and site.unit != "-" else ""
     first = next(iter(values.values()))
@@ -22,6 +31,8 @@ def words_of(model: Model, tested: Tested) -> str:
         return f"{name} does not go below {first:.3g}{unit}"
     if h.kind == "range":
         return f"{name} does not go above {first:.3g}{unit}"
+    if h.kind == "switch":
+        return f"{name} {_switched(h.effect, site.mode, first, unit, site.role == 'sensor')}"
     if h.kind == "gain":
         return f"{name} is {_factor(first)}"
     if h.kind == "offset":
@@ -52,3 +63,23 @@ def _factor(log: float) -> str:
     if 0.5 < factor < 2.0:
         return f"{abs(100 * (factor - 1)):.0f} % {'larger' if factor > 1 else 'smaller'}"
     return f"{factor:.2g} times as large"
+
+
+def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:
+    """What is switched, with its times: `fell by 20 % at 1500 s`, `is 4.1 times as large at 2053-2213 s, ...`."""
+    count = int(effect.settings["count"])  # type: ignore[arg-type]
+    on = [effect.coefficients[f"on_{k}"] for k in range(1, count + 1)]
+    duration = [effect.coefficients[f"for_{k}"] for k in range(1, count + 1)]
+    lasting = count == 1 and duration[0] >= FOREVER
+    if mode == "offset":
+        change = f"{abs(size):.3g}{unit} {'more' if size > 0 else 'less'}"
+        rest = f"shows {change}" if sensor else f"is {change}"
+    else:
+        rest = f"is {_factor(size)}"
+    if lasting:
+        return f"{rest} from {on[0]:.0f} s on"
+    times = [
+        f"{a:.0f}-{a + d:.0f} s" if d < FOREVER else f"from {a:.0f} s on" for a, d in zip(on, duration, strict=True)
+    ]
+    listed = ", ".join(times[:MOST_TIMES]) + (f" and {len(times) - MOST_TIMES} more" if len(times) > MOST_TIMES else "")
+    return f"{rest} while something is switched: {listed}"

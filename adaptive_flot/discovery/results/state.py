@@ -55,6 +55,8 @@ class State:
         What these rows say against a name, in words; empty where they do not.
     certain
         What is certain although the record is not told, in words.
+    sentence
+        What the innovations form names, in words; empty where it has not decided.
     experiment
         Input moves that would tell the leading alternatives apart.
     """
@@ -79,6 +81,7 @@ class State:
     error: tuple[OutputChange, ...] = ()
     contradiction: str = ""
     certain: str = ""
+    sentence: str = ""
     experiment: Experiment | None = None
 
     @property

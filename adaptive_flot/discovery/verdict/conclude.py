@@ -43,9 +43,7 @@ def conclude(state: State) -> Verdict:
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
     return Verdict(
         word=judgement.word,
-        reason=" ".join(
-            filter(None, (reason_words(judgement, result, effects, drift, state.contradiction), state.certain))
-        ),
+        reason=_reason(state, effects, drift),
         effects=effects,
         members=judgement.members,
         error=state.error,
@@ -64,6 +62,15 @@ def conclude(state: State) -> Verdict:
         location=locate(state.detection, result.rounds[0].scores) if state.detection else None,
         experiment=state.experiment,
     )
+
+
+def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
+    """The verdict in one paragraph: in the words of the innovations form where that has decided."""
+    if not state.sentence:
+        said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction)
+        return f"{said} {state.certain}".rstrip()
+    errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
+    return f"{state.sentence} Error of the free run on held-out rows: {errors}."
 
 
 def _tests(problem: Problem, before: Fit, after: Fit) -> dict[str, float]:

@@ -168,7 +168,9 @@ def first_state(model: Model, record: Dataset, noise: NoiseModel, p: FloatArray)
     """z0 and P0 before the first row: the record's own state or the model's first guess, known to one scale."""
     scale = np.array([s.scale for s in model.states])
     guess = np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])
-    x = guess if record.initial_state is None else record.initial_state
+    x = guess
+    if record.initial_state is not None:  # states of an effect that came later start from their guess
+        x = np.concatenate([record.initial_state, guess[len(record.initial_state) :]])
     walking = p[model.indices("parameters", noise.walk)]
     P = np.zeros((len(x) + len(walking),) * 2)
     P[: len(x), : len(x)] = np.diag((INITIAL * scale) ** 2)

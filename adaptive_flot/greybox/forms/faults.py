@@ -183,6 +183,7 @@ FAULT_FORMS: tuple[Form, ...] = (
         {},
         direct=_store,
         states=lambda settings: ("store",),
+        is_beside=True,
     ),
 )
 """Parts that stick or leak, switches, periodic disturbances, hidden stores, signs that are not seen."""

@@ -150,7 +150,8 @@ def _hypotheses(comparison: Comparison) -> Table:
         gain = mean_difference(comparison.blocks, comparison.null, t)
         scale = len(comparison.blocks.edges)
         low, high = number(scale * gain.low, ".1f"), number(scale * gain.high, ".1f")
-        words = words_of(comparison.calibration.model, t)
+        assert t.hypothesis is not None  # the model as it is is not among the tested
+        words = words_of(comparison.calibration.model, t.hypothesis, t.fit.value)
         cells.append((f"{words[0].upper()}{words[1:]}", number(scale * gain.value, ".1f"), f"{low} to {high}"))
     return Table("Hypotheses, best first", ("hypothesis", "gain", "95 % interval"), tuple(cells))
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.changes import find_changes
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
 from adaptive_flot.greybox.data.stretches import every_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
@@ -49,7 +50,7 @@ def discover_records(
         A table or the model can not be used.
     """
     new, old = ([r for s in group for r in _read(s, model, tag_map)] for group in (sources, references))
-    return compare(model, new, old, processes=processes, progress=progress)
+    return find_changes(model, new, old, processes=processes, progress=progress)
 
 
 def save_extended(

@@ -1,0 +1,108 @@
+"""What has changed since a reference: hypotheses about the whole record first, then events, in innovations form.
+
+The first compares free runs over hours, and finds what is the matter all the time. An event of a few rows is lost in
+it. The innovations form sees that, row by row. Before it may speak, what the model lacks on the reference too is added
+to the model: such a thing has not changed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.parallel import one_thread
+from adaptive_flot.discovery.hypotheses.cross_validation import model_with
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.known_before import Constants
+from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.hypotheses.rows import noise_floor
+from adaptive_flot.discovery.innovations.event_verdict import event_verdict
+from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+
+LACKING = ("lag", "store", "depends", "sign")
+"""Kinds of effects that a model may lack on its reference."""
+MOST_WORK = 4_000
+"""Rows times states up to which events are looked for."""
+
+
+@one_thread()
+def find_changes(
+    model: Model,
+    records: Sequence[Dataset],
+    references: Sequence[Dataset] = (),
+    *,
+    adapted: Sequence[str] = (),
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Comparison:
+    """Find what has changed since a reference, or what a model lacks in several records of one process.
+
+    Arguments and errors are those of `compare`. Events are looked for where there are one record and a reference.
+    """
+    began = time.perf_counter()
+    compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
+    if not references or len(records) != 1 or compared.verdict.word == "insufficient":
+        return compared
+    if len(records[0]) * len(model.states) > MOST_WORK:
+        return compared
+    reference = max(references, key=len)
+    with np.errstate(all="ignore"):
+        search, base, told = _events(compared, records[0], reference, processes, progress)
+    if told.word not in ("named", "class") or not _has_event(told):
+        return compared
+    verdict = event_verdict(compared.verdict, search, base, told)
+    return replace(
+        compared, verdict=replace(verdict, seconds=time.perf_counter() - began), model=search.model_of(told.best)
+    )
+
+
+def _events(
+    compared: Comparison, record: Dataset, reference: Dataset, processes: int, progress: Callable[[str], None]
+) -> tuple[Search, Explanation, Told]:
+    """Events in a record, by a model that has what the reference lacks."""
+    calibration, columns = compared.calibration, compared.rows.columns
+    constants, model = calibration.constants, calibration.model
+    floor = noise_floor([reference], columns)
+    progress("what the reference lacks")
+    before = Search(model, reference, columns, floor, constants.names, constants, processes, LACKING)
+    start = before.base(model.parameter_values)
+    lacking = judge(before, start, before.run(start))
+    explanation = lacking.best if lacking.word == "named" else start
+    extended = before.model_of(explanation)
+    where = extended.indices("parameters", constants.names)
+    known = Constants(constants.names, extended.parameter_values[list(where)], constants.root)
+    progress("events in the new record")
+    search = Search(extended, record, columns, floor, constants.names, known, processes)
+    base = search.base(extended.parameter_values)
+    told = judge(search, base, search.run(base, progress))
+    before = replace(before, model=extended)
+    return search, base, _changed(told, search, before, before.base(extended.parameter_values))
+
+
+def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:
+    """What is told, without what explains the reference as well: that has not changed."""
+    model = search.model_of(told.best)
+
+    def there(h: Hypothesis) -> bool:
+        if h.kind == "switch":
+            return False
+        extended = model_with(before.model, h)
+        p = np.array([model.parameters[model.index("parameters", q.name)].value for q in extended.parameters])
+        p[list(extended.indices("parameters", before.free))] = start.fit.p[
+            list(before.model.indices("parameters", before.free))
+        ]
+        return before.added(start, h, p).criterion > start.criterion + LEAST_GAIN
+
+    return replace(told, certain=tuple(h for h in told.certain if not there(h)))
+
+
+def _has_event(told: Told) -> bool:
+    """Whether what is told is an event, and not a thing of the whole record."""
+    said = (*told.certain, *(h for _, h in told.open))
+    return bool(said) and all(h.kind == "switch" for h in said)

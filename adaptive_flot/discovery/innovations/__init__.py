@@ -1,0 +1,19 @@
+"""Discovery in innovations form: a Kalman filter over the record, process noise for what always wanders.
+
+The innovations say when something happened. A regression on what each family would do to them says what it may be. A
+few effects are then fitted together, and judged on stretches that did not fit them.
+
+Map
+---
+linear_response.py  How the innovations answer to what happens at a site.
+courses.py          What each family would change at a site along a record.
+switching.py        When something was switched on and off.
+screening.py        Which further effects are worth a refit.
+noise_fit.py        How large process and measurement noise are.
+refit.py            A model with effects, fitted.
+search.py           A few effects together.
+judge.py            What is certain, and what predicts rows that did not fit it.
+in_words.py         What is told, in words.
+second_opinion.py   The stage of `discover` that asks, where the free run leaves too much.
+event_verdict.py    The verdict on an event in a record with a reference.
+"""

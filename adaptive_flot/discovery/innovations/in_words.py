@@ -1,0 +1,25 @@
+"""What the innovations form tells, in words."""
+
+from __future__ import annotations
+
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.wording import words_of
+from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.search import Explanation, Search
+
+
+def told_in_words(search: Search, told: Told) -> str:
+    """What is certain, then what is one of a few."""
+    sure = "; and ".join(words_at(search, told.best, h) for h in told.certain)
+    said = f"{sure[0].upper()}{sure[1:]}." if sure else ""
+    if told.word != "class":
+        return said
+    members = "; or ".join(words_at(search, e, h) for e, h in told.open)
+    first = "Besides, one of these" if sure else "One of these"
+    return f"{said} {first}, which the record can not tell apart: {members}.".strip()
+
+
+def words_at(search: Search, explanation: Explanation, h: Hypothesis) -> str:
+    """One effect of an explanation, with its fitted size."""
+    model = search.model_of(explanation)
+    return words_of(model, h, lambda name: model.parameters[model.index("parameters", name)].value)

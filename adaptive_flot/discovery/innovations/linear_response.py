@@ -1,0 +1,211 @@
+"""How the innovations of a filter answer to what happens at a site.
+
+With the filter's gain K, its transition F = df/dz and H = dh/dz at every row, a change a_k of the value at a site in
+the interval that leads to row k + 1 moves the innovations by::
+
+    e_(k+1) = -H_k d_k - h_k a_k          d_(k+1) = F_k (d_k + K_k e_(k+1)) + b_k a_k
+
+where b and h are the derivatives of the next state and of the outputs by the site's value. So what an effect does to
+the record is a linear function of its course, and every family of effects is a regression. Willsky & Jones, *IEEE
+Trans. Automatic Control* 21 (1976) 108, on jumps; Basseville & Nikiforov, *Detection of Abrupt Changes* (1993), 7.2.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.rows import BoolArray
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+CLIP = 100.0
+"""Innovations count up to so many of their standard deviations. A jump of a sensor is far: less would shrink it."""
+
+
+class ResponseFunctions:
+    """The functions behind the responses of one model to what happens at some sites; made once, used at many points.
+
+    Parameters
+    ----------
+    model
+        The model.
+    dt
+        Sampling interval [s].
+    columns
+        Indices of the outputs that count (m,).
+    sites
+        Names of the sites that are asked about.
+    constants
+        Names of the constants that are free beside any effect.
+    degrees_of_freedom
+        Of the innovations. Infinity, the Gaussian filter, follows a jump at once; Student's t takes it for an outlier.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        dt: float,
+        columns: Sequence[int],
+        sites: Sequence[str] = (),
+        constants: Sequence[str] = (),
+        degrees_of_freedom: float = float("inf"),
+    ) -> None:
+        self.model, self.columns, self.sites, self.constants = model, tuple(columns), tuple(sites), tuple(constants)
+        effects = [_probe(model, site) for site in sites]
+        self.extended = model.with_effects(effects) if effects else model
+        self.filter = RecordFilter(self.extended, dt, columns, (), degrees_of_freedom)
+        self.wrt = (*(e.parameter(e.terms[0].name) for e in effects), *constants)
+        self._step = Stepper(self.extended, dt).one_step_jacobians(list(self.wrt))
+        self._rows: dict[int, Any] = {}
+
+    def at(
+        self, record: Dataset, noise: NoiseModel, p: FloatArray, start: tuple[FloatArray, FloatArray]
+    ) -> LinearResponse:
+        """Run the filter and take the derivatives along it.
+
+        Parameters
+        ----------
+        record
+            N rows without a gap; a missing output is NaN.
+        noise
+            Process and measurement noise.
+        p
+            Parameters of the model (np,).
+        start
+            z0 (nx,) and P0 (nx, nx) before the first row.
+        """
+        values = self.extended.parameter_values
+        values[: len(p)] = p
+        filtered = self.filter.run(record, noise, *start, values)
+        return LinearResponse(self, record, noise, p, filtered, self._jacobians(record, filtered, values))
+
+    def _jacobians(self, record: Dataset, filtered: Filtered, p: FloatArray) -> Jacobians:
+        count, nx = len(record) - 1, len(self.extended.states)
+        if count not in self._rows:
+            self._rows[count] = self._step.map(count)
+        found = self._rows[count](
+            filtered.z[:-1].T, record.time[None, :-1], record.inputs[1:].T, np.tile(p[:, None], count)
+        )
+        _, _, fx, fp, hx, hp = (np.array(part) for part in found)
+
+        def by_row(table: FloatArray, width: int) -> FloatArray:
+            return table.reshape(len(table), count, width).transpose(1, 0, 2)
+
+        rows, w = list(self.columns), len(self.wrt)
+        return Jacobians(by_row(fx, nx), by_row(fp, w), by_row(hx, nx)[:, rows], by_row(hp, w)[:, rows])
+
+
+class Jacobians(NamedTuple):
+    """Derivatives of next state and outputs by the state and by what is asked about, for each interval."""
+
+    F: FloatArray
+    b: FloatArray
+    H: FloatArray
+    h: FloatArray
+
+
+class LinearResponse:
+    """Innovations of one model on one record, and their derivatives by sites and constants.
+
+    Attributes
+    ----------
+    innovations
+        Scaled by their standard deviations, row by row: (N - 1) m values; 0 where an output is missing.
+    by_constants
+        Their derivatives by minus the constants ((N - 1) m, c): what a fit of the constants can explain.
+    """
+
+    def __init__(
+        self,
+        functions: ResponseFunctions,
+        record: Dataset,
+        noise: NoiseModel,
+        p: FloatArray,
+        filtered: Filtered,
+        jacobians: Jacobians,
+    ) -> None:
+        self.record, self._functions, self._p, self._filtered = record, functions, p, filtered
+        columns, (F, b, H, h) = list(functions.columns), jacobians
+        there = np.isfinite(record.outputs[1:][:, columns])
+        K, S = _gains(filtered, H, noise.std(functions.extended)[columns], there)
+        self._H, self._h, self._A, self._B = H, h, F - F @ K @ H, b - F @ K @ h
+        self._weight = np.where(there, 1 / np.sqrt(S), 0.0)
+        e = np.where(there, record.outputs[1:][:, columns] - filtered.predicted[1:], 0.0)
+        self.innovations: FloatArray = np.clip(e * self._weight, -CLIP, CLIP).ravel()
+        first = len(functions.sites)
+        self.by_constants = self._constants(range(first, first + len(functions.constants)))
+
+    def respond(self, site: str, course: FloatArray) -> FloatArray:
+        """What changes of the value at a site explain of the innovations.
+
+        Parameters
+        ----------
+        site
+            One of the sites.
+        course
+            Change of the value in each interval (N - 1, f), in the site's unit, for f courses at once.
+
+        Returns
+        -------
+        numpy.ndarray
+            ((N - 1) m, f), scaled like the innovations.
+        """
+        which = self._functions.sites.index(site)
+        return self._respond(self._B[:, :, which, None], self._h[:, :, which, None], course[:, None, :])
+
+    def _constants(self, which: range) -> FloatArray:
+        """All constants at once: the course of each is 1 throughout."""
+        chosen = list(which)
+        if not chosen:
+            return np.empty((len(self.innovations), 0))
+        always = np.ones((len(self._H), 1, 1))
+        return self._respond(self._B[:, :, chosen], self._h[:, :, chosen], always)
+
+    def _respond(self, b: FloatArray, h: FloatArray, course: FloatArray) -> FloatArray:
+        rows, f = len(course), max(b.shape[2], course.shape[2])
+        d = np.zeros((self._A.shape[1], f))
+        moved = np.empty((rows, self._H.shape[1], f))
+        for k in range(rows):
+            moved[k] = self._H[k] @ d + h[k] * course[k]
+            d = self._A[k] @ d + b[k] * course[k]
+        moved *= self._weight[:, :, None]
+        return moved.reshape(-1, f)
+
+    def seen(self) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """Value at each site, and of each input, state and signal, in the interval that leads to each row (N - 1,)."""
+        model, record, n = self._functions.model, self.record, len(self.record) - 1
+        states, inputs, table = self._filtered.z[:-1].T, record.inputs[1:].T, np.tile(self._p[:, None], n)
+        found = model.ode.map(n)(record.time[None, :-1], states, inputs, table)
+        at = np.array(model.site_values.map(n)(record.time[None, :-1], states, inputs, table, found[3]))
+        drivers = dict(zip(model.names("inputs"), inputs, strict=True)) | dict(
+            zip(model.names("states"), states, strict=True)
+        )
+        if model.signals:
+            drivers |= dict(zip((s.name for s in model.signals), np.array(found[2]), strict=True))
+        return {s.name: at[i] for i, s in enumerate(model.sites)}, drivers
+
+
+def _probe(model: Model, site: str) -> Effect:
+    """An effect whose first coefficient is added to the value at a site, under a name that is still free."""
+    taken = {e.label for e in model.effects}
+    shift = Effect(site, "constant", "shift", mode="offset")
+    return shift if shift.label not in taken else Effect(site, "own_value", "span", settings={"middle": 0.0})
+
+
+def _gains(filtered: Filtered, H: FloatArray, r: FloatArray, there: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Gain of the filter (N - 1, nx, m), nothing for a missing output, and variances of the innovations (N - 1, m)."""
+    P = filtered.P[:-1] + np.diag(filtered.Q)
+    spread = P @ H.transpose(0, 2, 1)
+    S = H @ spread + np.diag(r**2)
+    variances = np.einsum("kii->ki", S).copy()
+    gone = ~there
+    both = gone[:, :, None] | gone[:, None, :]
+    alone = np.where(both, np.eye(len(r)) * variances[:, :, None], S)
+    gain = np.linalg.solve(alone, np.where(gone[:, None, :], 0.0, spread).transpose(0, 2, 1)).transpose(0, 2, 1)
+    return gain, variances

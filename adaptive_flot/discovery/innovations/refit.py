@@ -1,0 +1,206 @@
+"""A model in innovations form, fitted to one record: constants and coefficients by Gauss-Newton, noise in between.
+
+The steps are those of the prediction error method with the derivatives of the filter at its present gain: Ljung,
+*System Identification* (1999), 10.2. Weights of Student's t: Lange, Little & Taylor, *J. Am. Stat. Assoc.* 84 (1989)
+881.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.known_before import Constants
+from adaptive_flot.discovery.hypotheses.rows import BoolArray
+from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions
+from adaptive_flot.discovery.innovations.noise_fit import noise_of, search_noise
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.filtering import Filtered, NoiseModel
+from adaptive_flot.greybox.filtering.likelihood import first_state
+from adaptive_flot.greybox.model import FloatArray, Model
+
+NU = 5.0
+"""Degrees of freedom of the innovations."""
+ITERATIONS = 8
+SHARES = (1.0, 0.5, 0.2, 0.05)
+"""Shares of a step that are tried in turn."""
+ENOUGH, LARGE = 0.05, 5.0
+"""Gain below which a fit is where it stays, and below which the noise is searched for again."""
+LOOSE = 30.0
+"""Standard deviation of the prior of a free parameter about its start, in its scales."""
+UNSURE = 3.0
+"""Standard deviation of the state before the first row, in scales of the states."""
+HOPELESS = 1e12
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A model in innovations form, fitted. It holds no equations, so that it goes from one process to another.
+
+    Attributes
+    ----------
+    p
+        Parameters (np,).
+    noise, size
+        Process and measurement noise, and their factors theta and rho, see `search_noise`.
+    filtered
+        What the filter makes of the record.
+    log_likelihood
+        Over the rows that fitted, and less the priors.
+    """
+
+    p: FloatArray
+    noise: NoiseModel
+    size: tuple[float, float]
+    filtered: Filtered
+    log_likelihood: float
+
+    @property
+    def rows(self) -> FloatArray:
+        """Log-likelihood of each row (N,)."""
+        return self.filtered.log_likelihood
+
+
+class Refitter:
+    """Fits of one model structure to one record.
+
+    Parameters
+    ----------
+    model
+        The model with its effects.
+    record
+        The record, without a gap.
+    columns
+        Indices of the outputs that count (m,).
+    floor
+        Noise of these from row to row (m,).
+    free
+        Names of the free parameters.
+    known
+        What is known of some of them before.
+    counted
+        Rows that fit (N,); default all. The filter runs over all of them.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        record: Dataset,
+        columns: Sequence[int],
+        floor: FloatArray,
+        free: Sequence[str],
+        known: Constants | None = None,
+        counted: BoolArray | None = None,
+    ) -> None:
+        self.model, self.record, self.columns, self.floor = model, record, tuple(columns), floor
+        self.free, self.known = tuple(free), known
+        self.counted = np.ones(len(record), dtype=bool) if counted is None else counted
+        self._functions = ResponseFunctions(model, record.dt, columns, (), free, NU)
+        self._filter = self._functions.filter
+        self._where = list(model.indices("parameters", free))
+        chosen = [model.parameters[i] for i in self._where]
+        self._scale = np.array([q.scale or abs(q.value) or 1.0 for q in chosen])
+        self._lower, self._upper = (np.array([getattr(q, end) for q in chosen]) for end in ("lower", "upper"))
+        self._constants = [self.free.index(n) for n in known.names] if known is not None else []
+        self._root = np.linalg.inv(known.root) if known is not None else np.empty((0, 0))
+
+    def start(self, noise: NoiseModel, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """State and covariance before the first row."""
+        z, P = first_state(self.model, self.record, noise, p)
+        names = self.model.names("states")
+        for effect in self.model.effects:  # a hidden store starts where its balance stands
+            if effect.form == "store" and effect.driver in names:
+                z[names.index(f"{effect.label}.store")] = z[names.index(effect.driver)]
+        return z, UNSURE**2 * P
+
+    def noise(self, size: tuple[float, float]) -> NoiseModel:
+        """Noise of a size."""
+        return noise_of(self.model, self.floor, self.columns, self.record.dt, *size, NU)
+
+    def fit(self, p: FloatArray, size: tuple[float, float] | None = None, *, hold_noise: bool = False) -> Refit:
+        """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
+        p, first = p.copy(), p[self._where].copy()
+        if size is None or not hold_noise:
+            size = search_noise(lambda t, r: self._cost(p, (t, r), first), size)
+        best = self._cost(p, size, first)
+        for i in range(ITERATIONS if self.free else 0):
+            q, value = self._moved(p, size, first, best)
+            gain = best - value
+            p, best = q, value
+            if hold_noise and gain < ENOUGH:
+                break
+            if not hold_noise and (gain < LARGE or i % 2):
+                again = search_noise(lambda t, r, at=p: self._cost(at, (t, r), first), size)  # type: ignore[misc]
+                value = self._cost(p, again, first)
+                improved = best - value
+                if improved > 0:
+                    size, best = again, value
+                if gain < ENOUGH and improved < ENOUGH:
+                    break
+        noise = self.noise(size)
+        return Refit(p, noise, size, self._run(p, noise), -best)
+
+    def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
+        """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside."""
+        functions = ResponseFunctions(self.model, self.record.dt, self.columns, sites, self.free)
+        return functions.at(self.record, fit.noise, fit.p, self.start(fit.noise, fit.p))
+
+    def _run(self, p: FloatArray, noise: NoiseModel) -> Filtered:
+        with np.errstate(all="ignore"):
+            return self._filter.run(self.record, noise, *self.start(noise, p), p)
+
+    def _cost(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> float:
+        rows = self._run(p, self.noise(size)).log_likelihood[self.counted]
+        total = -float(rows.sum()) + float(np.sum(self._prior(p[self._where], first) ** 2)) / 2
+        return total if np.isfinite(total) else HOPELESS
+
+    def _prior(self, x: FloatArray, first: FloatArray) -> FloatArray:
+        """Distances from what is known before, in standard deviations (q + c,)."""
+        loose = (x - first) / (self._scale * LOOSE)
+        if self.known is None:
+            return loose
+        told: FloatArray = self._root @ (x[self._constants] - self.known.mean)
+        return np.concatenate([loose, told])
+
+    def _moved(
+        self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float
+    ) -> tuple[FloatArray, float]:
+        """Parameters after one step, and their cost; where none is better, those from before."""
+        step = self._step(p, size, first)
+        for share in SHARES:
+            q = p.copy()
+            q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
+            value = self._cost(q, size, first)
+            if value < best:
+                return q, value
+        return p, best
+
+    def _step(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> FloatArray:
+        """One step of Gauss and Newton; an unknown that would leave its range is held."""
+        noise = self.noise(size)
+        L = self._functions.at(self.record, noise, p, self.start(noise, p))
+        counts = np.repeat(self.counted[1:], len(self.columns))
+        w = counts * (NU + 1) / (NU + L.innovations**2)
+        J, x = L.by_constants * self._scale, p[self._where]
+        prior = self._prior(x, first)
+        D = np.eye(len(x)) / LOOSE
+        if self.known is not None:
+            told = np.zeros((len(self.known.names), len(x)))
+            told[:, self._constants] = self._root * self._scale[self._constants]
+            D = np.vstack([D, told])
+        A, b = (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
+        held = np.zeros(len(x), dtype=bool)
+        if not (np.isfinite(A).all() and np.isfinite(b).all()):
+            return held.astype(float)
+        while True:
+            move = np.zeros(len(x))
+            free = ~held
+            move[free] = np.linalg.lstsq(A[np.ix_(free, free)], b[free], rcond=1e-12)[0]
+            out = x + move * self._scale
+            beyond = free & (((out < self._lower) & (x <= self._lower)) | ((out > self._upper) & (x >= self._upper)))
+            if not beyond.any():
+                moved: FloatArray = move * self._scale
+                return moved
+            held |= beyond

@@ -1,0 +1,128 @@
+"""Which further effects are worth a refit: a regression of the innovations on what each would do to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.wording import FOREVER
+from adaptive_flot.discovery.innovations.courses import Suspect, suspects
+from adaptive_flot.discovery.innovations.linear_response import LinearResponse
+from adaptive_flot.discovery.innovations.switching import MOST_EDGES, Switch, best_switch
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.scope import Site
+
+EDGE = 0.05
+"""Width of the edges of a switch, in sampling intervals."""
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A suspect, its coefficients by the regression (f,), and what it gains: log-likelihood less k / 2 log n."""
+
+    suspect: Suspect
+    size: FloatArray
+    gain: float
+
+
+class Screening:
+    """The regressions on one fit: what its own free parameters explain is taken out first.
+
+    The gain of a course is ``n / 2 log(rss_0 / rss_1)``: the spread of the innovations is fitted with and without it.
+
+    Parameters
+    ----------
+    model
+        The fitted model.
+    response
+        How its innovations answer.
+    """
+
+    def __init__(self, model: Model, response: LinearResponse) -> None:
+        self.model, self._response = model, response
+        self._basis = _span(response.by_constants)
+        self._left = self._rest(response.innovations)
+        self._total = float(self._left @ self._left)
+        self._count = int(np.count_nonzero(response.innovations))
+        self._values, self._drivers = response.seen()
+
+    def all(self, *, events: bool) -> list[Screened]:
+        """Every suspect, the best first; with switches or without."""
+        record = self._response.record
+        by_site: dict[str, list[Suspect]] = {}
+        for s in suspects(self.model, self._values, self._drivers, record.dt):
+            by_site.setdefault(s.hypothesis.site, []).append(s)
+        found = [x for site, group in by_site.items() for x in self._regressions(site, group)]
+        if events:
+            found += [x for site in self.model.sites if (x := self.switch(site)) is not None]
+        return sorted(found, key=lambda x: -x.gain)
+
+    def switch(self, site: Site) -> Screened | None:
+        """The best switch at a site; None where none is worth its times."""
+        record, count = self._response.record, len(self._response.record) - 1
+        by = self._values[site.name] if site.mode == "factor" else np.ones(count)
+        if not np.isfinite(by).all() or not np.abs(by).max() > 0:
+            return None
+        edges = np.arange(1, count - 1, max(1, -(-count // MOST_EDGES)))
+        steps = (np.arange(count)[:, None] >= edges[None, :]) * by[:, None]
+        switch = best_switch(self._rest(self._response.respond(site.name, steps)), edges, self._left, count)
+        if switch is None:
+            return None
+        numbers = sum(1 + (b < count) for _, b in switch.pulses)
+        effect = _switch_effect(site, switch, record.time, record.dt)
+        hypothesis = Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))
+        suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
+        return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
+
+    def _regressions(self, site: str, group: list[Suspect]) -> list[Screened]:
+        X = self._rest(self._response.respond(site, np.column_stack([s.courses for s in group])))
+        found, at = [], 0
+        for s in group:
+            x = X[:, at : at + s.courses.shape[1]]
+            at += s.courses.shape[1]
+            if not np.isfinite(x).all():
+                continue
+            none: tuple[FloatArray, float] = (np.empty(0), self._all_or_nothing(x[:, 0]))
+            size, left = self._linear(x) if s.coefficients else none
+            gain = self._count / 2 * float(np.log(self._total / max(left, NOTHING * self._total)))
+            found.append(Screened(s, size, gain - self._charge(s)))
+        return found
+
+    def _linear(self, x: FloatArray) -> tuple[FloatArray, float]:
+        size: FloatArray = np.asarray(np.linalg.lstsq(x, self._left, rcond=1e-9)[0], dtype=float)
+        return size, float(np.sum((self._left - x @ size) ** 2))
+
+    def _all_or_nothing(self, x: FloatArray) -> float:
+        """Squares left by a change that is all or nothing; it is far, so that any share of its response counts."""
+        product = max(float(x @ self._left), 0.0)
+        return self._total - product**2 / max(float(x @ x), 1e-300)
+
+    def _charge(self, suspect: Suspect) -> float:
+        return suspect.cost / 2 * float(np.log(self._count))
+
+    def _rest(self, X: FloatArray) -> FloatArray:
+        left: FloatArray = X - self._basis @ (self._basis.T @ X)
+        return left
+
+
+def _span(X: FloatArray) -> FloatArray:
+    """Orthonormal columns that span those of X (n, r)."""
+    length = np.linalg.norm(X, axis=0)
+    U, s, _ = np.linalg.svd(X[:, length > 0] / length[length > 0], full_matrices=False)
+    found: FloatArray = U[:, s > NOTHING * s.max()] if len(s) else U
+    return found
+
+
+def _switch_effect(site: Site, switch: Switch, time: FloatArray, dt: float) -> Effect:
+    """A sensor's switch lies between two rows; what acts on a state begins with an interval."""
+    late = dt / 2 if site.role == "sensor" else 0.0
+    coefficients: dict[str, float] = {"amplitude": 0.0}
+    for k, (a, b) in enumerate(switch.pulses, 1):
+        coefficients[f"on_{k}"] = float(time[a] + late)
+        coefficients[f"for_{k}"] = float(time[b] - time[a]) if b < len(time) - 1 else FOREVER
+    settings = {"count": float(len(switch.pulses)), "width": EDGE * dt}
+    return Effect(site.name, "time", "switch", coefficients, settings, mode=site.mode)

@@ -1,0 +1,215 @@
+"""Search for what a model lacks, in innovations form: a few effects, each found by regression and then refitted.
+
+A second effect is looked for beside each of the best first ones, not only beside the best: what is missing besides
+decides which of two names is right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.parallel import parallel_map
+from adaptive_flot.discovery.hypotheses.cross_validation import model_with
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.known_before import Constants
+from adaptive_flot.discovery.hypotheses.wording import FOREVER
+from adaptive_flot.discovery.innovations.refit import Refit, Refitter
+from adaptive_flot.discovery.innovations.screening import Screened, Screening
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray, Model
+
+REFITTED, SAME_SITE = 6, 2
+"""Suspects that are refitted, and of these at one site."""
+BEAM = 3
+"""Explanations that are carried on."""
+MOST_EFFECTS = 2
+LEAST_GAIN = 12.0
+"""Gain of the criterion that another effect must bring."""
+FURTHEST = 4.0
+"""Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Effects, and the model with them in innovations form, fitted.
+
+    Attributes
+    ----------
+    hypotheses
+        The effects, in the order in which they act; none for the model as it is.
+    fit
+        The fit.
+    numbers
+        How many numbers were fitted for the effects, times of switches too.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    fit: Refit
+    numbers: int
+
+    @property
+    def criterion(self) -> float:
+        """Half the Bayesian information criterion, its sign turned: log L - k / 2 log n."""
+        n = int(np.count_nonzero(self.fit.rows))
+        return self.fit.log_likelihood - self.numbers / 2 * float(np.log(n))
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the fitted coefficients."""
+        return tuple(name for h in self.hypotheses for name in h.parameters)
+
+    @property
+    def names(self) -> frozenset[tuple[str, str, str]]:
+        """What tells it from another one: site, driver and kind of each effect."""
+        return frozenset((h.site, h.driver, h.kind) for h in self.hypotheses)
+
+
+@dataclass(frozen=True)
+class Search:
+    """A record, and what is asked of it.
+
+    Attributes
+    ----------
+    model
+        The model as it is.
+    record
+        The record, without a gap.
+    columns
+        Indices of the outputs that count (m,).
+    floor
+        Noise of these from row to row (m,).
+    free
+        Names of the constants that are fitted with every explanation.
+    known
+        What is known of them before.
+    processes
+        Fits that run at once.
+    kinds
+        Kinds of effects that may be found; None for all.
+    """
+
+    model: Model
+    record: Dataset
+    columns: tuple[int, ...]
+    floor: FloatArray
+    free: tuple[str, ...]
+    known: Constants | None = None
+    processes: int = 1
+    kinds: tuple[str, ...] | None = None
+
+    def model_of(self, explanation: Explanation) -> Model:
+        """The model with the effects of an explanation and its fitted parameters."""
+        model = self.model
+        for h in explanation.hypotheses:
+            model = model_with(model, h)
+        p = explanation.fit.p
+        return model.with_parameters({q.name: float(v) for q, v in zip(model.parameters, p, strict=True)})
+
+    def base(self, p: FloatArray) -> Explanation:
+        """The model as it is, fitted from parameters (np,)."""
+        return Explanation((), self.fitter(self.model, ()).fit(p), 0)
+
+    def fitter(self, model: Model, own: Sequence[str]) -> Refitter:
+        """Fits of a model with the constants and further parameters free."""
+        return Refitter(model, self.record, self.columns, self.floor, (*self.free, *own), self.known)
+
+    def run(self, base: Explanation, progress: Callable[[str], None] = lambda stage: None) -> list[Explanation]:
+        """All explanations that were refitted, the best first; the model as it is among them."""
+        found, beam, best = [base], [base], base
+        for count in range(1, MOST_EFFECTS + 1):
+            progress(f"innovations form: explanations of {count} effect{'s' if count > 1 else ''}")
+            further = [e for start in beam for e in self._further(start)]
+            ranked = _distinct(further)
+            if count > 1:
+                ranked = _distinct([*map(self.settled, ranked[: 2 * BEAM]), *ranked[2 * BEAM :]])
+            found += ranked
+            if not ranked or ranked[0].criterion < best.criterion + LEAST_GAIN:
+                break
+            beam, best = ranked[:BEAM], ranked[0]
+        return sorted(found, key=lambda e: -e.criterion)
+
+    def _further(self, start: Explanation) -> list[Explanation]:
+        """The explanation with one more effect, for each that is worth its numbers."""
+        model = self.model_of(start)
+        response = self.fitter(model, start.free).response(start.fit, [s.name for s in self.model.sites])
+        # one course in time at most: a second one would draw whatever is left
+        events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
+        screened = Screening(model, response).all(events=events)
+        chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
+        refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes, lambda: None)
+        return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
+
+    def _may(self, kind: str) -> bool:
+        return self.kinds is None or kind in self.kinds
+
+    def settled(self, explanation: Explanation) -> Explanation:
+        """The same, its switch placed anew beside the other effects, where that is better."""
+        switch = next((h for h in explanation.hypotheses if h.kind == "switch"), None)
+        if switch is None or len(explanation.hypotheses) < 2:
+            return explanation
+        without = self.without(explanation, switch)
+        model = self.model_of(without)
+        response = self.fitter(model, without.free).response(without.fit, [switch.site])
+        site = next(s for s in self.model.sites if s.name == switch.site)
+        placed = Screening(model, response).switch(site)
+        again = self._with(without, placed) if placed is not None else None
+        return again if again is not None and again.criterion > explanation.criterion else explanation
+
+    def without(self, explanation: Explanation, left_out: Hypothesis) -> Explanation:
+        """The explanation without one of its effects, fitted anew."""
+        others = tuple(h for h in explanation.hypotheses if h is not left_out)
+        model = self.model
+        for h in others:
+            model = model_with(model, h)
+        now = self.model_of(explanation)
+        p = np.array([now.parameters[now.index("parameters", q.name)].value for q in model.parameters])
+        fit = self.fitter(model, tuple(n for h in others for n in h.parameters)).fit(p, explanation.fit.size)
+        return Explanation(others, fit, explanation.numbers - numbers_of(left_out))
+
+    def added(self, start: Explanation, h: Hypothesis, p: FloatArray) -> Explanation:
+        """The explanation with an effect more, fitted from parameters of the model with it (np,)."""
+        model = model_with(self.model_of(start), h)
+        fit = self.fitter(model, (*start.free, *h.parameters)).fit(p, start.fit.size)
+        return Explanation((*start.hypotheses, h), fit, start.numbers + numbers_of(h))
+
+    def _with(self, start: Explanation, screened: Screened) -> Explanation | None:
+        h = screened.suspect.hypothesis
+        model = model_with(self.model_of(start), h)
+        p = model.parameter_values
+        p[: len(start.fit.p)] = start.fit.p
+        for name, value in zip(screened.suspect.coefficients, screened.size, strict=True):
+            q = model.parameters[model.index("parameters", h.effect.parameter(name))]
+            first = np.log(np.clip(1 + value, 1 / FURTHEST, FURTHEST)) if h.effect.mode == "factor" else value
+            p[model.index("parameters", q.name)] = np.clip(first, q.lower, q.upper)
+        again = self.added(start, h, p)
+        return again if np.isfinite(again.fit.log_likelihood) else None
+
+
+def numbers_of(h: Hypothesis) -> int:
+    """How many numbers a hypothesis was fitted by, those taken from a grid and the times of a switch too."""
+    times = [c for c, v in h.effect.coefficients.items() if c.startswith(("on_", "for_")) and v < FOREVER]
+    return len(h.free) + len(times)
+
+
+def _spread(ranked: Sequence[Screened]) -> list[Screened]:
+    """The best few: one of a kind, and few at one site."""
+    chosen: list[Screened] = []
+    for s in ranked:
+        h = s.suspect.hypothesis
+        same = [c.suspect.hypothesis for c in chosen if c.suspect.hypothesis.site == h.site]
+        if s.gain > 0 and len(same) < SAME_SITE and all((c.kind, c.driver) != (h.kind, h.driver) for c in same):
+            chosen.append(s)
+        if len(chosen) == REFITTED:
+            break
+    return chosen
+
+
+def _distinct(found: Sequence[Explanation]) -> list[Explanation]:
+    """The best of each set of effects, the best first."""
+    kept: dict[frozenset[tuple[str, str, str]], Explanation] = {}
+    for e in sorted(found, key=lambda e: -e.criterion):
+        kept.setdefault(e.names, e)
+    return list(kept.values())

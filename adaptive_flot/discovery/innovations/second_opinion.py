@@ -1,0 +1,137 @@
+"""A second opinion, in innovations form, on records that the free run does not explain.
+
+A free run with measurement noise alone has no place for what always wanders in a real process. So it bends that into an
+effect. Where the best alternative leaves an error far above the noise from row to row, its name is not believed before
+the innovations form has been asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.hypotheses.rows import noise_floor
+from adaptive_flot.discovery.innovations.in_words import told_in_words
+from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
+from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
+from adaptive_flot.discovery.verdict.conclude import report_errors
+from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
+from adaptive_flot.greybox.effects import Effect
+
+FAR = 3.0
+"""An error so many times the noise from row to row is not explained by measurement noise."""
+TELLS = ("named", "class", "unnamed")
+"""Words of the free run that the innovations form replaces only where it leaves a smaller error on the report rows."""
+MOST_WORK = 4_000
+"""Rows times states up to which the innovations form is tried: a longer record takes minutes."""
+
+
+def second_opinion(state: State) -> State:
+    """Ask the innovations form where the free run leaves too much, and keep only what both allow.
+
+    What it names, takes the place of the free run's verdict, where the report rows do not contradict it. A name of the
+    free run that it does not know is taken back.
+    """
+    problem, (before, _) = state.known_problem, state.refitted
+    asked = (state.judged.word == "abstain" and not state.contradiction) or _leaves_too_much(state)
+    if not asked or len(problem.record) * len(before.model.states) > MOST_WORK:
+        return state
+    state.progress("ask the innovations form")
+    record = replace(problem.record, initial_state=before.initial_state)
+    search = Search(
+        before.model, record, problem.columns, noise_floor([record], problem.columns), problem.adapted, None,
+        state.processes,
+    )  # fmt: skip
+    with np.errstate(all="ignore"):
+        base = search.base(before.model.parameter_values)
+        told = judge(search, base, search.run(base, state.progress))
+    if told.word in ("named", "class"):
+        return _told(state, search, told)
+    return _kept(state, told)
+
+
+def _kept(state: State, told: Told) -> State:
+    """The verdict of the free run where the innovations form tells nothing: less sure of a name, and of `none`."""
+    judgement = state.judged
+    named = {site for site, _ in judgement.best.names} if judgement.best and judgement.word == "named" else set()
+    if named and not named <= told.sites:
+        return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other sites explain more'}")
+    if judgement.word == "named" and judgement.best and any(_free_course(e) for e in judgement.best.effects):
+        return _taken_back(
+            state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
+        )
+    if judgement.word == "none" and judgement.best is None and told.word != "none":
+        return replace(
+            state,
+            judgement=replace(judgement, word="abstain"),
+            sentence="Something is missing, but the record does not say what: the error is far above the noise from "
+            f"row to row, and {told.why}.",
+        )
+    return state
+
+
+def _leaves_too_much(state: State) -> bool:
+    """By the rows of the record itself, each counted up to three standard deviations: outliers are no model error."""
+    problem, (_, after) = state.known_problem, state.refitted
+    left = np.where(problem.rows()[:, None], after.residual(problem), np.nan)
+    noise = noise_by_differences(problem.measured)
+    return any(clipped_std(e) > FAR * s for e, s in zip(left.T, noise, strict=True) if s > 0)
+
+
+def _taken_back(state: State, why: str) -> State:
+    judgement = replace(state.judged, word="abstain", members=())
+    return replace(state, judgement=judgement, contradiction=why)
+
+
+def _free_course(effect: Effect) -> bool:
+    return effect.driver == "time" and effect.family.is_curve
+
+
+def _told(state: State, search: Search, told: Told) -> State:
+    """The verdict of the innovations form, with a free run of the extended model beside that of the plain one."""
+    problem, (before, _) = state.known_problem, state.refitted
+    after = _free_run(state, search, told, before)
+    if after is None:
+        return _kept(state, told)
+    names = tuple((h.site, h.driver) for h in told.best.hypotheses)
+    best = Alternative(names, (True,) * len(names), after, before.loss - after.loss, after.bic - before.bic)
+    members = tuple((h.site, h.driver) for _, h in told.open)
+    judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
+    error = report_errors(problem, before, after, state.report_record)
+    record = problem.record if state.report_record is None else state.report_record
+    against = contradiction(judgement, error, noise_from_row_to_row(record.outputs, before.model, error))
+    if against or (state.judged.word in TELLS and not _smaller(error, state.error)):
+        return _kept(state, told)
+    _, result = state.searched
+    return replace(
+        state,
+        search=replace(result, alternatives=(best,), verification=None),
+        judgement=judgement,
+        after=after,
+        error=error,
+        contradiction="",
+        certain="",
+        sentence=told_in_words(search, told),
+    )
+
+
+def _smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...]) -> bool:
+    """Whether errors on the report rows are smaller than others, by the geometric mean over the outputs."""
+    with np.errstate(all="ignore"):
+        ratios = [np.log(a.after / b.after) for a, b in zip(error, than, strict=True) if a.after > 0 and b.after > 0]
+    return not ratios or float(np.mean(ratios)) < 0
+
+
+def _free_run(state: State, search: Search, told: Told, before: Fit) -> Fit | None:
+    """The extended model fitted to all rows but the report split, from where the innovations form has it."""
+    problem = replace(state.known_problem, nodes=None)
+    model = search.model_of(told.best)
+    fitter = Fitter(problem, ("estimate", "confirm"))
+    start = {p.name: p.value for p in model.parameters}
+    fit = fitter.fit(model, told.best.free, start, like=before, rounds=2)
+    return None if fit is None else fitter.with_intervals(fit)

@@ -1,0 +1,152 @@
+"""When something at a site was switched on and off: one size for all times, the times from the innovations.
+
+The response to a switch is that of the steps at its edges, so all pairs of edges are compared through one matrix of
+products. Pulses are added while they are worth their two times by the Bayesian information criterion. Then each is
+taken out and placed anew until none moves. Basseville & Nikiforov (1993), 2.6; Fearnhead & Rigaill, *J. Am. Stat.
+Assoc.* 114 (2019) 169, on changes of level that are found in order of their gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adaptive_flot.greybox.model import FloatArray
+
+IntArray = NDArray[np.int_]
+BoolArray = NDArray[np.bool_]
+
+MOST_EDGES = 600
+"""Most times between which a switch is looked for; a longer record has a coarser grid, refined at the end."""
+MOST_PULSES = 8
+ROUNDS = 4
+"""Rounds in which every pulse is placed anew."""
+WORTH = 2.0
+"""Gain of a pulse in log-likelihood, in log n: the best of all n^2 / 2 pairs of edges gains about so much by chance."""
+SHORTEST = 2
+"""Fewest rows of a pulse: a single row is an outlier."""
+
+
+@dataclass(frozen=True)
+class Switch:
+    """When it was on, for one site.
+
+    Attributes
+    ----------
+    pulses
+        First interval in which it is on, and first in which it is off again (the number of intervals where it lasts).
+    size
+        Factor of the course while it is on, as fitted by the regression.
+    gain
+        Of the log-likelihood over the model without, with the spread of the innovations fitted in both.
+    """
+
+    pulses: tuple[tuple[int, int], ...]
+    size: float
+    gain: float
+
+    def mask(self, count: int) -> FloatArray:
+        """1 in the intervals in which it is on, else 0 (count,)."""
+        mask = np.zeros(count)
+        for a, b in self.pulses:
+            mask[a:b] = 1.0
+        return mask
+
+
+def best_switch(steps: FloatArray, edges: IntArray, innovations: FloatArray, count: int) -> Switch | None:
+    """Find the switch of one size that explains most; None where none is worth its times.
+
+    Parameters
+    ----------
+    steps
+        Response to steps of the course at each edge (n, g), what the constants explain projected out.
+    edges
+        First interval of each step, rising (g,).
+    innovations
+        What is to be explained (n,), projected likewise.
+    count
+        Number of intervals.
+    """
+    n = len(innovations)
+    G, b = steps.T @ steps, steps.T @ innovations
+    total = float(innovations @ innovations)
+    G = np.pad(G, (0, 1))  # the last edge is the end of the record: a step that never comes
+    b = np.append(b, 0.0)
+    ends = np.append(edges, count)
+    allowed = (ends[None, :] - ends[:, None]) >= SHORTEST
+    search = _Search(G, b, total, n, ends, allowed)
+    chosen: list[tuple[int, int]] = []
+    best = 0.0
+    while len(chosen) < MOST_PULSES:
+        pulse, gain = search.best_beside(chosen)
+        if pulse is None or gain - best < WORTH * np.log(n):
+            break
+        chosen, best = search.settled([*chosen, pulse])
+    if not chosen:
+        return None
+    pulses = tuple(sorted((int(ends[i]), int(ends[j])) for i, j in chosen))
+    return Switch(pulses, search.size(chosen), best)
+
+
+@dataclass(frozen=True)
+class _Search:
+    G: FloatArray
+    b: FloatArray
+    total: float
+    n: int
+    ends: IntArray
+    allowed: BoolArray
+
+    def _sums(self, chosen: Sequence[tuple[int, int]]) -> tuple[float, float, FloatArray]:
+        """Products of the chosen pulses together with the innovations, themselves and every step."""
+        c = np.zeros(len(self.b))
+        for i, j in chosen:
+            c[i] += 1
+            c[j] -= 1
+        row = self.G @ c
+        return float(self.b @ c), float(c @ row), row
+
+    def size(self, chosen: Sequence[tuple[int, int]]) -> float:
+        num, den, _ = self._sums(chosen)
+        return num / den if den > 0 else 0.0
+
+    def gain(self, chosen: Sequence[tuple[int, int]]) -> float:
+        num, den, _ = self._sums(chosen)
+        return self._log_gain(num**2 / den if den > 0 else 0.0)
+
+    def _log_gain(self, explained: float) -> float:
+        return self.n / 2 * float(np.log(self.total / max(self.total - explained, 1e-9 * self.total)))
+
+    def best_beside(self, chosen: Sequence[tuple[int, int]]) -> tuple[tuple[int, int] | None, float]:
+        """The pulse that explains most together with the chosen ones, and the gain of all."""
+        num, den, row = self._sums(chosen)
+        diagonal = np.diag(self.G)
+        both = num + self.b[:, None] - self.b[None, :]
+        spread = den + diagonal[:, None] + diagonal[None, :] - 2 * self.G + 2 * (row[:, None] - row[None, :])
+        free = self.allowed.copy()
+        for i, j in chosen:  # no overlap, not even an edge in common
+            free &= (self.ends[None, :] < self.ends[i]) | (self.ends[:, None] > self.ends[j])
+        least = 1e-9 * float(diagonal.max() or 1.0)
+        explained = np.where(free & (spread > least), both**2 / np.maximum(spread, least), 0.0)
+        where = int(np.argmax(explained))
+        i, j = divmod(where, explained.shape[1])
+        if not explained[i, j] > 0:
+            return None, 0.0
+        return (i, j), self._log_gain(float(explained[i, j]))
+
+    def settled(self, chosen: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], float]:
+        """Each pulse taken out and placed anew, until none moves."""
+        pulses = list(chosen)
+        for _ in range(ROUNDS):
+            before = list(pulses)
+            for k in range(len(pulses)):
+                others = pulses[:k] + pulses[k + 1 :]
+                placed, _ = self.best_beside(others)
+                if placed is not None and self.gain([*others, placed]) > self.gain(pulses):
+                    pulses = [*others[:k], placed, *others[k:]]
+            if pulses == before:
+                break
+        return pulses, self.gain(pulses)

@@ -1,0 +1,31 @@
+"""The heated box: what is told of a lid that someone opens, on a process that is not flotation."""
+
+import pytest
+
+from adaptive_flot.discovery.changes import find_changes
+from adaptive_flot.discovery.discover import discover
+from tests.discovery.innovations.box import DT, LIDS, model, record
+
+
+def test_an_opened_lid_is_a_loss_that_is_switched_at_its_times() -> None:
+    """The lid's log is not known to the search; a free curve in time at the thermometer is not the answer."""
+    verdict = discover(model(), record()).verdict
+    assert verdict.word in ("named", "class"), verdict.reason
+    switch = next(e.effect for e in verdict.effects if e.effect.driver == "time")
+    assert (switch.site, switch.form) == ("loss", "switch")
+    for k, (a, b) in enumerate(LIDS, start=1):
+        on, duration = switch.coefficients[f"on_{k}"], switch.coefficients[f"for_{k}"]
+        assert on == pytest.approx(a, abs=1.5 * DT) and on + duration == pytest.approx(b, abs=1.5 * DT)
+    assert "times as large while something is switched" in verdict.reason
+    assert verdict.error[0].after < 0.3 * verdict.error[0].before
+
+
+def test_nothing_is_named_where_the_box_stayed_closed() -> None:
+    verdict = find_changes(model(), [record((), seed=1)], [record((), seed=2)]).verdict
+    assert verdict.word not in ("named", "class"), verdict.reason
+
+
+def test_an_opened_lid_is_told_against_a_closed_reference() -> None:
+    verdict = find_changes(model(), [record(seed=3)], [record((), seed=2)]).verdict
+    told = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    assert verdict.word in ("named", "class") and "loss" in told and told <= {"loss", "other_heat"}, verdict.reason
