@@ -19,7 +19,7 @@ from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.known_before import Constants
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.rows import noise_floor
-from adaptive_flot.discovery.innovations.event_verdict import event_verdict
+from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -53,18 +53,15 @@ def find_changes(
         return compared
     reference = max(references, key=len)
     with np.errstate(all="ignore"):
-        search, base, told = _events(compared, records[0], reference, processes, progress)
+        search, told = _events(compared, records[0], reference, processes, progress)
     if told.word not in ("named", "class") or not _has_event(told):
         return compared
-    verdict = event_verdict(compared.verdict, search, base, told)
-    return replace(
-        compared, verdict=replace(verdict, seconds=time.perf_counter() - began), model=search.model_of(told.best)
-    )
+    return with_event(compared, search, told, time.perf_counter() - began)
 
 
 def _events(
     compared: Comparison, record: Dataset, reference: Dataset, processes: int, progress: Callable[[str], None]
-) -> tuple[Search, Explanation, Told]:
+) -> tuple[Search, Told]:
     """Events in a record, by a model that has what the reference lacks."""
     calibration, columns = compared.calibration, compared.rows.columns
     constants, model = calibration.constants, calibration.model
@@ -82,7 +79,7 @@ def _events(
     base = search.base(extended.parameter_values)
     told = judge(search, base, search.run(base, progress))
     before = replace(before, model=extended)
-    return search, base, _changed(told, search, before, before.base(extended.parameter_values))
+    return search, _changed(told, search, before, before.base(extended.parameter_values))
 
 
 def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:

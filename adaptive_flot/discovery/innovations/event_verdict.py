@@ -1,4 +1,8 @@
-"""The verdict on an event that the innovations form has found in a record with a reference."""
+"""The verdict on an event that the innovations form has found in a record with a reference.
+
+The innovations form says what and when. Errors come from free runs, on stretches that did not fit the size of the
+event, like those of any other hypothesis.
+"""
 
 from __future__ import annotations
 
@@ -6,56 +10,62 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.innovations.in_words import told_in_words, words_at
+from adaptive_flot.discovery.hypotheses.comparison import blocks_of, rms
+from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, model_with, test_on_stretches
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.judgement import Judged
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.telling import verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
-from adaptive_flot.greybox.filtering import prediction_errors
-from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.stepper import Stepper
-
-AHEAD = 20
-"""Rows that the errors of the verdict are predicted ahead, at most."""
-JUDGED_ON = f"predictions up to {AHEAD} rows ahead"
 
 
-def event_verdict(verdict: Verdict, search: Search, base: Explanation, told: Told) -> Verdict:
-    """Tell an event instead of what the whole record was compared for.
+def with_event(compared: Comparison, search: Search, told: Told, seconds: float) -> Comparison:
+    """The comparison with the event told; unchanged where free runs do not get better by it.
 
     Parameters
     ----------
-    verdict
-        What the comparison of the whole record says; its notes stay.
-    search, base, told
-        The search in innovations form, the model as it is, and what was judged.
+    compared
+        The comparison of the whole record.
+    search, told
+        The search in innovations form, and what was judged: events, and nothing else.
+    seconds
+        How long it took.
     """
-    before, after = (_ahead(search, e) for e in (base, told.best))
-    outputs = [search.model.outputs[c] for c in search.columns]
-    error = tuple(
-        OutputChange(q.name, q.unit, float(b), float(a), float(n), (float("nan"), float("nan")))
-        for q, b, a, n in zip(outputs, before, after, search.floor, strict=True)
-    )
-    model = search.model_of(told.best)
-    said = told.certain or tuple(h for _, h in told.open[:1])
-    fitted = {e.label: e for e in model.fitted_effects()}
-    effects = tuple(NamedEffect(fitted[h.effect.label], words_at(search, told.best, h), {}, ()) for h in said)
-    helped = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in error)
+    model, rows = search.model, compared.rows
+    constants = search.known or compared.calibration.constants
+
+    def tested(hypothesis: Hypothesis | None) -> Tested | None:
+        fitted = fit_all_rows(model, rows, hypothesis, constants, None if hypothesis is None else null_fit)
+        return None if fitted is None else test_on_stretches(model, rows, fitted, hold_constants=True)
+
+    first = fit_all_rows(model, rows, None, constants, None)
+    assert first is not None  # the model as it is can be simulated
+    null_fit = first.fit
+    null = test_on_stretches(model, rows, first, hold_constants=True)
+    events = [(told.best, h) for h in told.certain] or list(told.open)
+    found = [t for e, h in events if (t := tested(_started(search, e, h))) is not None]
+    if not found or not np.nanmean(rms(rows, found[0].fresh) / rms(rows, null.fresh)) < 1:
+        return compared
+    word = "class" if told.word == "class" and len(found) > 1 else "named"
+    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))  # type: ignore[arg-type]
+    calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
+    verdict = verdict_of(calibration, rows, blocks, null, judged, True, seconds)
+    over_all = f"Over the whole record: {compared.verdict.reason}"
     return replace(
-        verdict,
-        word=told.word,
-        reason=f"{told_in_words(search, told)} Error up to {AHEAD} rows ahead: {helped}.",
-        effects=effects,
-        members=tuple((h.site, h.driver) for _, h in told.open) if told.word == "class" else (),
-        error=error,
-        split=JUDGED_ON,
-        notes=(*verdict.notes, f"Over the whole record: {verdict.reason}"),
+        compared,
+        verdict=replace(verdict, notes=(*verdict.notes, over_all)),
+        model=model_with(model, found[0].hypothesis).with_parameters(found[0].fit.values),
+        calibration=calibration,
+        blocks=blocks,
+        null=null,
+        tested=(*found, *compared.tested),
+        judged=judged,
     )
 
 
-def _ahead(search: Search, explanation: Explanation) -> FloatArray:
-    """Root mean square error of each output up to AHEAD rows ahead of the filter (m,)."""
-    model, fit = search.model_of(explanation), explanation.fit
-    stepper = Stepper(model, search.record.dt)
-    errors = prediction_errors(stepper, search.record, fit.filtered, search.columns, (), fit.p, AHEAD)
-    rms: FloatArray = np.sqrt(np.nanmean(errors**2, axis=0))
-    return rms
+def _started(search: Search, explanation: Explanation, h: Hypothesis) -> Hypothesis:
+    """The hypothesis with its fitted coefficients to start from."""
+    model = search.model_of(explanation)
+    values = {c: model.parameters[model.index("parameters", h.effect.parameter(c))].value for c in h.free}
+    return replace(h, starts=(values,))

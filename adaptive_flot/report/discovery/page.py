@@ -84,6 +84,8 @@ def _title(discovery: Discovery) -> str:
     """What is missing where it has a name, else what the verdict means."""
     verdict = discovery.verdict
     if verdict.word == "named" and verdict.effects:
+        if not verdict.reason.startswith("The model lacks"):  # the innovations form says it with sizes and times
+            return verdict.reason.partition(". ")[0]
         names = [f"{spaced(e.effect.site)} depends on {spaced(e.effect.driver)}" for e in verdict.effects]
         return capital(f"{joined(names)}, which the model lacks")
     return capital(TITLES[verdict.word])

@@ -29,3 +29,4 @@ def test_an_opened_lid_is_told_against_a_closed_reference() -> None:
     verdict = find_changes(model(), [record(seed=3)], [record((), seed=2)]).verdict
     told = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
     assert verdict.word in ("named", "class") and "loss" in told and told <= {"loss", "other_heat"}, verdict.reason
+    assert verdict.error[0].after < 0.3 * verdict.error[0].before and verdict.error[0].reduction95[0] > 0
