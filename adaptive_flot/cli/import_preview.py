@@ -41,7 +41,7 @@ def import_asking(source: Source, model: Model, given: TagMap, answer: Ask | Non
     DataError, RangeError
         The export can not be used.
     """
-    whole = all(q.name in given.quantities for q in model.inputs)
+    whole = all(given.names(q.name) for q in model.inputs)
     known = given
     while True:
         try:

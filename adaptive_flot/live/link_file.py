@@ -15,7 +15,8 @@ from adaptive_flot.greybox.quantities import Parameter, Quantity
 from adaptive_flot.live.safety.checks import TagRules
 from adaptive_flot.live.safety.limits import WriteLimit
 from adaptive_flot.live.safety.modes import Mode, ModeRules
-from adaptive_flot.records.tag_map import Duration, TagKeys
+from adaptive_flot.records.map_values import Duration
+from adaptive_flot.records.tag_map import TagKeys
 from adaptive_flot.records.units import convert, seconds
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.scenario import Scenario

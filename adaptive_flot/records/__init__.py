@@ -3,6 +3,7 @@
 Map
 ---
 tag_map.py    The map from tags to quantities of a model (YAML), which the live link reads too.
+map_values.py  Durations, units, zones and codes in it, checked as they are read.
 units.py      Units and durations as plants write them.
 reading/      From bytes to signals.
 guess.py      Which tag measures which quantity, and in what unit.

@@ -14,7 +14,7 @@ from adaptive_flot.greybox.data.columns import shown
 from adaptive_flot.greybox.data.wrong_unit import is_far_outside, units_that_fit
 from adaptive_flot.greybox.quantities import FloatArray, Quantity
 from adaptive_flot.records.reading.export import Instants, Signal
-from adaptive_flot.records.tag_map import TagKeys
+from adaptive_flot.records.tag_map import ConstantKeys, TagKeys
 from adaptive_flot.records.units import convert, is_unit, read_unit
 
 FATES = ("good", "code", "quality", "range", "frozen", "spike")
@@ -49,6 +49,8 @@ class Cleaned:
         Values left out because they only repeat the one before.
     repeated
         Values left out because a later row of the file has another for the same time.
+    constant
+        Whether it is no signal but one value that the map gives: it has no time of its own.
     """
 
     quantity: Quantity
@@ -60,6 +62,7 @@ class Cleaned:
     raw: FloatArray
     repeats: int = 0
     repeated: int = 0
+    constant: bool = False
 
     @property
     def good(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -130,6 +133,30 @@ def clean(signal: Signal, quantity: Quantity, keys: TagKeys, file: Path) -> Clea
         int((~fresh).sum()),
         signal.repeated,
     )
+
+
+def constant(quantity: Quantity, keys: ConstantKeys, file: Path) -> Cleaned:
+    """An input that nobody records, with the value that the map gives.
+
+    Raises
+    ------
+    DataError
+        Its unit is not one of the quantity.
+    RangeError
+        It is outside what is possible.
+    """
+    where = f"{file}: {quantity.name}: the map's constant"
+    raw = np.array([keys.constant])
+    with located(where):
+        values = convert(raw, keys.unit, quantity.unit)
+    if not quantity.lower <= values[0] <= quantity.upper:
+        raise RangeError(
+            f"{where} {keys.constant:g} {keys.unit} is {values[0]:g} {quantity.unit}, outside what is possible "
+            f"([{quantity.lower:g}, {quantity.upper:g}] {quantity.unit}); correct value or unit in the map"
+        )
+    good = np.zeros(1, dtype=np.int8)
+    shown_keys = TagKeys(tag="constant", unit=keys.unit)
+    return Cleaned(quantity, shown_keys, keys.unit, np.zeros(1, dtype=np.int64), values, good, raw, constant=True)
 
 
 def _is_number(code: str) -> bool:

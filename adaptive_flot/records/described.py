@@ -37,6 +37,8 @@ def done(imported: Imported) -> list[tuple[str, str]]:
 
 def _done(imported: Imported, c: Cleaned) -> str:
     grid = imported.tag_map.grid
+    if c.constant:
+        return "not recorded: the constant of the map in every row"
     if imported.is_input(c.quantity.name):
         held = c.keys.hold_at_most or grid.hold_at_most
         what = {"split": "a gap splits the record", "longest": "the longest stretch is kept", "refuse": "refused"}

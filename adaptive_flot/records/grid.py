@@ -19,8 +19,8 @@ from adaptive_flot.greybox.quantities import FloatArray
 from adaptive_flot.records.clean import Cleaned
 from adaptive_flot.records.reading.export import Instants
 
-STATUSES = ("measured", "held", "averaged", "missing", "bad")
-MEASURED, HELD, AVERAGED, MISSING, BAD = range(len(STATUSES))
+STATUSES = ("measured", "held", "averaged", "missing", "bad", "constant")
+MEASURED, HELD, AVERAGED, MISSING, BAD, CONSTANT = range(len(STATUSES))
 FEWEST_ROWS = 2
 """Rows of the shortest stretch that is kept."""
 Codes = np.ndarray[Any, np.dtype[np.int8]]
@@ -81,19 +81,20 @@ def make_rows(
     if step < 1 or hold < step:
         raise DataError(f"{file}: hold_at_most ({hold_s:g} s) is shorter than the step ({step_s:g} s); make it longer")
     slack = step // 1000
-    end = max(int(c.time[c.good][-1]) for c in (*inputs, *outputs))
+    moving = [c for c in inputs if not c.constant]
+    end = max(int(c.time[c.good][-1]) for c in (*moving, *outputs))
     known = [(-(2**62), 2**62)]
-    for c in inputs:
+    for c in moving:
         own = hold if c.keys.hold_s is None else round(c.keys.hold_s * 1e9)
         known = _both(known, _covered(c.time[c.good], own, end))
-    anchor = _anchor(inputs[0].time[inputs[0].good], step)
+    anchor = _anchor(moving[0].time[moving[0].good], step)
     spans = []
     for a, b in known:
         first, last = -(-(a - slack - anchor) // step), (b + slack - anchor) // step
         spans += [(first, last)] if last > first else []
     whole = [(a, b) for a, b in spans if b - a >= FEWEST_ROWS]
     total = sum(b - a for a, b in whole)
-    _check(whole, total, gaps, anchor, step, hold_s, inputs, file)
+    _check(whole, total, gaps, anchor, step, hold_s, moving, file)
     if gaps == "longest":
         whole = [max(whole, key=lambda s: s[1] - s[0])]
     edges = [anchor + step * np.arange(a, b + 1, dtype=np.int64) for a, b in whole]
@@ -182,6 +183,9 @@ def _input(cleaned: Cleaned, edges: Instants, step: int) -> tuple[FloatArray, Co
 
         u[k] = 1/step * sum_i v_i d_i,    d_i: how long v_i was held in the interval
     """
+    if cleaned.constant:
+        count = len(edges) - 1
+        return np.full(count, cleaned.values[0]), np.full(count, CONSTANT, dtype=np.int8)
     time, held = cleaned.time[cleaned.good], cleaned.values[cleaned.good]
     slack = step // 1000
     at = np.searchsorted(time, edges[:-1] + slack, side="right") - 1

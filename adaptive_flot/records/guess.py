@@ -81,12 +81,12 @@ def guess_tags(export: Export, model: Model, known: TagMap, *, outputs: bool = T
     DataError
         A tag of the map is not in the export, or no tag suits an input.
     """
-    known.check_names((*model.names("inputs"), *model.names("outputs")), model.name)
+    _check_names(known, model)
     for name, keys in known.quantities.items():
         if keys.tag not in export.signals:
             raise DataError(f"{export.file}: {name}: no tag {keys.tag!r}; {near_match(keys.tag, export.signals)}")
     for group in (model.inputs, model.outputs if outputs else ()):  # an output never takes a tag that an input needs
-        wanted = [q for q in group if q.name not in known.quantities]
+        wanted = [q for q in group if not known.names(q.name)]
         used = {keys.tag for keys in known.quantities.values()}
         signals = [s for tag, s in export.signals.items() if tag not in used and np.isfinite(s.values).mean() > 0.2]
         for q, signal in _assigned(wanted, signals, model, export):
@@ -96,6 +96,23 @@ def guess_tags(export: Export, model: Model, known: TagMap, *, outputs: bool = T
         if own is not None and own.unit is None:
             known = known.with_keys(q.name, {"unit": _one_unit(q, own, export)})
     return known
+
+
+def _check_names(known: TagMap, model: Model) -> None:
+    """Names are those of the model, and a constant is one of its inputs."""
+    parameters = {label for p in model.parameters for label in (p.name, p.symbol)}
+    for name in (*known.quantities, *known.constants):
+        if name in parameters:
+            raise DataError(
+                f"{name}: a parameter of model '{model.name}', and no quantity of a record; give its value in the "
+                "cell or model file, and leave it out of the map"
+            )
+    known.check_names((*model.names("inputs"), *model.names("outputs")), model.name)
+    for name in known.constants:
+        if name in model.names("outputs"):
+            raise DataError(f"{name}: an output of model '{model.name}' is measured; only an input can be constant")
+    if all(name in known.constants for name in model.names("inputs")):
+        raise DataError(f"all inputs of model '{model.name}' are constant in the map; name the tag of one that moves")
 
 
 def candidate(q: Quantity, signal: Signal) -> Candidate | None:

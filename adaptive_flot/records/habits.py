@@ -121,7 +121,8 @@ def period(signal: Signal) -> tuple[float, bool]:
 
 def _grid(export: Export, model: Model, known: TagMap) -> TagMap:
     """Step: that of the fastest regular input, else a round one for the fastest. Held for three steps."""
-    inputs = [export.signals[known.quantities[q.name].tag] for q in model.inputs]
+    moving = [q for q in model.inputs if q.name not in known.constants]
+    inputs = [export.signals[known.quantities[q.name].tag] for q in moving]
     with located(str(export.file)):
         found = {s.tag: period(s) for s in inputs}
     if known.grid.step is None:
@@ -133,7 +134,7 @@ def _grid(export: Export, model: Model, known: TagMap) -> TagMap:
     if known.grid.hold_at_most is None:
         known = known.with_keys("grid", {"hold_at_most": f"{STEPS_HELD * step_s:.6g} s"})
     held = seconds(known.grid.hold_at_most or "")
-    for q, signal in zip(model.inputs, inputs, strict=True):
+    for q, signal in zip(moving, inputs, strict=True):
         usual, even = found[signal.tag]
         keys = known.quantities[q.name]
         if keys.hold_at_most is None and (not even or usual > held / 1.5):

@@ -13,7 +13,7 @@ from adaptive_flot.greybox.data.dataset import TIME_COLUMN
 from adaptive_flot.greybox.data.stretches import STRETCH
 from adaptive_flot.greybox.data.tables import Source, read_table
 from adaptive_flot.greybox.model import Model, Quantity
-from adaptive_flot.records.clean import Cleaned, clean
+from adaptive_flot.records.clean import Cleaned, clean, constant
 from adaptive_flot.records.grid import STATUSES, Rows, make_rows
 from adaptive_flot.records.guess import guess_tags
 from adaptive_flot.records.habits import complete_habits
@@ -65,9 +65,8 @@ class Imported:
         """The record, with the columns that `read_dataset` reads.
 
         Time [s] from the first row, or as in the table where that was a record; `stretch`, where there are several; a
-        column a quantity, named with its unit; a
-        status a quantity (`air_flow_status`): measured, held, averaged, missing or bad; and the time in UTC, where the
-        export is dated.
+        column a quantity, named with its unit; a status a quantity (`air_flow_status`): measured, held, averaged,
+        missing, bad or constant; and the time in UTC, where the export is dated.
         """
         rows = self.rows
         since = ((rows.time - rows.time[0]) // rows.step) * (rows.step / 1e9)
@@ -112,14 +111,16 @@ def import_table(source: Source, model: Model, given: TagMap, *, outputs: bool |
     export = read_export(source, given)
     if export.time_keys.column == TIME_COLUMN and all(q.column in export.signals for q in model.inputs):
         export = acting_from_the_row_before(export, model.inputs)
-    whole = all(q.name in given.quantities for q in model.inputs)
+    whole = all(given.names(q.name) for q in model.inputs)
     full = given.model_copy(update={"file": export.file_keys, "time": export.time_keys})
     full = guess_tags(export, model, full, outputs=not whole if outputs is None else outputs)
     full = complete_habits(export, model, full)
     cleaned = tuple(
-        clean(export.signals[full.quantities[q.name].tag], q, full.quantities[q.name], export.file)
+        constant(q, full.constants[q.name], export.file)
+        if q.name in full.constants
+        else clean(export.signals[full.quantities[q.name].tag], q, full.quantities[q.name], export.file)
         for q in (*model.inputs, *model.outputs)
-        if q.name in full.quantities
+        if full.names(q.name)
     )
     count = len(model.inputs)
     grid = full.grid

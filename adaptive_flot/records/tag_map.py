@@ -6,6 +6,7 @@
     grid: {step: 10 s, hold_at_most: 30 s, gaps: split}
     air_flow: {tag: FIC_101.PV, unit: L/min, bad: [Bad Input, -9999]}
     concentrate_grade: {tag: AI_401.PV, unit: "%", delay: 90 s}
+    feed_flow: {constant: 10, unit: L/min}
 
 The importer and the live link read the same file. This module needs neither pandas nor a model.
 """
@@ -15,64 +16,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
-from zoneinfo import ZoneInfo
 
 import yaml
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from adaptive_flot.errors import DataError, near_match
-from adaptive_flot.records.units import read_unit, seconds
+from adaptive_flot.records.map_values import Codes, Duration, TimeForm, UnitText, Zone
+from adaptive_flot.records.units import seconds
 from adaptive_flot.yaml_files import line_of, read_yaml
 from adaptive_flot.yaml_problems import first_problem
 
 SECTIONS = ("file", "time", "grid")
 """Keys of the outermost level that are no quantities."""
-FORMATS = ("iso", "day-first", "month-first", "epoch s", "epoch ms", "excel", "seconds", "minutes", "hours")
-"""Forms of a time; the last three count from the start of the record."""
-
-
-def _duration(text: object) -> object:
-    if not isinstance(text, str):
-        raise ValueError("a duration has a unit; write it as 10 s, 5 min or 1 h")
-    try:
-        value = seconds(text)
-    except DataError as error:
-        raise ValueError(str(error)) from error
-    if not 0 < value < 1e9:
-        raise ValueError("a duration is longer than nothing")
-    return text
-
-
-def _unit(text: str) -> str:
-    try:
-        read_unit(text)
-    except DataError as error:
-        raise ValueError(str(error)) from error
-    return text
-
-
-def _zone(name: str) -> str:
-    try:
-        ZoneInfo(name)
-    except (LookupError, ValueError, OSError) as error:
-        raise ValueError("no time zone; write one as Europe/London, or UTC") from error
-    return name
-
-
-def _format(text: str) -> str:
-    if text not in FORMATS and "%" not in text:
-        raise ValueError(f"no form of time; write one of {', '.join(FORMATS)}, or one as '%d.%m.%Y %H:%M'")
-    return text
-
-
-def _codes(given: object) -> object:
-    """Texts and numbers, one or a list of them, as texts."""
-    listed = given if isinstance(given, (list, tuple)) else [given]
-    return [str(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else v for v in listed]
-
-
-Duration = Annotated[str, BeforeValidator(_duration)]
-Codes = Annotated[tuple[str, ...], BeforeValidator(_codes)]
 
 
 class _Part(BaseModel):
@@ -101,8 +56,8 @@ class TimeKeys(_Part):
     """
 
     column: str | tuple[str, str] | None = None
-    zone: Annotated[str, AfterValidator(_zone)] | None = None
-    format: Annotated[str, AfterValidator(_format)] | None = None
+    zone: Zone | None = None
+    format: TimeForm | None = None
 
 
 class GridKeys(_Part):
@@ -146,7 +101,7 @@ class TagKeys(_Part):
     """
 
     tag: str
-    unit: Annotated[str, AfterValidator(_unit)] | None = None
+    unit: UnitText | None = None
     bad: Codes = ()
     delay: Duration | None = None
     hold_at_most: Duration | None = None
@@ -172,6 +127,13 @@ class TagKeys(_Part):
         return None if self.frozen is None else seconds(self.frozen)
 
 
+class ConstantKeys(_Part):
+    """An input that nobody records: its value, and the unit of that."""
+
+    constant: float
+    unit: UnitText
+
+
 class TagMap(_Part):
     """A map file. What it leaves out, an import finds out and asks for; see `adaptive_flot.records.guess`."""
 
@@ -179,15 +141,22 @@ class TagMap(_Part):
     time: TimeKeys = TimeKeys()
     grid: GridKeys = GridKeys()
     quantities: dict[str, TagKeys] = Field(default_factory=dict)
+    constants: dict[str, ConstantKeys] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod
     def _gather(cls, content: Any) -> Any:
-        """Put the keys of quantities, which stand beside the sections in the file, together."""
+        """Put the keys of quantities, which stand beside the sections in the file, together; so of constants."""
         if not isinstance(content, Mapping) or "quantities" in content:
             return content
         sections = {k: v for k, v in content.items() if k in SECTIONS}
-        return {**sections, "quantities": {k: v for k, v in content.items() if k not in SECTIONS}}
+        others = {k: v for k, v in content.items() if k not in SECTIONS}
+        constants = {k: v for k, v in others.items() if isinstance(v, Mapping) and "constant" in v}
+        return {**sections, "quantities": {k: others[k] for k in others if k not in constants}, "constants": constants}
+
+    def names(self, quantity: str) -> bool:
+        """Whether it says where a quantity comes from."""
+        return quantity in self.quantities or quantity in self.constants
 
     def with_keys(self, section: str, keys: Mapping[str, object]) -> TagMap:
         """Return this map with further keys in a section or at a quantity."""
@@ -207,14 +176,15 @@ class TagMap(_Part):
         DataError
             Names the first that is not, and the nearest that is.
         """
-        for name in self.quantities:
+        for name in (*self.quantities, *self.constants):
             if name not in known:
                 raise DataError(f"{name}: no such quantity of model '{model}'; {near_match(name, known)}")
 
     def text(self) -> str:
         """The map as YAML, one line a section or quantity, keys at their default left out."""
         content = self.model_dump(mode="json", exclude_defaults=True)
-        parts = {k: content[k] for k in SECTIONS if k in content} | content.get("quantities", {})
+        parts = {k: content[k] for k in SECTIONS if k in content}
+        parts |= content.get("quantities", {}) | content.get("constants", {})
         return "".join(
             yaml.safe_dump({k: v}, default_flow_style=None, sort_keys=False, width=10_000, allow_unicode=True)
             if not v
@@ -243,7 +213,7 @@ def load_tag_map(path: Path | str) -> TagMap:
         return TagMap.model_validate(content)
     except ValidationError as error:
         place = error.errors()[0]["loc"]
-        outer = place[1:] if place[:1] == ("quantities",) else place
+        outer = place[1:] if place[:1] in (("quantities",), ("constants",)) else place
         line = line_of(file, outer)
-        problem = first_problem(error, TagMap).replace("quantities.", "", 1)
+        problem = first_problem(error, TagMap).replace("quantities.", "", 1).replace("constants.", "", 1)
         raise DataError(f"{file}: {'' if line is None else f'line {line}: '}{problem}") from error

@@ -33,7 +33,7 @@ class SignalQuality:
     available
         Share of the rows that have a value.
     statuses
-        Rows by status: measured, held, averaged, missing, bad.
+        Rows by status: measured, held, averaged, missing, bad, constant.
     dropped
         Values of the export that do not count, by reason.
     holes, longest_hole_s

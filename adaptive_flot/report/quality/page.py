@@ -11,6 +11,7 @@ from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.files import write_text
 from adaptive_flot.records import described
 from adaptive_flot.records.clean import FATES
+from adaptive_flot.records.grid import CONSTANT, STATUSES
 from adaptive_flot.records.importing import Imported
 from adaptive_flot.records.quality.quality import FEWEST_ROWS, Quality
 from adaptive_flot.records.quality.signals import SignalQuality
@@ -129,27 +130,18 @@ def _done_table(imported: Imported) -> Table:
 
 
 def _availability_table(quality: Quality) -> Table:
+    words = [w for w in STATUSES if w != STATUSES[CONSTANT] or any(w in s.statuses for s in quality.signals)]
     rows = tuple(
         (
             spaced(s.name),
             number(100 * s.available, ".1f"),
-            *(str(s.statuses.get(word, 0)) for word in ("measured", "held", "averaged", "missing", "bad")),
+            *(str(s.statuses.get(word, 0)) for word in words),
             str(s.holes),
             _duration(s.longest_hole_s),
         )
         for s in quality.signals
     )
-    header = (
-        "Quantity",
-        "Available [%]",
-        "Measured",
-        "Held",
-        "Averaged",
-        "Missing",
-        "Bad",
-        "Holes",
-        "Longest hole [s]",
-    )
+    header = ("Quantity", "Available [%]", *(w.capitalize() for w in words), "Holes", "Longest hole [s]")
     caption = "Rows by how they came about. A hole is a time of more than 2.5 usual steps without a good value."
     return Table(caption, header, rows)
 
