@@ -79,4 +79,5 @@ def scenario_inputs(scenario: Scenario, *plugins: Mapping[str, Plugin] | Iterabl
         addresses += [p.use for p in given.values()] if isinstance(given, Mapping) else list(given)
     folder = scenario.path.parent
     plant = [] if file.plant.cell is None else model_inputs(file.model, file.plant.cell, folder)
-    return [scenario.path, *model_inputs(file.model, file.cell, folder, addresses), *plant]
+    records = [path for profile in scenario.recorded.values() for path in profile.paths(folder)]
+    return [scenario.path, *records, *model_inputs(file.model, file.cell, folder, addresses), *plant]

@@ -13,14 +13,19 @@ import pandas as pd
 
 from adaptive_flot.api.plugins import Choices, plugins
 from adaptive_flot.api.progress import counted
+from adaptive_flot.api.records import AnyMap, AnyRecord, read_map
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ResultError, ScenarioError, near_match
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.tables import named
+from adaptive_flot.processes.registry import read_measurements
 from adaptive_flot.report.kit.wording import seed_list
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_files, run_summary, write_json, write_runs
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
 from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.runner.scenario.recorded_inputs import on_record
 from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.targets import check_targets, scenario_inputs
 
@@ -154,6 +159,8 @@ def run(
     estimators: Choices = (),
     controllers: Choices = (),
     seeds: Iterable[int] = (),
+    record: AnyRecord | None = None,
+    tag_map: AnyMap | None = None,
     compiled: bool = False,
     progress: bool = False,
 ) -> Runs:
@@ -168,6 +175,11 @@ def run(
         under which they show: `{"mine": (MyEstimator, {"gain": 0.1})}`.
     seeds
         Seeds of the noise, whole numbers from 0 on; default those of the scenario.
+    record
+        Measured record whose inputs are played in place of the scenario's, for as long as it lasts. The plant, its
+        outputs and its noise stay simulated.
+    tag_map
+        Map file (or `TagMap`) where `record` is an export of a plant's historian.
     compiled
         Run step and estimators as machine code, by the C compiler of this system.
     progress
@@ -184,6 +196,8 @@ def run(
         The scenario can not be used, or a seed is no whole number.
     PluginError
         An estimator or controller can not be loaded.
+    DataError, RangeError
+        The record can not be used.
 
     Examples
     --------
@@ -193,6 +207,7 @@ def run(
     ['controller', 'estimator', 'seed', 'n', 'C', 'concentrate_grade']
     """
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    loaded = loaded if record is None else _on_record(loaded, record, tag_map)
     loaded = loaded.compiled() if compiled else loaded
     chosen = plugins(estimators, lambda name: estimator_plugin(loaded, name), "estimator")
     moved = plugins(controllers, lambda name: controller_plugin(loaded, name), "controller")
@@ -203,6 +218,13 @@ def run(
     count = len(extended.combinations(*who)) * len(numbers)
     with counted(progress, loaded.name, count) as advance:
         return Runs(extended, tuple(run_scenario(extended, who[0], numbers, advance, who[1])))
+
+
+def _on_record(scenario: Scenario, record: AnyRecord, tag_map: AnyMap | None) -> Scenario:
+    if isinstance(record, Dataset):
+        return on_record(scenario, record, Path(record.name))
+    read = read_measurements(record, scenario.model, tag_map=read_map(tag_map)).record
+    return on_record(scenario, read, named(record), Path(tag_map) if isinstance(tag_map, str | Path) else None)
 
 
 def _seeds(given: Iterable[int]) -> tuple[int, ...]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.options import Compile, Json, Out, can_compile, command_line, once, results_folder
+from adaptive_flot.cli.options import Compile, Json, MapOption, Out, can_compile, command_line, once, results_folder
 from adaptive_flot.targets import check_targets, in_folder, scenario_inputs
 
 
@@ -19,6 +20,11 @@ def run(
     seed: Annotated[
         list[int] | None, typer.Option(min=0, max=2**63 - 1, help="Noise seed (repeatable); default the scenario's.")
     ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Play the inputs of this measured record, CSV or Parquet; with --map an export."),
+    ] = None,
+    map_: MapOption = None,
     out: Out = None,
     json: Json = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write the time series as Parquet, not CSV.")] = False,
@@ -26,15 +32,27 @@ def run(
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
     from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
+    from adaptive_flot.errors import ScenarioError
+    from adaptive_flot.processes.registry import read_measurements
+    from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.run import run_scenario
     from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
     from adaptive_flot.runner.scenario.loading import load_scenario
+    from adaptive_flot.runner.scenario.recorded_inputs import on_record
 
     loaded = load_scenario(scenario)
+    if map_ is not None and record is None:
+        raise ScenarioError("--map: there is no --record that it belongs to; give both, or neither")
+    if record is not None:
+        tag_map = None if map_ is None else load_tag_map(map_)
+        measured = read_measurements(record, loaded.model, tag_map=tag_map).record
+        loaded = on_record(loaded, measured, record, map_)
     loaded = loaded.compiled() if can_compile(compile_) else loaded
     who = once(estimator), once(controller)
     folder = results_folder(out, loaded.name, "run")
     check_targets(scenario_inputs(loaded, *who), [*in_folder(folder, "summary.json", "report.html"), ("--json", json)])
+    for said in dict.fromkeys(played.said for played in loaded.recorded.values()):
+        typer.echo(f"Inputs of {said}")
     count = len(loaded.combinations(*who)) * len(once(seed) or set(loaded.file.seeds))
     with progress_bar(loaded.name, count) as advance:
         runs = run_scenario(loaded, who[0], once(seed), advance, who[1])

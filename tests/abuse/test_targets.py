@@ -33,6 +33,7 @@ CASES = [
     *((["discover", "rec.csv", "--model", "model.yaml"], "--json", [name]) for name in ("rec.csv", "cell.yaml")),
     (["discover", "rec.csv", "--model", "model.yaml"], "--save-model", ["model.yaml", "cell.yaml"]),
     (RUN, "--json", ["short.yaml", "cell.yaml", "own.py"]),
+    ([*RUN, "--record", "rec.csv", "--map", "map.yaml"], "--json", ["rec.csv", "map.yaml"]),
     *((["compare", "done"], option, ["done/summary.json"]) for option in ("--json", "--markdown")),
     (["import", "rec.csv", "--map", "map.yaml", "--cell", "cell.yaml"], "--out", ["rec.csv", "map.yaml", "cell.yaml"]),
     (["serve-plant", "short.yaml"], "--write-link", ["short.yaml"]),
@@ -46,7 +47,7 @@ FOLDERS = [
     (["compare", "comparison.html"], "."),
 ]
 """A result in the folder of the results has the name of an input."""
-INPUT_OPTIONS = {"--map", "--reference", "--certificates"}
+INPUT_OPTIONS = {"--map", "--record", "--reference", "--certificates"}
 READS_NOTHING = {("certificates", "--out")}
 """It writes into a folder, and refuses to where one of its files is: see `tests/live/test_server.py`."""
 

@@ -11,7 +11,7 @@ from adaptive_flot.report.compare.page import comparison_parts
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Section, Text, present
-from adaptive_flot.report.kit.wording import seed_list
+from adaptive_flot.report.kit.wording import joined, seed_list, spaced
 from adaptive_flot.report.run import answer, series
 from adaptive_flot.report.run.chapter import Topic, spread_picture, title, topics
 from adaptive_flot.report.run.closed_loop_figures import contenders_picture
@@ -57,9 +57,23 @@ def run_report(results: Results, command: str = "") -> str:
         facts=_facts(loops[0][0], discovered) if loops else answer.facts(opened),
         first=_first(loops, opened, album),
         sections=[*_compared(loops, album), *_sections(cases, album)],
-        made=made_by(command, _made(cases), dict.fromkeys(c.scenario.path for c in cases)),
+        made=made_by(command, _made(cases), dict.fromkeys(file for c in cases for file in _files(c.scenario))),
     )
     return render(page, album)
+
+
+def _files(scenario: Scenario) -> list[Path]:
+    """The scenario, and the records that it plays."""
+    return [scenario.path, *(p for r in scenario.recorded.values() for p in r.paths(scenario.path.parent))]
+
+
+def _played(scenario: Scenario) -> str:
+    """Which inputs a record plays, in words; "" where none."""
+    said: dict[str, list[str]] = {}
+    for column, profile in scenario.recorded.items():
+        said.setdefault(profile.said, []).append(column)
+    names = {q.column: spaced(q.name) for q in scenario.model.inputs}
+    return "".join(f" Inputs of a record ({joined(names[c] for c in played)}): {r}." for r, played in said.items())
 
 
 def _earned(runs: Sequence[Run]) -> bool:
@@ -71,7 +85,8 @@ def _lead(cases: Sequence[CaseRuns], names: Sequence[str]) -> str:
     runs = sum(len(case.runs) for case in cases)
     what = f"{runs} simulated {'run' if runs == 1 else 'runs'}"
     descriptions = dict.fromkeys(f"{case.scenario.file.description}." for case in cases)
-    return f"{', '.join(names)}: {what} with {', '.join(estimators)}. {' '.join(descriptions)}"
+    played = "".join(dict.fromkeys(_played(case.scenario) for case in cases))
+    return f"{', '.join(names)}: {what} with {', '.join(estimators)}. {' '.join(descriptions)}{played}"
 
 
 def _facts(comparison: Comparison, discovered: Sequence[str]) -> list[Fact]:

@@ -5,6 +5,8 @@ Map
 loading.py            Read a scenario file.
 keys.py               The keys of the file.
 profiles.py           How inputs and parameters move over a run.
+recorded.py           An input as it was recorded at a plant.
+recorded_inputs.py    Read the record, or put a scenario on one.
 faults.py             The entries of `faults`.
 discovery_options.py  The key `discovery`.
 scenario.py           A scenario as a frozen object.

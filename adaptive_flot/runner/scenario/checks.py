@@ -8,6 +8,7 @@ from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.runner.scenario.discovery_options import FEWEST
 from adaptive_flot.runner.scenario.faults import ControllerFault, SlowAnalyser, Stuck
 from adaptive_flot.runner.scenario.realisation import Realisation
+from adaptive_flot.runner.scenario.recorded import Recorded
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 MOST_INTERVALS = MOST_ROWS
@@ -34,6 +35,10 @@ def check_scenario(scenario: Scenario) -> None:
     for column in columns:
         if column not in file.inputs:
             raise ScenarioError(f"inputs: {column!r} is missing; give its profile")
+    for key, profile in file.inputs.items():
+        if isinstance(profile, Recorded):
+            with located(f"inputs.{key}"):
+                profile.check(file.duration_s, file.sampling_s)
     model.indices("outputs", file.measurements)
     with located("initial_estimate.guess"):
         model.with_parameters(file.initial_estimate.guess)

@@ -14,6 +14,7 @@ from adaptive_flot.processes.registry import make_model
 from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.scenario.checks import check_scenario
 from adaptive_flot.runner.scenario.keys import ScenarioFile
+from adaptive_flot.runner.scenario.recorded_inputs import with_values
 from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.yaml_files import read_yaml
 from adaptive_flot.yaml_problems import first_problem
@@ -59,6 +60,7 @@ def load_scenario(name: Path | str) -> Scenario:
         raise ScenarioError(f"{path}: {first_problem(error, ScenarioFile)}") from error
     with located(path):
         model = attach(make_model(file.model, cell=file.cell, folder=path.parent), file.effects)
+        file = file.model_copy(update={"inputs": with_values(file.inputs, model, path.parent)})
         plant = _plant_model(file, model, path.parent)
         scenario = Scenario(path.stem, path, file, model, _setup(file, model), plant)
         check_scenario(scenario)

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.scenario.random_streams import Stream, generator
+from adaptive_flot.runner.scenario.recorded import Recorded
 
 
 class _Profile(BaseModel):
@@ -177,5 +178,5 @@ class FeedWalk(_Profile):
         return np.exp(walk)
 
 
-InputProfile = Annotated[Constant | Staircase | Random | Steps, Field(discriminator="profile")]
+InputProfile = Annotated[Constant | Staircase | Random | Steps | Recorded, Field(discriminator="profile")]
 ParameterProfile = Change | Factors | RandomWalk

@@ -15,6 +15,7 @@ from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.faults import ControllerFault, PlantFault, SlowAnalyser
 from adaptive_flot.runner.scenario.keys import ScenarioFile
 from adaptive_flot.runner.scenario.profiles import FeedWalk, ParameterProfile
+from adaptive_flot.runner.scenario.recorded import Recorded
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,6 +69,11 @@ class Scenario(Described):
     def dt(self) -> float:
         """Sampling interval [s]."""
         return self.file.sampling_s
+
+    @property
+    def recorded(self) -> dict[str, Recorded]:
+        """Inputs that a record plays, by column."""
+        return {key: profile for key, profile in self.file.inputs.items() if isinstance(profile, Recorded)}
 
     @property
     def starts(self) -> FloatArray:
