@@ -13,6 +13,7 @@ forms/               Forms of an effect, their coefficients and what each coeffi
 effects.py           Effect: a form at a site, with a driver and values.
 sensors.py           A model without the errors of its sensors.
 stepping/            Simulation of one sampling interval and of whole records, with exact sensitivities.
+ensemble/            The same for many members side by side.
 filtering/           A model in innovations form: extended Kalman filter, smoother, k-step prediction, likelihood.
 data/                Measured tables.
 assumed_start.py     What is said of a record that does not start where its model assumes.
@@ -31,6 +32,7 @@ from adaptive_flot.greybox.cramer_rao_bound import (
 )
 from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.ensemble.ensemble import Ensemble, EnsembleRun, EnsembleSensitivities
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.quantities import KnownEffect
 from adaptive_flot.greybox.scope import Site
@@ -43,6 +45,9 @@ from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
 __all__ = [
     "Dataset",
     "Effect",
+    "Ensemble",
+    "EnsembleRun",
+    "EnsembleSensitivities",
     "FloatArray",
     "KnownEffect",
     "LinearisedTrajectory",

@@ -4,7 +4,7 @@ CasADi interprets an expression operation by operation. The same operations as C
 products and sums, give the same numbers several times quicker; higher levels gain nothing on straight-line code and
 take the compiler much longer. A library is kept under a hash of source, compiler and flags, in the user's cache folder
 (`platformdirs`). It is compiled under another name and then renamed, so any number of processes may want the same one
-at once.
+at once. A library is loaded only where nobody else can have put it (`safe_folder.py`).
 """
 
 from __future__ import annotations
@@ -17,15 +17,22 @@ import shutil
 import subprocess
 import tempfile
 import warnings
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 import casadi as ca
 from platformdirs import user_cache_path
 
+from adaptive_flot.greybox.stepping.safe_folder import make_private, problem_of
+
 FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
+CACHE_LEVELS = 3
+"""Folders above a library that are checked: its own, that of the project, and the user's cache folder."""
+Loaded = TypeVar("Loaded")
 COMPILERS = ("cc", "gcc", "clang")
 """Looked for in this order, unless the environment variable CC names one."""
 
@@ -73,19 +80,48 @@ def compile_function(function: ca.Function) -> ca.Function:
     CompileError
         No compiler, it fails, or its result can not be kept or loaded.
     """
-    compiler, source = find_compiler(), _source(function)
-    content = "\0".join([source, compiler.identity, *FLAGS])
+    source = _source(function)
+    return load_library(function.name(), source, FLAGS, lambda library: ca.external(function.name(), str(library)))
+
+
+def load_library(name: str, source: str, flags: Sequence[str], load: Callable[[Path], Loaded]) -> Loaded:
+    """Compile C source into a shared library, where this was not done before, and load it.
+
+    Parameters
+    ----------
+    name
+        What it is, the beginning of the name of its file.
+    source, flags
+        The source, and the options of the compiler.
+    load
+        Loads the file; raises RuntimeError or OSError where it can not.
+
+    Raises
+    ------
+    CompileError
+        No compiler, it fails, or the library can not be kept, trusted or loaded.
+    """
+    compiler = find_compiler()
+    content = "\0".join([source, compiler.identity, *flags])
     digest = hashlib.sha256(content.encode()).hexdigest()[:24]
-    library = cache_folder() / f"{function.name()}-{digest}.so"
-    if library.is_file():
+    library = cache_folder() / f"{name}-{digest}.so"
+    if os.path.lexists(library):
+        _check_safe(library)
         # an unfinished library is never there, but a disk may have lost part of one
-        with suppress(RuntimeError):
-            return ca.external(function.name(), str(library))
-    _build(source, compiler, library)
+        with suppress(RuntimeError, OSError):
+            return load(library)
+    _build(source, compiler, flags, library)
+    _check_safe(library)
     try:
-        return ca.external(function.name(), str(library))
-    except RuntimeError as error:
+        return load(library)
+    except (RuntimeError, OSError) as error:
         raise CompileError(f"{library} can not be loaded ({_last_line(str(error))})") from error
+
+
+def _check_safe(path: Path, levels: int = CACHE_LEVELS) -> None:
+    problem = problem_of(path, levels)
+    if problem is not None:
+        raise CompileError(problem)
 
 
 def cache_folder() -> Path:
@@ -126,14 +162,16 @@ def _source(function: ca.Function) -> str:
         raise CompileError(f"CasADi writes no C for it ({_last_line(str(error))})") from error
 
 
-def _build(source: str, compiler: Compiler, library: Path) -> None:
+def _build(source: str, compiler: Compiler, flags: Sequence[str], library: Path) -> None:
     """Compile a source and put the result in its place, whole."""
     try:
-        library.parent.mkdir(parents=True, exist_ok=True)
+        make_private(library.parent)
+        _check_safe(library.parent, CACHE_LEVELS - 1)
         with tempfile.TemporaryDirectory(prefix=".compiling-", dir=library.parent) as folder:
             code, made = Path(folder) / "function.c", Path(folder) / "function.so"
             code.write_text(source, encoding="utf-8")
-            _run([*compiler.command, *FLAGS, str(code), "-o", str(made), "-lm"], library.name)
+            _run([*compiler.command, *flags, str(code), "-o", str(made), "-lm"], library.name)
+            made.chmod(0o700)
             made.replace(library)
     except OSError as error:
         reason = error.strerror or str(error)

@@ -15,12 +15,20 @@ def core_count() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def worker_threads() -> int:
+    """Number of threads for this process: one a core, or one where it is one of several processes.
+
+    A worker of a study or a fit of a search is such a process: the others have the cores.
+    """
+    return 1 if multiprocessing.parent_process() is not None else core_count()
+
+
 def over_rows(function: ca.Function, rows: int, *, as_machine_code: bool = False) -> ca.Function:
     """`function` with `rows` columns side by side in each argument and result; a single column serves all rows.
 
-    The rows go to one thread a core; in a process that is one of several (a worker of a study, a fit of a search) to
-    one only, since the others have the cores. The results are the same to the bit, whatever the number of threads.
+    The rows go to as many threads as `worker_threads` allows. The results are the same to the bit, whatever their
+    number.
     """
     one = compiled(function) if as_machine_code else function
-    threads = 1 if multiprocessing.parent_process() is not None else core_count()
+    threads = worker_threads()
     return one.map(rows, "thread", min(threads, rows)) if min(threads, rows) > 1 else one.map(rows)

@@ -1,0 +1,10 @@
+"""Many members of one model side by side: each with its own states, inputs and parameters.
+
+Map
+---
+lane_source.py       C source of a function in lanes: one lane of a vector register a member.
+instruction_sets.py  Vector instructions of this machine, chosen at run time.
+lane_library.py      The machine code, called on blocks of members.
+lanes.py             A function for many members over many rows; by CasADi's `map` where nothing can be compiled.
+ensemble.py          Simulation of the members of a model, with or without sensitivities.
+"""

@@ -1,0 +1,20 @@
+"""The user's cache is neither used nor filled by these tests."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from adaptive_flot.greybox.stepping import compiled
+
+
+@pytest.fixture(scope="package")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cache") / "compiled"
+
+
+@pytest.fixture(autouse=True)
+def own_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: folder)
+    yield
+    compiled._compiler.cache_clear()
