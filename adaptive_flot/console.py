@@ -29,7 +29,7 @@ PIPE_WIDTH = 80
 """Letters a line where standard output is no terminal."""
 
 
-def _console() -> Console:
+def standard_output() -> Console:
     """Standard output; a name such as `[bold]` or `data[1]` is text as any other, not a style."""
     return Console(width=None if Console().is_terminal else PIPE_WIDTH, markup=False)
 
@@ -61,7 +61,7 @@ def stage_bar(label: str) -> Iterator[Callable[[str], None]]:
 
 def print_verdict(verdict: Verdict) -> None:
     """Print the verdict in words and the error of each output before and after."""
-    console = _console()
+    console = standard_output()
     console.print(Text.assemble((verdict.word, "bold"), f": {verdict.reason}"), highlight=False)
     for note in verdict.notes:
         console.print(f"- {note}", highlight=False)
@@ -94,7 +94,7 @@ def print_fits(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> None:
             rows.append((scenario.name, shown, str(len(own)), *cells))
             told += absorbed(shown, own)
     title = "Fit in percent: median and range over the seeds, published value in brackets"
-    console = _console()
+    console = standard_output()
     print_table(console, Content("", ("scenario", "estimator", "seeds", *keys), tuple(rows), words=3), title)
     for sentence in told:
         console.print(f"- {sentence}", highlight=False)
@@ -126,7 +126,7 @@ def print_estimate(result: RecordEstimate) -> None:
         for e in replay.errors
     ]
     header = ("estimator", "block", "output", "unit", "one step", "free run", "Ljung-Box p")
-    console = _console()
+    console = standard_output()
     for note in result.blocks.fit.notes:
         console.print(f"- {note}", highlight=False)
     title = f"{result.blocks.name}: root mean square errors"
@@ -151,7 +151,7 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
 
 def print_comparison(tables: Sequence[Content], sentences: Sequence[str]) -> None:
     """Print the tables of a comparison and what follows from them."""
-    console = _console()
+    console = standard_output()
     for content in tables:
         print_table(console, content)
     for sentence in sentences:

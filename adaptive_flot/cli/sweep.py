@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.child_processes import Terminated
-from adaptive_flot.cli.options import Compile, Out, can_compile, results_folder
+from adaptive_flot.cli.options import Compile, Out, can_compile, command_line, results_folder
 from adaptive_flot.targets import check_targets, in_folder, scenario_inputs
 
 INTERRUPTED = 130
+FILES = ("study.json", "runs.parquet", "timings.parquet", "report.html")
 
 
 def sweep(
@@ -25,14 +26,17 @@ def sweep(
     compile_: Compile = False,
 ) -> None:
     """Run a study of many runs. Interrupted, the same command goes on where it was."""
-    from adaptive_flot.studies.progress import live, print_study
+    from adaptive_flot.console_study import print_study
+    from adaptive_flot.studies.progress import live
     from adaptive_flot.studies.study_file import load_study
     from adaptive_flot.studies.sweep import sweep as run_study
 
     loaded = load_study(study)
     folder = results_folder(out, loaded.name, "sweep")
     inputs = [file for arm in loaded.arms for file in scenario_inputs(arm.scenario, arm.estimators, arm.controllers)]
-    check_targets([loaded.path, *inputs], in_folder(folder, "study.json", "runs.parquet", "timings.parquet"))
+    check_targets(
+        [loaded.path, *inputs], in_folder(folder, "study.json", "runs.parquet", "timings.parquet", "report.html")
+    )
     compiled = can_compile(compile_)
     try:
         with live(loaded.name) as progress:
@@ -50,3 +54,8 @@ def sweep(
         sys.exit(end.exit_code if isinstance(end, Terminated) else INTERRUPTED)
     print_study(outcome.table)
     typer.echo(f"{len(outcome.table)} runs, {outcome.from_before} of them from before: {folder / 'runs.parquet'}")
+    from adaptive_flot.report.sweep.page import write_sweep_report
+
+    page = folder / "report.html"
+    write_sweep_report(loaded, folder, page, command=command_line(), read=[loaded.path, *dict.fromkeys(inputs)])
+    typer.echo(f"Report: {page}")

@@ -5,6 +5,7 @@ Map
 kit/        What every page is made of: page, parts, album, style, figures.
 run/        The report of scenario runs.
 compare/    Runs side by side.
+sweep/      A study of many runs.
 discovery/  What a model lacks.
 estimate/   A measured record replayed through estimators.
 quality/    An imported record.

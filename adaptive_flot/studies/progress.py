@@ -1,4 +1,4 @@
-"""What a sweep shows while it runs and at its end: a bar with live counts of statuses, a table of distributions."""
+"""What a sweep shows while it runs: a bar with live counts of statuses."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 
 PLAIN_EVERY_S = 30.0
 """Time between two lines where standard error is no terminal."""
@@ -75,32 +73,3 @@ def live(label: str) -> Iterator[Callable[[int, Rows], Callable[[Rows], None]]]:
             return advance
 
         yield start
-
-
-def print_study(table: pd.DataFrame) -> None:
-    """Print the distribution of each fit by scenario, controller and estimator, then the failed runs."""
-    fits = [c for c in map(str, table.columns) if c.startswith("fit_") and table[c].notna().any()]
-    shown = Table(title="Fit in percent: median [5 %, 95 %] over the seeds")
-    for heading in ("scenario", "controller", "estimator", "runs", "failed"):
-        shown.add_column(heading, justify="right" if heading in ("runs", "failed") else "left")
-    for column in fits:
-        shown.add_column(column.removeprefix("fit_"), justify="right")
-    for names, rows in table.groupby(["scenario", "controller", "estimator"], sort=False):
-        failed = int((rows["outcome"] == "failed").sum())
-        shown.add_row(*map(str, names), str(len(rows)), str(failed), *(_distribution(rows[c]) for c in fits))
-    console = Console(width=None if Console().is_terminal else 140, markup=False)
-    console.print(shown)
-    messages = table.loc[table["outcome"] == "failed", "message"].value_counts()
-    for message, count in messages.head(3).items():
-        console.print(f"{count} failed: {message}", highlight=False)
-    if len(messages):
-        console.print("Run failed ones again with --retry-failed.", highlight=False)
-    console.file.flush()
-
-
-def _distribution(values: pd.Series[float]) -> str:
-    finite = values.dropna()
-    if finite.empty:
-        return ""
-    low, median, high = finite.quantile([0.05, 0.5, 0.95])
-    return f"{median:.2f} [{low:.2f}, {high:.2f}]"

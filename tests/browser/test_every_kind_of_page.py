@@ -15,6 +15,7 @@ from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.browser.conftest import Check
 from tests.cli.conftest import Call, WriteTable, plant, table  # noqa: F401  # fixtures
+from tests.report import test_sweep_report as sweep
 
 
 def test_page_of_a_closed_loop(tmp_path: Path, right: Check) -> None:
@@ -49,3 +50,11 @@ def test_a_long_record_makes_a_small_page(tmp_path: Path, right: Check) -> None:
     made = Page("Test", "A long record", "", ["An answer."], [], [chart], [], made_by(""))
     (tmp_path / "page.html").write_text(render(made, album), encoding="utf-8")
     right(tmp_path / "page.html")
+
+
+def test_page_of_a_study(tmp_path: Path, right: Check) -> None:
+    """Distributions are drawn over fits, and not over time; a line of equal values is seen."""
+    page = sweep.page(tmp_path, sweep.runs(failed=2))
+    assert "Share of the runs that stay below" in page.split('<details class="fold"')[0]
+    (tmp_path / "report.html").write_text(page, encoding="utf-8")
+    right(tmp_path / "report.html")

@@ -37,18 +37,18 @@ def title(comparison: Comparison) -> str:
     winner = best(comparison)
     earned = any(c.has(VALUE) for c in comparison.contenders)
     if winner is not None and earned and len(tied := _tied(comparison, winner)) > 1:
-        return f"{joined(_short(comparison, c) for c in tied)} earn the same"
+        return f"{joined(short(comparison, c) for c in tied)} earn the same"
     if winner is None:
         return "Nobody keeps the grade limit" if earned else "No fit to compare"
     if len([c for c in comparison.contenders if c.estimator != ORACLE]) == 1:
         value = winner.spread(VALUE if earned else fit_names(comparison)[0]).median
         return f"{winner.label}: {number(value, '.3f')} cu/h" if earned else f"{winner.label}: fit {number(value)} %"
-    name = _short(comparison, winner)
+    name = short(comparison, winner)
     return f"{name} earns most within the limit" if earned else f"{name} fits best"
 
 
-def _short(comparison: Comparison, c: Contender) -> str:
-    """Name of a contender in a title: its controller is left out where all have the same."""
+def short(comparison: Comparison, c: Contender) -> str:
+    """Name of a contender in a sentence: its controller is left out where all have the same."""
     same = len({x.controller for x in comparison.contenders}) == 1 and not c.result
     return c.estimator if same else c.label.replace(", ", " with ", 1)
 
@@ -132,9 +132,13 @@ def matrix(comparison: Comparison) -> Table | None:
     return table
 
 
+def is_out(c: Contender) -> bool:
+    """Whether it can not be the best: it is the oracle, or below the limit too often."""
+    return c.estimator == ORACLE or (c.has("below_limit") and c.spread("below_limit").median > OFTEN)
+
+
 def _judged(c: Contender, name: str) -> float:
-    breaks = c.has("below_limit") and c.spread("below_limit").median > OFTEN
-    return float("nan") if c.estimator == ORACLE or breaks else c.spread(name).median
+    return float("nan") if is_out(c) else c.spread(name).median
 
 
 def _deciders(c: Contender) -> str:

@@ -52,7 +52,7 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
         answer=[s for c in comparisons for s in _said(c, len(comparisons) > 1)],
         facts=answer.facts(one) if len(comparisons) == 1 else [],
         first=_first(comparisons, album),
-        sections=[s for i, c in enumerate(comparisons, 1) for s in _sections(c, i, len(comparisons) > 1, album)],
+        sections=[s for i, c in enumerate(comparisons, 1) for s in sections(c, i, len(comparisons) > 1, album)],
         made=made_by(command, [("Results", ", ".join(_results(comparisons)))], _summaries(comparisons)),
     )
     return render(page, album)
@@ -73,7 +73,8 @@ def _first(comparisons: Sequence[Comparison], album: Album) -> list[Part]:
     return present(answer.matrix(comparisons[0]), trajectories_picture(comparisons[0], album))
 
 
-def _sections(comparison: Comparison, i: int, several: bool, album: Album) -> list[Section]:
+def sections(comparison: Comparison, i: int, several: bool, album: Album) -> list[Section]:
+    """Chapters of a scenario: several where it is the only one of a page, else one, the i-th."""
     if several:
         parts = present(
             answer.matrix(comparison), trajectories_picture(comparison, album), *comparison_parts(comparison, album)
