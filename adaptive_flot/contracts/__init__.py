@@ -13,6 +13,7 @@ status                What happened at one step.
 sample                What the instruments show at one sampling instant.
 estimator             `Setup`, `Prior`, `Estimate` and the contract `Estimator`.
 track                 Estimates over a whole record, as arrays.
+ensemble_record       Records of many members at once, for an estimator that tracks them all in one call.
 batch                 The contract of a fit to a whole record at once, and what it returns.
 controller            `ControllerSetup`, `Limits`, `Plan`, `Decision` and the contract `Controller`.
 economics             `Economics`: what running a process earns and costs; `OperatingPoint`, what it reads.

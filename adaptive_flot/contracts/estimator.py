@@ -130,7 +130,8 @@ class Estimator(Protocol[State]):
 
     Whole records: an estimator may have `track(state, time, inputs, outputs) -> Track`
     (`adaptive_flot/contracts/track.py`) that gives for N samples what N calls of `update` give. Replays of measured
-    records then use it.
+    records then use it. One that has `track_ensemble` does the same for many members at once
+    (`adaptive_flot/contracts/ensemble_record.py`).
     """
 
     setup: Setup

@@ -3,16 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
+import numpy as np
+
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.ensemble_record import EnsembleRecord
+from adaptive_flot.contracts.track import Track
 from adaptive_flot.errors import ModelError, near_match
+from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.drift import Drift, drift_of
-from estimators.shared.joint_filter import filter_step, first_estimate, layout, parameters_of, process_noise
+from estimators.shared.ensemble import Flags, driving, known_parameters, samples_of, statuses
+from estimators.shared.joint_filter import (
+    filter_step,
+    first_estimate,
+    layout,
+    parameters_of,
+    parameters_of_rows,
+    process_noise,
+)
 from estimators.shared.measured import driving_outputs
 
 Walk = Literal["random", "integrated"]
@@ -124,3 +139,63 @@ class Ekf:
             status=status,
         )
         return EkfState(sample.time, z, P, state.noise_std), estimate
+
+    def track_ensemble(self, states: Sequence[EkfState], record: EnsembleRecord) -> list[tuple[EkfState, Track]]:
+        """Take the records of many members at once; see `TracksEnsembles`.
+
+        Parameters
+        ----------
+        states
+            Of each member before its first sample.
+        record
+            Their samples.
+        """
+        parameters = known_parameters(record, self._p)
+        measured, present = driving(record, self.columns)
+        fixed = {
+            "z": np.array([s.z for s in states]),
+            "P": np.array([s.P for s in states]),
+            "Q": self.noise,
+            "noise": np.array([s.noise_std for s in states]),
+            **parameters["fixed"],
+        }
+        times = record.times_before([s.time for s in states])
+        by_row = {"t": times, "u": record.inputs, "measured": measured, "present": present, **parameters["by_row"]}
+        every = ["z_next", "P_next", "prediction", "expected_std", "flags"]
+        rows = self._lanes(len(record), len(record.time), fixed, by_row, every=every)
+        seen: Flags = np.asarray(present.max(axis=2) > 0)
+        return [
+            self._member({name: rows[name][m] for name in every}, states[m], record, m, seen[m])
+            for m in range(len(states))
+        ]
+
+    @cached_property
+    def _lanes(self) -> Lanes:
+        # made when first asked for: compiling it takes seconds
+        function = filter_step(self.setup, self.layout, self.outlier_std)
+        carried = {"z": "z_next", "P": "P_next"}
+        return Lanes(function, carried, ("P", "Q", "P_next"), as_machine_code=self.setup.model.compiled)
+
+    def _member(
+        self, rows: Mapping[str, FloatArray], state: EkfState, record: EnsembleRecord, m: int, present: Flags
+    ) -> tuple[EkfState, Track]:
+        """State after the samples and estimates of one member."""
+        flags = rows["flags"]
+        if not np.isfinite(flags[:, 0]).all():  # a sample to be skipped made all that came after it NaN
+            estimates = []
+            for sample in samples_of(record, m):
+                state, estimate = self.update(state, sample)
+                estimates.append(estimate)
+            return state, Track.of(estimates)
+        theta, covariance = parameters_of_rows(rows["z_next"], rows["P_next"], self.coordinates, self.layout)
+        track = Track(
+            record.time,
+            rows["prediction"],
+            rows["expected_std"],
+            theta,
+            covariance,
+            rows["z_next"][:, : self.layout.nx],
+            statuses(flags[:, 1] > 0, present),
+        )
+        last = EkfState(float(record.time[-1]), rows["z_next"][-1].copy(), rows["P_next"][-1].copy(), state.noise_std)
+        return last, track

@@ -6,6 +6,7 @@ estimator.py  `Rpem`: the recursion of the paper, and its options.
 state.py      `RpemState`: what the next sample needs.
 update.py     One update of estimate and covariance.
 record.py     Many rows in one call, for replays.
+ensemble.py   Many members at once.
 full.py       `rpem_full`: the options that make it the full recursion.
 """
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.ensemble_record import EnsembleRecord
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
+from estimators.rpem.ensemble import RpemEnsemble
 from estimators.rpem.record import BLOCK_ROWS, RecordBlock
 from estimators.rpem.state import RpemState
 from estimators.rpem.update import Gradient, UpdateOptions, alternative_covariance, update_function
+from estimators.shared.ensemble import samples_of
 from estimators.shared.information import Information
 from estimators.shared.measured import driving_outputs
 from estimators.shared.state_correction import StateCorrection
@@ -200,11 +204,35 @@ class Rpem:
             parts.append(part)
         return Track.joined(parts)
 
+    def track_ensemble(self, states: Sequence[RpemState], record: EnsembleRecord) -> list[tuple[RpemState, Track]]:
+        """Take the records of many members at once; see `TracksEnsembles`.
+
+        Parameters
+        ----------
+        states
+            Of each member before its first sample.
+        record
+            Their samples.
+        """
+        tracked = self._ensemble(states, record)
+        return [
+            self._one_by_one(state, samples_of(record, m)) if found is None else found
+            for m, (state, found) in enumerate(zip(states, tracked, strict=True))
+        ]
+
+    @cached_property
+    def _ensemble(self) -> RpemEnsemble:
+        # made when first asked for: compiling it takes seconds
+        return RpemEnsemble(self.setup, self.options, self._correction, self._information)
+
     def _by_samples(
         self, state: RpemState, time: FloatArray, inputs: FloatArray, outputs: FloatArray
     ) -> tuple[RpemState, Track]:
+        return self._one_by_one(state, [Sample(float(t), u, y) for t, u, y in zip(time, inputs, outputs, strict=True)])
+
+    def _one_by_one(self, state: RpemState, samples: Sequence[Sample]) -> tuple[RpemState, Track]:
         estimates: list[Estimate] = []
-        for t, u, y in zip(time, inputs, outputs, strict=True):
-            state, estimate = self.update(state, Sample(float(t), u, y))
+        for sample in samples:
+            state, estimate = self.update(state, sample)
             estimates.append(estimate)
         return state, Track.of(estimates)

@@ -7,5 +7,6 @@ drift.py             How far parameters drift within an hour, as an option gives
 coordinates.py       Scaled parameters and their bounds.
 information.py       Directions of the parameters on which the last rows say too little.
 measured.py          Which outputs of a sample are there.
+ensemble.py          Samples of many members at once.
 state_correction.py  Correction of the state by measured outputs.
 """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray
 
@@ -43,3 +44,11 @@ class Information:
         free = vectors[:, values >= 1.0]
         projection: FloatArray = (free @ free.T) * scale[:, None] / scale
         return projection, free.shape[1] < len(values)
+
+    def free_directions_of(self, information: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """The same for many matrices (M, q, q): projections (M, q, q), and whether any direction is left out (M,)."""
+        scale = np.sqrt(np.diag(self.alternative))
+        values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+        free = vectors * (values >= 1.0)[:, None, :]
+        projection: FloatArray = (free @ free.transpose(0, 2, 1)) * scale[:, None] / scale
+        return projection, np.asarray(values.min(axis=1) < 1.0)
