@@ -15,9 +15,10 @@ A page holds the styles, the scripts, and for each chart ::
     <div class="chart"><script type="application/json">BLOCK</script></div>
 
 `AdaptiveFlotChart.start()` then draws each one as it comes into view. A page that gets data as they come calls
-`AdaptiveFlotChart.make(element, block)` and `chart.append(panel, times, rows)`.
+`AdaptiveFlotChart.make(element, block)`, and `chart.append(panel, times, rows)` or `chart.renew(range, tables)`.
 
-The block has the keys `x` (label, unit, `time`: linked with the other charts of the page), `panels` and `marks`.
+The block has the keys `x` (label, unit, `time`: linked with the other charts of the page, `clock`: seconds since 1970
+that are shown as time of day), `panels` and `marks`.
 A panel is of the kind `lines` (`label`, `unit`, `height`, `limits`, `range`, `band`, `x`: tables of times, `series`)
 or `strips` (`rows`, `states`). Numbers are `{"o": first, "s": step, "v": [0, 3, null, ...]}`: first + step times
 each, null is a gap; with `n` in place of `v` they count 0 to n - 1.

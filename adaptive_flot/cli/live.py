@@ -13,7 +13,7 @@ def live(
     cycles: Annotated[int | None, typer.Option(min=1, help="Number of cycles; default until it is ended.")] = None,
 ) -> None:
     """Run an estimator and a controller beside a plant, over OPC UA."""
-    from adaptive_flot.live.link.live import live as run_live
     from adaptive_flot.live.link_file import load_link
+    from adaptive_flot.live.program import live as run_live
 
     run_live(load_link(link), typer.echo, cycles)

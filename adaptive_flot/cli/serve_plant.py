@@ -26,6 +26,7 @@ def serve_plant(
     auto_operator: Annotated[
         bool, typer.Option("--auto-operator", help="Simulate an operator who lets the link go to closed.")
     ] = False,
+    page: Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the page, for the link file.")] = 8050,
     write_link: Annotated[Path | None, typer.Option("--write-link", help="Write a link file for this plant.")] = None,
 ) -> None:
     """Play a scenario as a plant with an OPC UA server: a test plant for `live`."""
@@ -39,7 +40,7 @@ def serve_plant(
     place = ServerPlace(certificates.absolute(), host, port)
     if write_link is not None:
         check_targets([loaded.path], [("--write-link", write_link)])
-        write_text(write_link, link_text(loaded, place.url, certificates.absolute(), speed=speed))
+        write_text(write_link, link_text(loaded, place.url, certificates.absolute(), speed=speed, page=page))
         typer.echo(f"Link file: {write_link}")
     serve(
         loaded,

@@ -27,6 +27,8 @@ USES = {
     OPERATOR: ExtendedKeyUsageOID.CLIENT_AUTH,
 }
 USERS = (LINK, OPERATOR)
+TOKENS = ("view", "act")
+"""Tokens of the page: for viewing, and for acting."""
 VALID_DAYS = 365
 PRIVATE = 0o600
 
@@ -67,6 +69,11 @@ def password_file(folder: Path, user: str) -> Path:
     return folder / f"{user}.password"
 
 
+def token_file(folder: Path, name: str) -> Path:
+    """File of a token of the page."""
+    return folder / f"{name}.token"
+
+
 def read_password(file: Path) -> str:
     """Password in a file; LinkError where there is none."""
     try:
@@ -82,10 +89,12 @@ def read_password(file: Path) -> str:
 def make_certificates(folder: Path, hosts: tuple[str, ...] = ("localhost", "127.0.0.1")) -> list[Path]:
     """Make self-signed certificates (RSA 2048, SHA-256), keys and passwords for plant, link and operator.
 
+    The tokens of the page are made too.
+
     Parameters
     ----------
     folder
-        Where they go; keys and passwords can be read by their owner only.
+        Where they go; keys, passwords and tokens can be read by their owner only.
     hosts
         Names and addresses of the plant that its certificate is good for; the name of this machine is added.
 
@@ -100,7 +109,8 @@ def make_certificates(folder: Path, hosts: tuple[str, ...] = ("localhost", "127.
         One of the files is there already, or the folder can not be written.
     """
     files = [*(f for name in USES for f in (folder / f"{name}.der", folder / f"{name}.pem"))]
-    files += [password_file(folder, user) for user in USERS]
+    secret = [*(password_file(folder, user) for user in USERS), *(token_file(folder, name) for name in TOKENS)]
+    files += secret
     there = [file for file in files if file.exists()]
     if there:
         raise OutputError(f"{there[0]}: is there already; give another folder with --out, or remove it yourself")
@@ -114,8 +124,8 @@ def make_certificates(folder: Path, hosts: tuple[str, ...] = ("localhost", "127.
             )
             _write(folder / f"{name}.pem", dump_private_key_as_pem(key), PRIVATE)
             _write(folder / f"{name}.der", certificate.public_bytes(Encoding.DER), 0o644)
-        for user in USERS:
-            _write(password_file(folder, user), (secrets.token_urlsafe(24) + "\n").encode(), PRIVATE)
+        for file in secret:
+            _write(file, (secrets.token_urlsafe(24) + "\n").encode(), PRIVATE)
     except OSError as error:
         raise OutputError(f"{folder}: can not be written ({error.strerror or error}); give another folder") from error
     return files

@@ -1,4 +1,4 @@
-"""`make live-demo`: a test plant and a link on this machine, until Ctrl-C."""
+"""`make live-demo`: a test plant, a link and its page on this machine, until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from adaptive_flot.live.certificates import make_certificates
-from adaptive_flot.live.link.live import live
 from adaptive_flot.live.link_file import load_link
+from adaptive_flot.live.program import live
 
 SCENARIO, SPEED, HOURS = "closed_loop_drift", 5.0, 24.0
 FOLDER = Path("results/live_demo")

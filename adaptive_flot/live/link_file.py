@@ -1,161 +1,38 @@
-"""The keys of a link file: which scenario, which server, which tags, and what may be written."""
+"""A link file: which scenario, which server, which tags, and what may be written."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from adaptive_flot.errors import DataError, LinkError, near_match
 from adaptive_flot.greybox.quantities import Parameter, Quantity
-from adaptive_flot.live.safety.checks import TagRules
-from adaptive_flot.live.safety.limits import WriteLimit
-from adaptive_flot.live.safety.modes import Mode, ModeRules
-from adaptive_flot.records.map_values import Duration
-from adaptive_flot.records.tag_map import TagKeys
-from adaptive_flot.records.units import convert, seconds
+from adaptive_flot.live.link_keys import (
+    MODES,
+    CyclePart,
+    HandshakePart,
+    LiveTag,
+    PagePart,
+    Part,
+    Scale,
+    ServerPart,
+    ShadowPart,
+    WritePart,
+)
+from adaptive_flot.live.safety.modes import ModeRules
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.yaml_files import read_yaml
 from adaptive_flot.yaml_problems import first_problem
 
-MODES = {"off": Mode.OFF, "monitor": Mode.MONITOR, "advisory": Mode.ADVISORY, "closed": Mode.CLOSED}
-Seconds = Annotated[float, Field(gt=0)]
+ShadowName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+TRIED = "extended"
+"""Role of an extended model that runs in shadow; no key of `shadows` may be called so."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class ServerPart(_Part):
-    """The OPC UA server: its address, the security policy (always sign and encrypt), and who logs in."""
-
-    url: str
-    security: Literal["Aes256Sha256RsaPss", "Basic256Sha256"] = "Aes256Sha256RsaPss"
-    certificate: str
-    key: str
-    server_certificate: str
-    user: str
-    password_file: str
-    namespace: str = ""
-    """Namespace URI of tags that are given by name alone."""
-    timeout_s: Seconds = 2.0
-    """A server that does not answer for so long counts as lost."""
-
-
-@dataclass(frozen=True)
-class Scale:
-    """A tag's unit as the model's: model value = offset + factor times tag value."""
-
-    offset: float = 0.0
-    factor: float = 1.0
-
-    @classmethod
-    def of(cls, unit: str | None, wanted: str) -> Scale:
-        """Scale of a unit; DataError where it does not fit the wanted one. None is the wanted one."""
-        if unit is None:
-            return cls()
-        zero, one = convert(np.array([0.0, 1.0]), unit, wanted)
-        return cls(float(zero), float(one - zero))
-
-    def model(self, value: float) -> float:
-        """A tag's value in the model's unit."""
-        return self.offset + self.factor * value
-
-    def tag(self, value: float) -> float:
-        """A model's value in the tag's unit."""
-        return (value - self.offset) / self.factor
-
-
-class LiveTag(TagKeys):
-    """A measured quantity: the keys of the map of `import`, and what only a live value needs.
-
-    Attributes
-    ----------
-    stale
-        Age from which the last value no longer counts. Longer than the time between two values of an analyser.
-    jump
-        Largest change from one value to the next, in the tag's unit; default no check.
-    """
-
-    stale: Duration = "10 s"
-    jump: Annotated[float, Field(gt=0)] | None = None
-
-    def rules(self, scale: Scale, low: float, high: float) -> TagRules:
-        """What is asked of the tag, in the model's unit, where the model's range is [low, high]."""
-        if self.range is not None:
-            low, high = sorted(scale.model(v) for v in self.range)
-        return TagRules(
-            low,
-            high,
-            seconds(self.stale),
-            math.inf if self.frozen_s is None else self.frozen_s,
-            math.inf if self.jump is None else abs(scale.factor) * self.jump,
-            tuple(scale.model(float(code)) for code in self.bad if _is_number(code)),
-        )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-class WritePart(_Part):
-    """One input that is written: tags, clamps, and the largest change an interval; numbers in the model's unit."""
-
-    tag: str
-    unit: str | None = None
-    """Unit of the tags; default the model's."""
-    read_back: str
-    """Tag of the set-point that acts."""
-    low: float
-    high: float
-    rate: Seconds
-    operator_low: str | None = None
-    operator_high: str | None = None
-
-    @model_validator(mode="after")
-    def _order(self) -> WritePart:
-        if not self.low < self.high:
-            raise ValueError("low must lie below high")
-        return self
-
-    @property
-    def limit(self) -> WriteLimit:
-        """Clamps and rate limit."""
-        return WriteLimit(self.low, self.high, self.rate)
-
-
-class HandshakePart(_Part):
-    """Tags by which plant and link know of each other."""
-
-    plant_heartbeat: str
-    active: str
-    switch: str
-    link_heartbeat: str
-    asks: str
-    mode: str | None = None
-
-
-class CyclePart(_Part):
-    """How patient the link is, and how much faster than real time the plant runs (test plants only)."""
-
-    shed_after: int = Field(default=3, ge=1, le=10)
-    handshake_cycles: int = Field(default=10, ge=1)
-    longest_gap_s: Seconds = 60.0
-    """A longer gap in the samples starts the estimator again from its last estimate."""
-    deadline: float = Field(default=0.8, gt=0, lt=1)
-    """Share of the sampling interval after which nothing is written any more in a cycle."""
-    speed: float = Field(default=1.0, gt=0, le=1000)
-
-
-class LinkFile(_Part):
+class LinkFile(Part):
     """Keys of a link file."""
 
     scenario: str
@@ -169,6 +46,11 @@ class LinkFile(_Part):
     writes: dict[str, WritePart]
     handshake: HandshakePart
     cycle: CyclePart = CyclePart()
+    page: PagePart | None = None
+    shadows: dict[ShadowName, ShadowPart] = Field(default_factory=dict, max_length=4)
+    """What runs beside the acting estimator and controller, by a name of its own."""
+    extend: Literal["by a person", "by itself"] = "by a person"
+    """Who applies an extension of the model that discovery found and that has run in shadow."""
 
     @property
     def mode_rules(self) -> ModeRules:
@@ -247,10 +129,18 @@ def _check(path: Path, file: LinkFile, scenario: Scenario) -> None:
                 f"{path}: writes.{name}: clamps [{write.low:g}, {write.high:g}] are wider than the scenario's "
                 f"limits [{low:g}, {high:g}]; narrow them"
             )
-    if file.estimator not in scenario.file.estimators or file.controller not in scenario.file.controllers:
+    if TRIED in file.shadows:
+        raise LinkError(f"{path}: shadows: {TRIED!r} is the name of an extended model in shadow; take another one")
+    for name, shadow in file.shadows.items():
+        _check_who(f"{path}: shadows.{name}", scenario, shadow.estimator, shadow.controller)
+    _check_who(str(path), scenario, file.estimator, file.controller)
+
+
+def _check_who(where: str, scenario: Scenario, estimator: str, controller: str | None) -> None:
+    if estimator not in scenario.file.estimators or controller not in (None, *scenario.file.controllers):
         raise LinkError(
-            f"{path}: scenario {scenario.name!r} has estimators {', '.join(scenario.file.estimators)} and controllers "
+            f"{where}: scenario {scenario.name!r} has estimators {', '.join(scenario.file.estimators)} and controllers "
             f"{', '.join(scenario.file.controllers)}; name one of each"
         )
-    if scenario.file.estimators[file.estimator].needs_truth(scenario.path.parent):
-        raise LinkError(f"{path}: estimator {file.estimator!r} needs the true parameters, which no plant tells")
+    if scenario.file.estimators[estimator].needs_truth(scenario.path.parent):
+        raise LinkError(f"{where}: estimator {estimator!r} needs the true parameters, which no plant tells")

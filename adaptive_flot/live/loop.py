@@ -12,8 +12,9 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def quiet_libraries() -> None:
-    """The log of asyncua repeats what this program says in its own words."""
-    logging.getLogger("asyncua").setLevel(logging.CRITICAL)
+    """The logs of asyncua and uvicorn repeat what this program says in its own words, or what strangers send."""
+    for name in ("asyncua", "uvicorn"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 @asynccontextmanager

@@ -33,6 +33,8 @@ class Snapshot:
         The cycle before ended before its deadline.
     written
         What the cycle before wrote was taken and read back.
+    allowed
+        How far a person at the page of the link lets it go.
     """
 
     time: float
@@ -44,3 +46,11 @@ class Snapshot:
     granted: bool
     in_time: bool = True
     written: bool = True
+    allowed: Mode = Mode.CLOSED
+
+    @property
+    def permitted(self) -> Mode | None:
+        """The lower one of the operator's switch and the page's; None where nobody says how far the link may go."""
+        if self.switch is None:
+            return None if self.allowed is Mode.CLOSED else self.allowed
+        return min(self.switch, self.allowed)

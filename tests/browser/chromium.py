@@ -88,9 +88,10 @@ class Browser:
                     return kept
             self.events.append(self._next())
 
-    def open(self) -> Tab:
-        """Open a tab."""
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+    def open(self, apart: bool = False) -> Tab:
+        """Open a tab; `apart` has cookies of its own."""
+        context = {"browserContextId": self.call("Target.createBrowserContext")["browserContextId"]} if apart else {}
+        target = self.call("Target.createTarget", url="about:blank", **context)["targetId"]
         return Tab(self, self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"], target)
 
     def _next(self) -> dict[str, Any]:
@@ -126,8 +127,12 @@ class Tab:
 
     def load(self, page: Path) -> None:
         """Open a file and wait until it is loaded."""
+        self.go(page.resolve().as_uri())
+
+    def go(self, url: str) -> None:
+        """Open an address and wait until it is loaded."""
         self.browser.events = [e for e in self.browser.events if e.get("method") != "Page.loadEventFired"]
-        self.call("Page.navigate", url=page.resolve().as_uri())
+        self.call("Page.navigate", url=url)
         self.browser.wait_for("Page.loadEventFired", self.session)
 
     def run(self, expression: str) -> Any:

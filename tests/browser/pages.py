@@ -27,9 +27,9 @@ DRAW_ALL = f"""
 """
 
 
-def opened(browser: Browser) -> Tab:
-    """Return a new tab in which text that is drawn is written down."""
-    tab = browser.open()
+def opened(browser: Browser, apart: bool = False) -> Tab:
+    """Return a new tab in which text that is drawn is written down; `apart` has cookies of its own."""
+    tab = browser.open(apart)
     tab.call("Page.addScriptToEvaluateOnNewDocument", source=CHECKS)
     return tab
 

@@ -11,6 +11,8 @@ import pytest
 
 from adaptive_flot.contracts import Estimate, Sample, Status
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.live.finding import Finding
 from adaptive_flot.live.link.discovery import LiveDiscovery
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome
@@ -20,12 +22,12 @@ from adaptive_flot.runner.scenario.scenario import Scenario
 WINDOW, LEAST = 60, 100
 
 
-def judge(link_file: Path, record: Dataset) -> str:
+def judge(link_file: Path, record: Dataset, effects: tuple[Effect, ...]) -> Finding:
     """A search that costs nothing: how many rows it was given."""
-    return f"{link_file.name} with {len(record)} rows"
+    return Finding("none", f"{link_file.name} with {len(record)} rows, {len(effects)} effects")
 
 
-def fails(link_file: Path, record: Dataset) -> str:
+def fails(link_file: Path, record: Dataset, effects: tuple[Effect, ...]) -> Finding:
     raise ValueError(f"{link_file.name} is beyond me")
 
 
@@ -68,8 +70,8 @@ def test_an_alarm_starts_a_search_whose_verdict_is_said(watched: Link) -> None:
         discovery.close()
     assert words[0].startswith("alarm: concentrate_grade mean p =")
     assert words[1].startswith("search begins after an alarm of concentrate_grade mean")
-    assert words[2] == "search ended: link.yaml with 100 rows"
-    assert words[-1].endswith("with 150 rows"), "no record is longer than asked"
+    assert words[2] == "search ended: none: link.yaml with 100 rows, 0 effects"
+    assert words[-1].endswith("with 150 rows, 0 effects"), "no record is longer than asked"
 
 
 def test_white_innovations_raise_no_alarm(watched: Link) -> None:

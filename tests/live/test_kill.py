@@ -16,8 +16,8 @@ import yaml
 from sqlalchemy import ColumnElement, Table, create_engine, func, select
 from sqlalchemy.exc import OperationalError
 
-from adaptive_flot.live.link.run import SILENT_INTERVALS
 from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.running.run import SILENT_INTERVALS
 from adaptive_flot.live.store import schema
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.live.test_server import free_port

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from adaptive_flot.live.link_file import Link, LiveTag, Scale
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.link_keys import LiveTag, Scale
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 

@@ -20,11 +20,11 @@ from asyncua.crypto import security_policies
 from adaptive_flot.errors import LinkError, OutputError
 from adaptive_flot.live.certificates import identity, make_certificates, password_file, read_password
 from adaptive_flot.live.link.client import LOST
-from adaptive_flot.live.link.run import LinkRun
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.plant.process import TestPlant
 from adaptive_flot.live.plant.server import PlantServer, ServerPlace
 from adaptive_flot.live.plant.tags import NAMESPACE
+from adaptive_flot.live.running.run import LinkRun
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store.memory import Memory, open_database
 from adaptive_flot.runner.scenario.realisation import Realisation

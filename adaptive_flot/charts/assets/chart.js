@@ -3,12 +3,13 @@
  *   AdaptiveFlotChart.start()              draw each div.chart of the page when it comes into view
  *   AdaptiveFlotChart.make(element, block) draw one now; returns it
  *   chart.append(panel, times, rows)       add points at the end: rows[i] are the values of line i, null for none
+ *   chart.renew(range, tables)             all points anew: for each panel its times, then the values of each line
  *   AdaptiveFlotChart.recolour()           after the colours of the page have changed
  *
  * The block is described in adaptive_flot/charts/__init__.py. No text of it is ever read as HTML. */
 const AdaptiveFlotChart = (() => {
   "use strict";
-  const { element, decode, number, moment } = AdaptiveFlotText;
+  const { element, decode, number, moment, clock } = AdaptiveFlotText;
   const MOST_LIVE = 20000; // points of a line that grows
   const AXIS = 58; // width of the vertical axis [px]
   const STEPS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400];
@@ -33,8 +34,11 @@ const AdaptiveFlotChart = (() => {
       ...axis,
       size: last ? 34 : 8,
       space: 64,
-      values: (u, splits) =>
-        last ? splits.map((v) => number(v / x.seconds, splits.length > 1 ? (splits[1] - splits[0]) / x.seconds : 0)) : splits.map(() => ""),
+      values: (u, splits) => {
+        if (!last) return splits.map(() => "");
+        const step = splits.length > 1 ? splits[1] - splits[0] : 0;
+        return splits.map((v) => (x.clock ? clock(v, step) : number(v / x.seconds, step / x.seconds)));
+      },
     };
     if (x.time) across.incrs = TIME_STEPS;
     return {
@@ -71,10 +75,10 @@ const AdaptiveFlotChart = (() => {
   function drawMarks(u, chart) {
     const { ctx, bbox } = u;
     ctx.save();
-    ctx.strokeStyle = colour("limit");
     ctx.lineWidth = devicePixelRatio;
     ctx.setLineDash([3 * devicePixelRatio, 3 * devicePixelRatio]);
     for (const mark of chart.spec.marks) {
+      ctx.strokeStyle = colour(mark.color ?? "limit");
       const at = Math.round(u.valToPos(mark.x, "x", true));
       if (at < bbox.left || at > bbox.left + bbox.width) continue;
       ctx.beginPath();
@@ -223,6 +227,17 @@ const AdaptiveFlotChart = (() => {
       linking = false;
       if (max < before[1]) return;
       this.show(min <= before[0] ? this.spec.x.range[0] : min + newest - max, newest);
+    }
+
+    /* All points anew; a chart that shows all goes along, one that is zoomed stays where it is. */
+    renew(range, tables) {
+      const [low, high] = this.spec.x.range;
+      const all = this.view[0] <= low && this.view[1] >= high;
+      this.spec.x.range = range;
+      linking = true;
+      tables.forEach((table, k) => this.plots[k].batch(() => this.plots[k].setData(table, false)));
+      linking = false;
+      this.show(...(all ? range : this.view));
     }
   }
 

@@ -29,10 +29,17 @@ const AdaptiveFlotText = (() => {
     return digits;
   }
 
+  /* Time of day of seconds since 1970; without seconds where steps are whole minutes. */
+  function clock(seconds, step = 1) {
+    if (!Number.isFinite(seconds)) return "–";
+    return new Date(seconds * 1000).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit", ...(step % 60 ? { second: "2-digit" } : {}) });
+  }
+
   function moment(x, value) {
+    if (x.clock) return clock(value);
     const own = number(Number((value / x.seconds).toPrecision(6)));
     return `${x.label} ${own}${x.unit === "–" ? "" : " " + x.unit}`;
   }
 
-  return { element, decode, number, moment };
+  return { element, decode, number, moment, clock };
 })();

@@ -7,7 +7,5 @@ cycle.py      One cycle: check, estimate, decide, mode, limits. A function of sn
 estimation.py The estimator over gaps and restarts.
 discovery.py  Watches the innovations, searches for a cause, applies nothing.
 client.py     The OPC UA client: reads by subscription, writes and reads back, never waits without end.
-run.py        The loop: snapshot, cycle, storage, writes.
-live.py       A link as a program.
 replay.py     A stored session once more, compared to the bit.
 """

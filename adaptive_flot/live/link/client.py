@@ -17,7 +17,8 @@ from asyncua.crypto import security_policies
 
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.certificates import LINK, Identity, read_password
-from adaptive_flot.live.link_file import Link, Scale
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.link_keys import Scale
 from adaptive_flot.live.outcome import Written
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.safety.tag_value import Quality, TagValue

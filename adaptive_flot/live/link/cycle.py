@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from adaptive_flot.contracts import AnyController, Decision, Estimate, Prior, Sample, Status, TracksInputs
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.live.link.estimation import Estimation, EstimationState
 from adaptive_flot.live.link.samples import Histories, Reading, Samples, forgotten
 from adaptive_flot.live.link_file import Link
@@ -78,17 +79,29 @@ class Cycle:
     ----------
     link
         The link file and its scenario.
+    effects
+        What the model in use has beyond the scenario's.
+
+    Raises
+    ------
+    AdaptiveFlotError
+        The plug-ins do not take the extended model.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Link, effects: tuple[Effect, ...] = ()) -> None:
         file, scenario = link.file, link.scenario
         prepared = Prepared.of(scenario, [file.estimator], [file.controller])
         realisation = Realisation(scenario, scenario.file.seeds[0])
-        self.link = link
+        self.link, self.effects = link, effects
         estimator = prepared.estimator(file.estimator, realisation)
+        if effects:
+            extended = replace(scenario.setup, model=scenario.model.with_effects(effects))
+            estimator = prepared.new_estimator(file.estimator, extended)
         start = scenario.file.estimators[file.estimator].start
         self.estimation = Estimation(prepared, estimator, start, file.cycle.longest_gap_s)
         self.controller: AnyController = prepared.controller(file.controller, realisation, estimator.setup)
+        self.model = estimator.setup.model
+        self._further = self.model.parameter_values[len(scenario.model.parameters) :]
         self.limits = {name: write.limit for name, write in file.writes.items()}
         self._samples = Samples(link)
         self._rules = file.mode_rules
@@ -98,6 +111,13 @@ class Cycle:
     def start(self, resumes: Prior | None = None) -> CycleState:
         """In monitor and not armed, whatever was before; a stored estimate is where the estimator goes on."""
         return CycleState(estimation=EstimationState(resumes=resumes))
+
+    def go_on(self, state: CycleState, prior: Prior) -> CycleState:
+        """Where a cycle with another model stood: the estimator starts anew, the controller from what acts."""
+        inner = self.estimation.estimator.init(prior)
+        estimation = EstimationState(inner=inner, noise_std=tuple(prior.noise_std), last=state.sample)
+        controller = None if state.sample is None else self.controller.init(state.sample.time)
+        return replace(state, estimation=estimation, controller=controller, on_target=False)
 
     def step(self, state: CycleState, snapshot: Snapshot) -> tuple[CycleState, Outcome]:
         """One cycle."""
@@ -111,7 +131,7 @@ class Cycle:
                 state, estimate, problem = self._estimated(state, reading.sample)
         asked = self._asked(state, snapshot, reading, estimate)
         facts = CycleFacts(
-            switch=snapshot.switch,
+            switch=snapshot.permitted,
             alive=time is not None,
             measured=(reading is not None and reading.good) or state.modes.mode is Mode.OFF,
             solved=asked.found or state.modes.mode not in (Mode.ADVISORY, Mode.CLOSED),
@@ -154,7 +174,7 @@ class Cycle:
 
     def _estimated(self, state: CycleState, sample: Sample) -> tuple[CycleState, Estimate | None, str]:
         try:
-            after = self.estimation.take(state.estimation, sample)
+            after = self.estimation.take(state.estimation, self._known(sample))
         except Exception as error:  # a failed estimator must not take the link's mode machine with it
             return state, None, f"estimator: {type(error).__name__}: {error}"
         estimate = after.estimate
@@ -173,7 +193,7 @@ class Cycle:
             return _Asked(self._tracked(state.controller, self._acting(reading)))
         before = state.controller if state.on_target else self._tracked(state.controller, self._acting(reading))
         try:
-            returned = self.controller.decide(before, reading.sample, estimate)
+            returned = self.controller.decide(before, self._known(reading.sample), estimate)
             after, decision = checked_decision(self.controller, returned, len(reading.sample.inputs))
         except Exception as error:  # a failed controller makes a bad cycle, and sheds if it goes on
             return _Asked(before, problem=f"controller: {type(error).__name__}: {error}")
@@ -189,6 +209,12 @@ class Cycle:
         if not np.array_equal(clamped, decision.inputs):
             after = self._tracked(after, clamped)
         return _Asked(after, decision, moves, found=True)
+
+    def _known(self, sample: Sample) -> Sample:
+        """The sample with its measured parameters as the model in use has them."""
+        if sample.parameters is None or not self._further.size:
+            return sample
+        return replace(sample, parameters=np.concatenate([sample.parameters, self._further]))
 
     def _acting(self, reading: Reading) -> np.ndarray[Any, np.dtype[np.float64]]:
         assert reading.sample is not None

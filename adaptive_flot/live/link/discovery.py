@@ -1,6 +1,6 @@
 """Discovery beside a link: watches the innovations, searches for a cause, says what it found, and applies nothing.
 
-A model is never extended on a live plant without a person. What is found is stored as an event.
+What is found is stored as an event, and shown. Whether the model in use is extended is decided elsewhere.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import multiprocessing
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ import numpy as np
 from adaptive_flot.contracts import Decision, Estimate, PlantRecord, Sample, Setup, Status
 from adaptive_flot.contracts.delayed_measurements import in_time
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.live.finding import Finding
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.outcome import Outcome
 from adaptive_flot.runner.adaptation.supervisor import measured_record
@@ -23,17 +26,34 @@ from adaptive_flot.runner.adaptation.whiteness_watch import watch
 from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.results.timeseries import innovations
 
-Search = Callable[[Path, Dataset], str]
+Search = Callable[[Path, Dataset, tuple[Effect, ...]], Finding]
 
 
-def search(link_file: Path, record: Dataset) -> str:
-    """Search a record for what the model of a link lacks: the verdict in words. Runs in a process of its own."""
+def search(link_file: Path, record: Dataset, effects: tuple[Effect, ...]) -> Finding:
+    """Search a record for what the model in use lacks. Runs in a process of its own.
+
+    Parameters
+    ----------
+    link_file
+        The link file.
+    record
+        What was measured.
+    effects
+        What the model in use has beyond the scenario's.
+    """
     from adaptive_flot.runner.adaptation.extension import search_record
 
     link = load_link(link_file)
-    options = link.scenario.file.discovery
-    finding = search_record(link.scenario.setup, record, 1 if options is None else options.processes)
-    return f"{finding.verdict.word}: {finding.verdict.reason}"
+    options, setup = link.scenario.file.discovery, link.scenario.setup
+    if effects:
+        setup = replace(setup, model=setup.model.with_effects(effects))
+    found = search_record(setup, record, 1 if options is None else options.processes)
+    verdict, extension = found.verdict, found.extension
+    evidence = [str(symptom) for symptom in verdict.detection.symptoms] if verdict.detection else []
+    evidence += [f"{e.effect.label}: {e.meaning}" for e in verdict.effects]
+    errors = tuple((c.output, c.unit, c.before, c.after) for c in verdict.error)
+    more = (*evidence, *verdict.drift, *verdict.notes)
+    return Finding(verdict.word, verdict.reason, more, errors, extension.effects, tuple(extension.parameters.items()))
 
 
 class LiveDiscovery:
@@ -45,14 +65,23 @@ class LiveDiscovery:
         The link file and its scenario.
     searcher
         Judges a record; default `search`.
+    effects
+        What the model in use has beyond the scenario's.
+
+    Attributes
+    ----------
+    finding
+        What the last search found; None before the first.
     """
 
-    def __init__(self, link: Link, searcher: Search = search) -> None:
+    def __init__(self, link: Link, searcher: Search = search, effects: tuple[Effect, ...] = ()) -> None:
+        self.finding: Finding | None = None
+        self._effects = effects
         self._options = link.scenario.file.discovery if link.file.estimator in link.scenario.watched else None
         self._path, self._search = link.path.absolute(), searcher
         self._setup: Setup = link.scenario.setup
         self._pool: ProcessPoolExecutor | None = None
-        self._found: Future[str] | None = None
+        self._found: Future[Finding] | None = None
         self._alarm, self._quiet_until, self._window = "", -np.inf, 0
         rows = 0 if self._options is None else max(self._options.record_s, self._options.window_s) / self._setup.dt
         self._steps: deque[Step] = deque(maxlen=round(rows) + 1)
@@ -72,7 +101,7 @@ class LiveDiscovery:
         words = self._test(outcome.sample.time) if self._window * self._setup.dt >= self._options.window_s else ""
         if self._alarm and len(self._steps) * self._setup.dt >= self._options.least_record_s:
             record = measured_record(list(self._steps)[-round(self._options.record_s / self._setup.dt) :], self._setup)
-            self._found = self._executor().submit(self._search, self._path, record)
+            self._found = self._executor().submit(self._search, self._path, record, self._effects)
             begun = f"search begins after an alarm of {self._alarm}"
             self._alarm = ""
             return begun
@@ -107,7 +136,8 @@ class LiveDiscovery:
         found, self._found = self._found, None
         self._quiet_until, self._window = now + self._options.pause_s, 0
         try:
-            return f"search ended: {found.result()}"
+            self.finding = found.result()
+            return f"search ended: {self.finding}"
         except Exception as error:  # the link goes on without a search that failed, whatever it was
             return f"search failed: {type(error).__name__}: {error}"
 

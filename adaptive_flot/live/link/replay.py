@@ -18,6 +18,7 @@ from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.safety.tag_value import Quality, TagValue
 from adaptive_flot.live.snapshot import Snapshot
 from adaptive_flot.live.store import schema
+from adaptive_flot.live.store.beside import stored_change
 from adaptive_flot.live.store.memory import ACTING
 from adaptive_flot.live.store.numbers import as_array, as_text, from_column
 
@@ -66,6 +67,10 @@ def replay(engine: Engine, link: Link, session: int | None = None) -> Replay:
         cycles, different = 0, 0
         words: list[str] = []
         for number, snapshot in stored.snapshots():
+            if number in stored.changes:
+                change = stored.changes[number]
+                cycle = Cycle(cycle.link, change.effects)
+                state = cycle.go_on(state, change.prior)
             state, outcome = cycle.step(state, snapshot)
             wrong = stored.differences(number, outcome)
             cycles, different = cycles + 1, different + bool(wrong)
@@ -107,6 +112,7 @@ class _Stored:
         self.cycles = list(rows(schema.cycles))
         self.estimates = {row["cycle"]: row for row in rows(schema.estimates)}
         self.decisions = {row["cycle"]: row for row in rows(schema.decisions)}
+        self.changes = {row["cycle"]: stored_change(row) for row in rows(schema.models)}
         self._tags, self._limits, self._writes = (defaultdict[int, list[Any]](list) for _ in range(3))
         for found, table in ((self._tags, schema.tags), (self._limits, schema.limits), (self._writes, schema.writes)):
             for row in rows(table):
@@ -125,7 +131,7 @@ class _Stored:
             acting = {name.removeprefix(ACTING): tag for name, tag in told.items() if name.startswith(ACTING)}
             measured = {name: tag for name, tag in told.items() if not name.startswith(ACTING)}
             switch = None if row["switch"] is None else Mode(row["switch"])
-            facts = row["granted"], row["in_time"], row["written"]
+            facts = row["granted"], row["in_time"], row["written"], Mode(row["allowed"])
             time = from_column(row["plant_time"])
             yield number, Snapshot(time, row["alive"], measured, acting, dict(operator), switch, *facts)
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from adaptive_flot.contracts import DelayedValue, Sample
-from adaptive_flot.live.link_file import Link, Scale, tagged_quantities
+from adaptive_flot.live.link_file import Link, tagged_quantities
+from adaptive_flot.live.link_keys import Scale
 from adaptive_flot.live.safety.checks import Check, TagHistory, TagRules, check
 from adaptive_flot.live.snapshot import Snapshot
 

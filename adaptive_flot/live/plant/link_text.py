@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from adaptive_flot.live.certificates import LINK, PLANT, identity, password_file
+from adaptive_flot.live.certificates import LINK, PLANT, TOKENS, identity, password_file, token_file
 from adaptive_flot.live.plant.process import measured_outputs, write_limits
 from adaptive_flot.live.plant.tags import (
     LINK_ASKS,
@@ -28,7 +28,15 @@ INTERVALS_A_STALE_VALUE = 10
 """Values older than so many intervals of their measurement are stale."""
 
 
-def link_text(scenario: Scenario, url: str, certificates: Path, *, highest: str = "closed", speed: float = 1.0) -> str:
+def link_text(
+    scenario: Scenario,
+    url: str,
+    certificates: Path,
+    *,
+    highest: str = "closed",
+    speed: float = 1.0,
+    page: int | None = None,
+) -> str:
     """Content of a link file for a scenario's test plant (YAML).
 
     Parameters
@@ -43,6 +51,8 @@ def link_text(scenario: Scenario, url: str, certificates: Path, *, highest: str 
         Highest mode: `monitor`, `advisory` or `closed`.
     speed
         How much faster than real time the plant runs.
+    page
+        Port of the page of the control room; None for no page.
     """
     case = scenario.combinations()[0]
     me, plant = identity(certificates, LINK), identity(certificates, PLANT)
@@ -73,8 +83,14 @@ def link_text(scenario: Scenario, url: str, certificates: Path, *, highest: str 
             "mode": LINK_MODE,
         },
         "cycle": {"speed": speed},
+        **({} if page is None else {"page": _page(certificates, page)}),
     }
     return HEAD + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=118)
+
+
+def _page(certificates: Path, port: int) -> dict[str, Any]:
+    files = {f"{name}_token_file": str(token_file(certificates, name)) for name in TOKENS}
+    return {"host": "127.0.0.1", "port": port, **files}
 
 
 def _tags(scenario: Scenario) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from adaptive_flot.errors import LinkError, near_match
-from adaptive_flot.live.link_file import MODES
+from adaptive_flot.live.link_keys import MODES
 from adaptive_flot.live.loop import quiet_libraries, until_stopped
 from adaptive_flot.live.plant.operator import Operator
 from adaptive_flot.live.plant.process import TestPlant

@@ -20,6 +20,7 @@ from adaptive_flot.live.outcome import Outcome, Written
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.snapshot import Snapshot
 from adaptive_flot.live.store import schema
+from adaptive_flot.live.store.beside import NOTHING_BESIDE, Beside, action_row, change_row, shadow_row
 from adaptive_flot.live.store.numbers import as_array, as_column, as_text
 
 Rows = dict[Table, list[dict[str, Any]]]
@@ -126,6 +127,7 @@ class Memory:
         noise_std: Sequence[float],
         before: Mapping[str, Written],
         found: str = "",
+        beside: Beside = NOTHING_BESIDE,
     ) -> None:
         """Store a cycle whole or not at all, before anything of it is written to the plant.
 
@@ -139,6 +141,8 @@ class Memory:
             What came of the writes of the cycle before.
         found
             What discovery says in this cycle; empty for nothing.
+        beside
+            What persons did, alarms, shadows, and a change of the model.
 
         Raises
         ------
@@ -150,6 +154,9 @@ class Memory:
         rows[schema.events] = self._events(snapshot, outcome)
         if found:
             rows[schema.events].append({"kind": "discovery", "text": found})
+        rows[schema.events] += [{"kind": f"alarm {key}"[:120], "text": text} for key, text in beside.alarms.items()]
+        rows[schema.actions] = [action_row(k + 1, answered) for k, answered in enumerate(beside.answered)]
+        rows[schema.models] = [] if beside.change is None else [change_row(beside.change)]
         rows[schema.limits] = self._changed_limits(snapshot)
         if outcome.sample is not None:
             rows[schema.samples] = [_sample(outcome)]
@@ -166,6 +173,9 @@ class Memory:
             if before:
                 earlier = {"session": self.session, "cycle": outcome.number - 1}
                 connection.execute(insert(schema.results), [{**earlier, **_result(n, w)} for n, w in before.items()])
+            if beside.shadows:
+                shown = [{"session": self.session, **shadow_row(result)} for result in beside.shadows]
+                connection.execute(insert(schema.shadows), shown)
         if snapshot.switch is not None:
             self._switch = int(snapshot.switch)
         self._limits.update(snapshot.operator)
@@ -206,6 +216,7 @@ def _cycle(snapshot: Snapshot, outcome: Outcome) -> dict[str, Any]:
         "record_time": None if outcome.sample is None else outcome.sample.time,
         "alive": snapshot.alive,
         "switch": None if snapshot.switch is None else int(snapshot.switch),
+        "allowed": int(snapshot.allowed),
         "granted": snapshot.granted,
         "in_time": snapshot.in_time,
         "written": snapshot.written,
@@ -277,7 +288,8 @@ def _last_estimate(connection: Connection, link: Link) -> Resumed | None:
         return None
     parameters, state = as_array(row["parameters"]), as_array(row["state"])
     setup = link.scenario.setup
-    if parameters.shape != (len(setup.parameters),) or state.shape != (len(setup.model.states),):
+    own = len(setup.model.states)  # the states of effects that were in use come after them
+    if parameters.shape != (len(setup.parameters),) or len(state) < own:
         return None
-    prior = Prior(0.0, state, parameters, as_array(row["covariance"]), as_array(row["noise_std"]))
+    prior = Prior(0.0, state[:own], parameters, as_array(row["covariance"]), as_array(row["noise_std"]))
     return Resumed(row["session"], row["cycle"], prior)

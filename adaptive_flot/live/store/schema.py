@@ -19,7 +19,7 @@ from sqlalchemy import (
     Text,
 )
 
-VERSION = 1
+VERSION = 2
 """Version of the tables; another one is refused."""
 metadata = MetaData()
 
@@ -54,6 +54,7 @@ cycles = Table(
     Column("record_time", Float(53), doc="time of the sample in the record; NULL where there was none"),
     Column("alive", Boolean, nullable=False),
     Column("switch", Integer),
+    Column("allowed", Integer, nullable=False, doc="how far a person at the page lets the link go"),
     Column("granted", Boolean, nullable=False),
     Column("in_time", Boolean, nullable=False),
     Column("written", Boolean, nullable=False),
@@ -97,4 +98,35 @@ results = _of_cycle(
     keys=("input",),
 )
 events = _of_cycle("events", Column("text", Text, nullable=False), keys=("kind",))
-"""Mode changes, what the operator did at the panel, and what discovery found."""
+"""Mode changes, what the operator did at the panel, alarms, and what discovery found."""
+actions = _of_cycle(
+    "actions",
+    Column("person", String(80), nullable=False),
+    Column("action", String(20), nullable=False),
+    Column("about", Text, nullable=False),
+    Column("answer", Text, nullable=False, doc="what came of it"),
+    Column("asked", String(40), nullable=False, doc="date and time of this machine"),
+    keys=("number",),
+)
+"""What persons asked for at the page, by name."""
+shadows = _of_cycle(
+    "shadows",
+    Column("status", Text, nullable=False),
+    Column("seconds", Float(53)),
+    Column("parameters", Text),
+    Column("covariance", Text),
+    Column("state", Text),
+    Column("prediction", Text),
+    Column("innovation", Text),
+    Column("inputs", Text, doc="what it would set"),
+    Column("decision_status", String(30)),
+    keys=("role",),
+)
+"""What ran beside the acting estimator and controller made of the sample of a cycle."""
+models = _of_cycle(
+    "models",
+    Column("effects", Text, nullable=False, doc="what the model in use has beyond the scenario's, from this cycle on"),
+    Column("prior", Text, nullable=False, doc="where its estimator started"),
+    Column("person", String(80), nullable=False),
+)
+"""Changes of the model in use; each one before the cycle of its number."""

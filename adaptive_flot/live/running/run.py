@@ -5,16 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.link.client import LOST, PlantClient
-from adaptive_flot.live.link.cycle import Cycle, CycleState
+from adaptive_flot.live.link.cycle import CycleState
 from adaptive_flot.live.link.discovery import LiveDiscovery
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome, Written
+from adaptive_flot.live.requests import Answered, Inbox
+from adaptive_flot.live.running.desk import Desk
+from adaptive_flot.live.running.model_use import ModelUse
+from adaptive_flot.live.running.progress import Progress
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.snapshot import Snapshot
+from adaptive_flot.live.store.beside import Beside
 from adaptive_flot.live.store.memory import Memory
 
 PATIENCE = 1.5
@@ -28,16 +33,6 @@ RETRY_S = 0.5
 NOTHING = Snapshot(float("nan"), False, {}, {}, {}, None, False)
 
 
-@dataclass(frozen=True)
-class Progress:
-    """What a person may want to see of a cycle."""
-
-    snapshot: Snapshot
-    outcome: Outcome
-    seconds: float
-    found: str = ""
-
-
 class LinkRun:
     """Runs a link until it is told to stop.
 
@@ -48,18 +43,31 @@ class LinkRun:
     memory
         Where everything is stored.
     show
-        Called after each cycle.
+        Called after each cycle; it must not wait for anything.
+    inbox
+        What persons ask for at the page.
 
     Attributes
     ----------
     state
         After the last cycle.
+    use
+        The model in use, with its cycle.
+    desk
+        What happens beside the cycles.
     """
 
-    def __init__(self, link: Link, memory: Memory, show: Callable[[Progress], None] = lambda progress: None) -> None:
-        self.link, self.memory = link, memory
-        self.cycle, self.discovery = Cycle(link), LiveDiscovery(link)
-        self.state: CycleState = self.cycle.start(None if memory.resumed is None else memory.resumed.prior)
+    def __init__(
+        self,
+        link: Link,
+        memory: Memory,
+        show: Callable[[Progress], None] = lambda progress: None,
+        inbox: Inbox | None = None,
+    ) -> None:
+        self.link, self.memory, self.inbox = link, memory, inbox or Inbox()
+        self.use, self.discovery = ModelUse(link), LiveDiscovery(link)
+        self.desk = Desk(link, self.use)
+        self.state: CycleState = self.use.cycle.start(None if memory.resumed is None else memory.resumed.prior)
         self._show = show
         self._interval = link.scenario.dt / link.file.cycle.speed  # of this machine
         self._client: PlantClient | None = None
@@ -81,6 +89,7 @@ class LinkRun:
                 in_time, written = await self._one(in_time, written)
         finally:
             self.discovery.close()
+            self.desk.close()
             await self._leave()
 
     async def _one(self, in_time: bool, before: Mapping[str, Written]) -> tuple[bool, dict[str, Written]]:
@@ -90,20 +99,43 @@ class LinkRun:
         loop = asyncio.get_running_loop()
         begin = loop.time()
         well = all(not result.problem for result in before.values())
+        answered = self.desk.answer(self.inbox.take())
+        self.state, change = self.desk.change_model(self.state)
+        if change is not None:
+            self.discovery.close()
+            self.discovery = LiveDiscovery(self.link, effects=change.effects)
         snapshot = NOTHING if client is None else client.snapshot(alive, in_time, well)
+        snapshot = replace(snapshot, allowed=self.desk.allowed)
         self.state, outcome = await self._stepped(client, snapshot)
         found = self.discovery.look(outcome)
         noise = self.state.estimation.noise_std
-        await asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found)
+        self.desk.after(outcome, noise, self.discovery.finding)
+        beside = Beside(answered, self.desk.said(), self.desk.results(), change)
+        await asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found, beside)
         seconds = loop.time() - begin
         in_time = seconds <= self.link.file.cycle.deadline * self._interval
         written = await self._tell(client, outcome, in_time)
-        self._show(Progress(snapshot, outcome, seconds, found))
+        self._show(self._progress(snapshot, outcome, seconds, found, client is not None, answered))
         return in_time, written
+
+    def _progress(
+        self,
+        snapshot: Snapshot,
+        outcome: Outcome,
+        seconds: float,
+        found: str,
+        connected: bool,
+        answered: tuple[Answered, ...],
+    ) -> Progress:
+        state, desk = self.state, self.desk
+        beside = desk.alarms, desk.card, desk.shadows(), answered
+        return Progress(
+            snapshot, outcome, seconds, found, connected, state.modes, state.histories, self.use.cycle.model, *beside
+        )
 
     async def _stepped(self, client: PlantClient | None, snapshot: Snapshot) -> tuple[CycleState, Outcome]:
         """One step; one that does not end (a solver may hang) gives control back before it is waited for."""
-        working = asyncio.create_task(asyncio.to_thread(self.cycle.step, self.state, snapshot))
+        working = asyncio.create_task(asyncio.to_thread(self.use.cycle.step, self.state, snapshot))
         longest = max(self.link.file.cycle.shed_after * self._interval, LEAST_PATIENCE_S)
         done, _ = await asyncio.wait({working}, timeout=longest)
         if not done and client is not None and self.state.modes.mode is Mode.CLOSED:

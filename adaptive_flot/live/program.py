@@ -5,9 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from adaptive_flot.live.link.run import LinkRun, Progress
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.loop import quiet_libraries, until_stopped
+from adaptive_flot.live.page.server import PageServer
+from adaptive_flot.live.requests import Inbox
+from adaptive_flot.live.running.progress import Progress
+from adaptive_flot.live.running.run import LinkRun
 from adaptive_flot.live.store.memory import Memory, open_database
 
 
@@ -26,17 +29,31 @@ def live(link: Link, say: Callable[[str], None] = print, cycles: int | None = No
     Raises
     ------
     LinkError
-        A file, a tag or the database can not be used.
+        A file, a tag, the database or the address of the page can not be used.
     """
     quiet_libraries()
+    inbox, speaker = Inbox(), Speaker(say)
+    page = None if link.file.page is None else PageServer(link, inbox)
     memory = Memory(open_database(link.file.database, link.path.parent), link)
     try:
         say(_started(link, memory))
-        run = LinkRun(link, memory, Speaker(say))
+        shows: tuple[Callable[[Progress], None], ...] = (speaker,)
+        if page is not None:
+            page.start()
+            shows = (speaker, page.show)
+            say(f"Page: {page.address}")
+        run = LinkRun(link, memory, lambda progress: _show(shows, progress), inbox)
         asyncio.run(_run(run, cycles))
         say(f"Session {memory.session}: ended after {run.state.number} cycles; control is with the plant")
     finally:
+        if page is not None:
+            page.close()
         memory.close()
+
+
+def _show(shows: tuple[Callable[[Progress], None], ...], progress: Progress) -> None:
+    for show in shows:
+        show(progress)
 
 
 async def _run(run: LinkRun, cycles: int | None) -> None:
@@ -68,6 +85,9 @@ class Speaker:
         if outcome.estimate is not None and not self._estimating:
             self._estimating = True
             self._say(f"{outcome.number}: the estimator runs")
+        for answered in progress.answered:
+            asked = answered.request
+            self._say(f"{outcome.number}: {asked.person}: {asked.action.value} {asked.about}: {answered.answer}")
         if progress.found:
             self._say(f"{outcome.number}: discovery: {progress.found}")
         if outcome.faults != self._faults:

@@ -1,0 +1,231 @@
+"""What is served: the page, its stream, and the actions. Nothing here changes anything but through the inbox."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal
+from urllib.parse import parse_qs
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from starlette.applications import Starlette
+from starlette.requests import Request as HttpRequest
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from adaptive_flot.live.page.access import COOKIE, LASTS_S, Access, Role, Session, foreign, is_same
+from adaptive_flot.live.page.assets import ASSETS, login_page, page
+from adaptive_flot.live.page.hub import Hub, Listener
+from adaptive_flot.live.requests import Action, Inbox, Request
+
+LONGEST_BODY = 4096
+PING_S = 10.0
+SLOWEST_S = 5.0
+"""A browser that does not take a message within this time is dropped."""
+HEADERS = {
+    "content-security-policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
+        "form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+    ),
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-store",
+}
+
+
+class Asked(BaseModel):
+    """Body of a request for an action."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    action: Literal["switch", "acknowledge", "shadow", "apply", "revert"]
+    about: Annotated[str, Field(max_length=200)] = ""
+
+
+class _TooLongError(Exception):
+    pass
+
+
+class PageApplication:
+    """The page as an ASGI application.
+
+    Parameters
+    ----------
+    access
+        Tokens and sessions.
+    hub
+        What is shown.
+    inbox
+        Where requests go.
+    hosts
+        Values of `Host` under which it is served.
+    scheme
+        `http` or `https`.
+    """
+
+    def __init__(self, access: Access, hub: Hub, inbox: Inbox, hosts: frozenset[str], scheme: str) -> None:
+        self._access, self._hub, self._inbox = access, hub, inbox
+        self._origins = frozenset(f"{scheme}://{host}" for host in hosts)
+        self._secure = scheme == "https"
+        routes = [
+            Route("/", self._page, methods=["GET"]),
+            Route("/login", self._login, methods=["GET", "POST"]),
+            Route("/logout", self._logout, methods=["POST"]),
+            Route("/events", self._events, methods=["GET"]),
+            Route("/action", self._action, methods=["POST"]),
+            Route("/assets/{name}", self._asset, methods=["GET"]),
+        ]
+        self.application = with_headers(Starlette(routes=routes), hosts)
+
+    async def _page(self, request: HttpRequest) -> Response:
+        if self._session(request) is None:
+            return RedirectResponse("/login", 303)
+        return Response(page(), media_type="text/html")
+
+    async def _asset(self, request: HttpRequest) -> Response:
+        found = ASSETS.get(request.path_params["name"])
+        return PlainTextResponse("not found", 404) if found is None else Response(found[0](), media_type=found[1])
+
+    async def _login(self, request: HttpRequest) -> Response:
+        if request.method == "GET":
+            return Response(login_page(""), media_type="text/html")
+        why = foreign(request.headers, self._origins)
+        if why:
+            return PlainTextResponse(f"refused: {why}", 403)
+        try:
+            form = parse_qs((await _body(request)).decode("utf-8"), max_num_fields=8)
+        except _TooLongError:
+            return PlainTextResponse("refused: too long", 413)
+        except (UnicodeError, ValueError):
+            return PlainTextResponse("refused: no form", 400)
+        given = self._access.log_in(form.get("token", [""])[0].strip(), form.get("name", [""])[0])
+        if given is None:
+            return Response(login_page("Wrong token, or no name."), 403, media_type="text/html")
+        answer = RedirectResponse("/", 303)
+        answer.set_cookie(
+            COOKIE, given[0], max_age=int(LASTS_S), httponly=True, samesite="strict", secure=self._secure, path="/"
+        )
+        return answer
+
+    async def _logout(self, request: HttpRequest) -> Response:
+        session = self._session(request)
+        if session is None or foreign(request.headers, self._origins) or not _has_csrf(request, session):
+            return PlainTextResponse("refused", 403)
+        self._access.log_out(request.cookies.get(COOKIE))
+        answer = PlainTextResponse("logged out")
+        answer.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict", secure=self._secure)
+        return answer
+
+    async def _action(self, request: HttpRequest) -> Response:
+        session = self._session(request)
+        if session is None:
+            return PlainTextResponse("refused: not logged in", 401)
+        why = foreign(request.headers, self._origins)
+        if not why and not _has_csrf(request, session):
+            why = "it has no valid CSRF token"
+        if not why and session.role is not Role.ACT:
+            why = "this session may only look; log in with the token for acting"
+        if not why and request.headers.get("content-type", "").split(";")[0] != "application/json":
+            why = "it is no JSON"
+        if why:
+            return PlainTextResponse(f"refused: {why}", 403)
+        try:
+            asked = Asked.model_validate_json(await _body(request))
+        except _TooLongError:
+            return PlainTextResponse("refused: too long", 413)
+        except ValidationError:
+            return PlainTextResponse("refused: unknown action", 400)
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        if not self._inbox.put(Request(session.name, Action(asked.action), asked.about, now)):
+            return PlainTextResponse("refused: too many requests wait for the next cycle", 503)
+        return PlainTextResponse("taken: the next cycle carries it out", 202)
+
+    async def _events(self, request: HttpRequest) -> Response:
+        key = request.cookies.get(COOKIE)
+        session = self._access.session(key)
+        if session is None:
+            return PlainTextResponse("refused: not logged in", 401)
+        listener = self._hub.join()
+        if listener is None:
+            return PlainTextResponse("refused: too many browsers listen", 503)
+        who = {"name": session.name, "may": session.role.value, "csrf": session.csrf}
+        valid: Callable[[], bool] = lambda: self._access.session(key) is not None  # noqa: E731
+        return _Stream(self._hub, listener, who, valid)
+
+    def _session(self, request: HttpRequest) -> Session | None:
+        return self._access.session(request.cookies.get(COOKIE))
+
+
+class _Stream(Response):
+    """Server-sent events to one browser, which ends with its session, or where the browser does not keep up."""
+
+    def __init__(self, hub: Hub, listener: Listener, who: dict[str, Any], valid: Callable[[], bool]) -> None:
+        super().__init__(media_type="text/event-stream")
+        self._hub, self._listener, self._who, self._valid = hub, listener, who, valid
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        gone = asyncio.ensure_future(_disconnected(receive))
+        telling = asyncio.ensure_future(self._tell(send))
+        try:
+            await asyncio.wait({gone, telling}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._hub.leave(self._listener)
+            for task in (gone, telling):
+                task.cancel()
+            await asyncio.gather(gone, telling, return_exceptions=True)
+
+    async def _tell(self, send: Send) -> None:
+        headers = [(b"content-type", b"text/event-stream; charset=utf-8")]
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        message: str | None = "retry: 1000\n\n" + self._hub.begin(self._who)
+        while not self._listener.dropped and self._valid():
+            body = (message or ": nothing new\n\n").encode()
+            part = {"type": "http.response.body", "body": body, "more_body": True}
+            await asyncio.wait_for(send(part), SLOWEST_S)
+            message = await self._listener.next(PING_S)
+        await asyncio.wait_for(send({"type": "http.response.body", "body": b"", "more_body": False}), SLOWEST_S)
+
+
+async def _disconnected(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def _has_csrf(request: HttpRequest, session: Session) -> bool:
+    return is_same(request.headers.get("x-csrf-token"), session.csrf)
+
+
+async def _body(request: HttpRequest) -> bytes:
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > LONGEST_BODY:
+            raise _TooLongError
+    return body
+
+
+def with_headers(application: ASGIApp, hosts: frozenset[str]) -> ASGIApp:
+    """Every answer has the headers of safety; a request under another name is refused (DNS rebinding)."""
+    extra = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+
+    async def safe(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            return
+
+        async def with_extra(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message.get("headers", []), *extra]}
+            await send(message)
+
+        named: Mapping[bytes, bytes] = dict(scope["headers"])
+        if named.get(b"host", b"").decode("latin-1").lower() not in hosts:
+            await PlainTextResponse("refused: unknown host", 421)(scope, receive, with_extra)
+            return
+        await application(scope, receive, with_extra)
+
+    return safe

@@ -1,0 +1,88 @@
+"""The model in use: extended and reverted between two cycles, by a request of a person."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+import numpy as np
+
+from adaptive_flot.contracts import Estimate, Prior
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.live.link.cycle import Cycle, CycleState
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.store.beside import ModelChange
+
+
+@dataclass(frozen=True)
+class _Before:
+    """A cycle that was left, and the parameters that its estimator had."""
+
+    cycle: Cycle
+    parameters: FloatArray
+
+
+class ModelUse:
+    """The cycle in use, and those before it.
+
+    A longer model is built in a thread of its own, while the cycles go on with the one in use.
+
+    Parameters
+    ----------
+    link
+        The link file and its scenario.
+
+    Attributes
+    ----------
+    cycle
+        The cycle in use.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self.cycle = Cycle(link)
+        self._before: list[_Before] = []
+        self._building: asyncio.Task[Cycle] | None = None
+
+    @property
+    def extended(self) -> bool:
+        """The model in use is longer than the scenario's."""
+        return bool(self._before)
+
+    def build(self, effects: tuple[Effect, ...]) -> None:
+        """Begin to build the cycle with further effects."""
+        link, all_effects = self.cycle.link, (*self.cycle.effects, *effects)
+        self._building = asyncio.create_task(asyncio.to_thread(Cycle, link, all_effects))
+
+    def built(self) -> str | None:
+        """Empty when the cycle is built, words where it failed, None while nothing is ready."""
+        if self._building is None or not self._building.done():
+            return None
+        error = self._building.exception()
+        if error is None:
+            return ""
+        self._building = None
+        return f"{type(error).__name__}: {error}"
+
+    def apply(self, state: CycleState, known: Estimate, person: str) -> tuple[CycleState, ModelChange]:
+        """Go on with the cycle that was built, from an estimate with its model."""
+        assert self._building is not None and state.sample is not None and state.estimation.estimate is not None
+        self._before.append(_Before(self.cycle, state.estimation.estimate.parameters))
+        self.cycle, self._building = self._building.result(), None
+        return self._go_on(state, known.state, known.parameters, known.covariance, person)
+
+    def revert(self, state: CycleState, person: str) -> tuple[CycleState, ModelChange]:
+        """Go back to the cycle before, with the parameters that it had."""
+        before = self._before.pop()
+        self.cycle = before.cycle
+        estimate = state.estimation.estimate
+        assert estimate is not None
+        own = estimate.state[: len(self.cycle.model.states)]
+        return self._go_on(state, own, before.parameters, estimate.covariance, person)
+
+    def _go_on(
+        self, state: CycleState, x: FloatArray, parameters: FloatArray, covariance: FloatArray, person: str
+    ) -> tuple[CycleState, ModelChange]:
+        assert state.sample is not None
+        prior = Prior(state.sample.time, x, parameters, covariance, np.array(state.estimation.noise_std))
+        return self.cycle.go_on(state, prior), ModelChange(self.cycle.effects, prior, person)
