@@ -22,7 +22,7 @@ SETTLED = """
 """Four frames on: what observers of sizes and of places on the screen have to do is done by then, however slow."""
 DRAW_ALL = f"""
     document.querySelectorAll('details').forEach((part) => part.open = true);
-    if (window.AdaptiveFlotChart) AdaptiveFlotChart.all();
+    if (typeof AdaptiveFlotChart !== 'undefined') AdaptiveFlotChart.all();
     {SETTLED}
 """
 

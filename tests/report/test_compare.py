@@ -8,13 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.charts.plotdata import Role
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.compare.page import compare_report
 from adaptive_flot.report.compare.tables import compare_tables, markdown, overview_table, quantile_table
-from adaptive_flot.report.kit.distributions import cumulative_figure
 from adaptive_flot.report.kit.parts import Table
-from adaptive_flot.report.kit.plotdata import Spread
 from adaptive_flot.runner.commands.comparison import Comparison, compare
 from benchmarks.readme_table import BEGIN, END, PAGE, put
 from tests.report.test_run_report import Links
@@ -120,7 +117,8 @@ def test_page_is_self_contained_and_complete(seeds: int) -> None:
     page = compare_report([comparison(seeds)], command="adaptive-flot compare r")
     links = Links()
     links.feed(page)
-    assert (links.fetched, links.charts, links.images) == ([], 0, 2)  # no time series beside these results
+    distribution = int(seeds >= 5)  # a chart, with a picture for readers without scripts
+    assert (links.fetched, links.charts, links.images) == ([], distribution, 2 + distribution)
     for text in ("mpc", "oracle", "Share of oracle", "adaptive-flot compare r"):
         assert text in page
     assert ("box from quartile" in page) == (seeds >= 5)
@@ -156,16 +154,3 @@ def test_many_seeds_show_their_distribution_and_few_only_median_and_range() -> N
     )
     assert rows["Recovery [–]", "pi", "fixed"][:2] == ("101", "0.8010")
     assert len(rows) == 4 * 3  # value, recovery and one fit
-
-
-def test_cumulative_figure_rises_by_one_run_at_each_value() -> None:
-    spread = Spread("fit", {"a": np.array([3.0, 1.0, np.nan, 2.0]), "b": np.array([np.nan])})
-    figure = cumulative_figure([spread], {"a": (Role.ESTIMATE, 0), "b": (Role.ESTIMATE, 1)})
-    (line,) = [x for x in figure.axes[0].lines if x.get_label() == "a"]
-    x, y = (np.asarray(v) for v in line.get_data())
-    assert [(float(b), round(float(a), 9)) for b, a in zip(x, y, strict=True)][1:] == [
-        (1.0, round(1 / 3, 9)),
-        (2.0, round(2 / 3, 9)),
-        (3.0, 1.0),
-    ]
-    assert "b" not in [x.get_label() for x in figure.axes[0].lines]

@@ -9,7 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adaptive_flot.report.compare.distribution import distribution_picture
+from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.sweep.page import sweep_report
+from adaptive_flot.runner.commands.comparison import compare
 from adaptive_flot.studies.study_file import Study, load_study
 
 SEEDS = 40
@@ -92,3 +95,16 @@ def test_few_seeds_make_no_distribution(tmp_path: Path, count: int) -> None:
     few = runs().query("seed <= @count").reset_index(drop=True)
     text = page(tmp_path, few)
     assert "Share of the runs" not in text and "fits best" in text
+
+
+def test_a_distribution_rises_by_one_run_at_each_value() -> None:
+    """At Hazen's positions; the lowest value of many does not stretch the axis, and no value is invented."""
+    (comparison,) = compare(runs().assign(result=""))
+    picture = distribution_picture([comparison], album := Album())
+    assert picture is not None and picture.chart is not None and album.pictures == [picture]
+    panel = picture.chart.panels[0]
+    assert (picture.chart.x_unit, [t.label for t in panel.traces]) == ("%", ["schedule, fixed", "schedule, rpem"])
+    own = panel.traces[1]
+    fits = np.sort(runs()["fit_n"].to_numpy()[SEEDS:])
+    assert set(own.time) <= set(fits)
+    assert np.allclose(own.values[own.time > 70], 100 * (np.arange(4, SEEDS) + 0.5) / SEEDS)

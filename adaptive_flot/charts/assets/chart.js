@@ -11,7 +11,7 @@ const AdaptiveFlotChart = (() => {
   "use strict";
   const { element, decode, number, moment, clock } = AdaptiveFlotText;
   const MOST_LIVE = 20000; // points of a line that grows
-  const AXIS = 58; // width of the vertical axis [px]
+  const AXIS = 68; // width of the vertical axis [px]
   const STEPS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400];
   const TIME_STEPS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, ...STEPS, ...[2, 5, 10, 20, 50, 100, 200].map((d) => d * 86400)];
   const charts = [];
@@ -150,7 +150,7 @@ const AdaptiveFlotChart = (() => {
     legend(bar) {
       const seen = new Map();
       for (const panel of this.panels) for (const entry of panel.entries) if (entry.label && !seen.has(entry.label)) seen.set(entry.label, entry);
-      if (seen.size > 1 || this.spec.panels.some((p) => p.kind === "strips" || (p.limits ?? []).length)) {
+      if (seen.size > 1 || this.spec.panels.some((p) => p.kind === "strips" || p.band || (p.limits ?? []).length)) {
         for (const entry of seen.values()) bar.append(this.name(entry));
       }
       const tools = element("div", "chart-tools");

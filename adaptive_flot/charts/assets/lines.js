@@ -3,6 +3,7 @@ AdaptiveFlotChart.kinds.lines = (chart, spec, last) => {
   "use strict";
   const { frame, tip, colour } = AdaptiveFlotChart.parts;
   const { decode, number } = AdaptiveFlotText;
+  const FINEST = 3e-4; // smallest range of an axis, as a share of its numbers
   const FAR = 2000; // rows from the pointer within which a value is looked for
   const axes = spec.x.map(decode);
   const tables = axes.map((x) => [x]);
@@ -32,7 +33,8 @@ AdaptiveFlotChart.kinds.lines = (chart, spec, last) => {
     const ends = [...(low === null ? [] : [low, high]), ...extra];
     if (!ends.length) return [0, 1];
     const [least, most] = [Math.min(...ends), Math.max(...ends)];
-    const room = 0.06 * (most - least) || Math.abs(most) * 0.05 || 1;
+    const finest = FINEST * Math.max(Math.abs(least), Math.abs(most)); // ticks of a smaller range would not fit beside it
+    const room = most === least ? Math.abs(most) * 0.05 || 1 : Math.max(0.06 * (most - least), (finest - (most - least)) / 2);
     return [least - room, most + room];
   };
   const under = (u) => {

@@ -8,5 +8,6 @@ findings.py      Sentences, each made from the numbers.
 tables.py        The same cells for terminal, page and Markdown.
 paired.py        Differences paired by seed, with intervals and wins.
 trajectories.py  Time series over each other.
+distribution.py  Distributions over the seeds.
 contenders.py    The colour of each contender.
 """

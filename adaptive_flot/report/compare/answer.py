@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.compare.contenders import colour_names
 from adaptive_flot.report.compare.findings import OFTEN, findings
 from adaptive_flot.report.kit.parts import Fact, Table
@@ -13,6 +14,19 @@ from adaptive_flot.report.kit.wording import joined, number, spaced
 from adaptive_flot.runner.commands.comparison import ORACLE, Comparison, Contender, SeedSpread
 
 VALUE = "value_cu_h"
+
+
+def is_earned(comparison: Comparison) -> bool:
+    """Whether the scenario has economics."""
+    return any(c.has(VALUE) for c in comparison.contenders)
+
+
+def outcome(comparison: Comparison, contender: Contender) -> FloatArray:
+    """What counts, a value a seed (S,): value [cu/h], or the mean of all fits [%]."""
+    if is_earned(comparison):
+        return contender.values(VALUE)
+    names = fit_names(comparison)
+    return np.mean([contender.values(n) for n in names], axis=0) if names else np.full(len(contender.seeds), np.nan)
 
 
 def best(comparison: Comparison) -> Contender | None:

@@ -8,8 +8,9 @@ from pathlib import Path
 from adaptive_flot.files import write_text
 from adaptive_flot.report.compare import answer
 from adaptive_flot.report.compare.contenders import roles
+from adaptive_flot.report.compare.distribution import distribution_picture
 from adaptive_flot.report.compare.paired import paired_table
-from adaptive_flot.report.compare.tables import MANY_SEEDS, compare_tables, made_table, overview_table, spread_text
+from adaptive_flot.report.compare.tables import compare_tables, made_table, overview_table, spread_text
 from adaptive_flot.report.compare.trajectories import trajectories_picture
 from adaptive_flot.report.kit import distributions
 from adaptive_flot.report.kit.album import Album
@@ -59,7 +60,7 @@ def compare_report(comparisons: Sequence[Comparison], command: str = "") -> str:
 
 
 def _earned(comparisons: Sequence[Comparison]) -> bool:
-    return any(x.has(answer.VALUE) for c in comparisons for x in c.contenders)
+    return any(map(answer.is_earned, comparisons))
 
 
 def _said(comparison: Comparison, several: bool) -> list[str]:
@@ -73,8 +74,11 @@ def _first(comparisons: Sequence[Comparison], album: Album) -> list[Part]:
     return present(answer.matrix(comparisons[0]), trajectories_picture(comparisons[0], album))
 
 
-def sections(comparison: Comparison, i: int, several: bool, album: Album) -> list[Section]:
-    """Chapters of a scenario: several where it is the only one of a page, else one, the i-th."""
+def sections(comparison: Comparison, i: int, several: bool, album: Album, distribution: bool = True) -> list[Section]:
+    """Chapters of a scenario: several where it is the only one of a page, else one, the i-th.
+
+    `distribution` is False where the page shows the distributions of a single scenario above.
+    """
     if several:
         parts = present(
             answer.matrix(comparison), trajectories_picture(comparison, album), *comparison_parts(comparison, album)
@@ -84,7 +88,7 @@ def sections(comparison: Comparison, i: int, several: bool, album: Album) -> lis
     paired = paired_table(comparison)
     return [
         *([Section("paired", "Paired differences", "with interval, and wins per seed", [paired])] if paired else []),
-        Section("spread", "Distribution over the seeds", "", _pictures(comparison, album)),
+        Section("spread", "Distribution over the seeds", "", _pictures(comparison, album, distribution)),
         Section("tables", "All tables", "outcome, terms, statuses, times, fits", compare_tables(comparison)),
         Section("runs", "Who ran", "options, version and commit", [made_table(comparison)]),
     ]
@@ -106,10 +110,13 @@ def _summaries(comparisons: Sequence[Comparison]) -> list[Path]:
     return [p / SUMMARY if p.is_dir() else p for p in map(Path, _results(comparisons))]
 
 
-def _pictures(comparison: Comparison, album: Album) -> list[Picture]:
-    if not any(c.has("value_cu_h") for c in comparison.contenders):
-        return _fit_pictures(comparison, album)
-    return [_plane(comparison, album), _spread(comparison, album)]
+def _pictures(comparison: Comparison, album: Album, distribution: bool = True) -> list[Picture]:
+    if not answer.is_earned(comparison):
+        still = _fit_pictures(comparison, album)
+    else:
+        still = [_plane(comparison, album), _spread(comparison, album)]
+    moving = distribution_picture([comparison], album) if distribution else None
+    return [*still, *([] if moving is None else [moving])]
 
 
 def _plane(comparison: Comparison, album: Album) -> Picture:
@@ -144,12 +151,7 @@ def _fit_pictures(comparison: Comparison, album: Album) -> list[Picture]:
         for name in names
     ]
     figure = distributions.spread_figure(spreads, roles(comparison))
-    pictures = [album.add(figure, _spread_caption(comparison), "Fits by contender")]
-    if max(len(c.seeds) for c in comparison.contenders) >= MANY_SEEDS:
-        caption = f"{comparison.scenario}: share of the runs whose fit is at most that; further right is better."
-        figure = distributions.cumulative_figure(spreads, roles(comparison))
-        pictures.append(album.add(figure, caption, "Cumulative distribution of the fits"))
-    return pictures
+    return [album.add(figure, _spread_caption(comparison), "Fits by contender")]
 
 
 def _spread_caption(comparison: Comparison) -> str:

@@ -40,7 +40,7 @@ def heat_map(scores: Sequence[Score], chosen: Sequence[tuple[str, str]] = ()) ->
         A logarithmic map; a dot marks what the model's catalogue knows by name.
     """
     sites = list(dict.fromkeys(s.candidate.site.name for s in sorted(scores, key=lambda s: -s.gain)))
-    drivers = _driver_order(scores)
+    drivers = driver_order(scores)
     table = np.full((len(sites), len(drivers)), np.nan)
     best = max((s.gain for s in scores), default=1.0)
     for s in scores:
@@ -68,7 +68,8 @@ def heat_map(scores: Sequence[Score], chosen: Sequence[tuple[str, str]] = ()) ->
     return figure
 
 
-def _driver_order(scores: Sequence[Score]) -> list[str]:
+def driver_order(scores: Sequence[Score]) -> list[str]:
+    """Drivers from left to right: constant and time first, what only delays last."""
     names = list(dict.fromkeys(s.candidate.driver for s in scores))
     last = ("lag", "delay")
     first = [d for d in ("constant", "time") if d in names]

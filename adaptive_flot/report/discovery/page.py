@@ -15,7 +15,8 @@ from adaptive_flot.discovery.verdict.report_veto import AT_NOISE
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
 from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
-from adaptive_flot.report.discovery.figures import curve_figure, heat_map, residual_panels, run_panels
+from adaptive_flot.report.discovery.charts import curve_chart, score_map
+from adaptive_flot.report.discovery.figures import residual_panels, run_panels
 from adaptive_flot.report.discovery.test_design import experiment_chapter
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
@@ -125,7 +126,7 @@ def _evidence(
         )
     first = present(
         _measured_against_model(discovery, problem, before, after, album),
-        _curve_picture(discovery, problem, after, album),
+        *_curve_pictures(discovery, problem, after, album),
         tables.coefficient_table(discovery) if verdict.effects else None,
     )
     return first, sections
@@ -172,22 +173,27 @@ def _data(discovery: Discovery) -> list[str]:
     return said or ["Every measured output and every input can be used."]
 
 
-def _curve_picture(discovery: Discovery, problem: Problem, after: Fit, album: Album) -> Picture | None:
+def _curve_pictures(discovery: Discovery, problem: Problem, after: Fit, album: Album) -> list[Picture]:
     best = discovery.judgement.best if discovery.judgement else None
     curves = effect_curves(problem, after, len(best.names)) if best else ()
     if not curves:
-        return None
+        return []
     told = "the effect" if discovery.verdict.effects else "the best alternative, which the verdict does not tell"
+    names = capital(tables.effect_text([(c.effect.site, c.effect.driver) for c in curves]))
     caption = (
-        f"{tables.effect_text([(c.effect.site, c.effect.driver) for c in curves])}: {told}, over what the record "
-        "covers, with the 95 % band from the covariance of the fit. Below: how often the record was there."
+        f"{names}: {told}, over what the record covers, with the 95 % band from the covariance of the fit. Below: how "
+        "often the record was there."
     )
     if any(c.anchor is not None for c in curves):
         caption += (
             " Shown relative to the middle of the record, which is all it tells: a constant change at this site is "
             "one of the adapted parameters."
         )
-    return album.add(curve_figure(curves), caption, "Curve of the effect over its driver")
+    rest = "The same, over the other driver."
+    return [
+        album.chart(curve_chart(c), rest if k else caption, f"Curve of the effect over {spaced(c.effect.driver)}")
+        for k, c in enumerate(curves)
+    ]
 
 
 def _before_after(problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
@@ -239,13 +245,10 @@ def _map(discovery: Discovery, album: Album) -> Picture:
     names = best.names if best else ()
     caption = (
         "What each site (row) with each driver (column) would explain of the residual of the model as it is, to first "
-        "order, after everything that the adapted parameters and the initial state can absorb; as a share of the best. "
-        "White: the record tells nothing about it. Dot: known by name."
+        "order, after everything that the adapted parameters and the initial state can absorb; in percent of the best. "
+        "Empty: the record tells nothing about it. Dot: known by name."
         + (" Frame: the best alternative after full fits." if names else "")
     )
-    return album.add(
-        heat_map(discovery.search.rounds[0].scores, names),
-        caption,
-        "Map of what would explain the residual",
-        is_map=True,
+    return album.heat(
+        score_map(discovery.search.rounds[0].scores, names), caption, "Map of what would explain the residual"
     )

@@ -9,6 +9,7 @@ wording.py        Numbers and lists as text.
 style.py          The look of figures that do not move; figures as data URIs.
 figures.py        A chart as a figure that does not move.
 strips.py         Which of a few states held when, for such a figure.
+heat.py           A map of numbers, coloured, to point at.
 residuals.py      Charts of residuals.
 plotdata.py       What figures of many values are made of: frozen data.
 distributions.py  Values over the seeds.

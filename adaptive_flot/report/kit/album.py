@@ -12,6 +12,8 @@ from adaptive_flot.report.kit.parts import Picture
 if TYPE_CHECKING:  # what prints tables has no need of Matplotlib, which takes a while to load
     from matplotlib.figure import Figure
 
+    from adaptive_flot.report.kit.heat import HeatMap
+
 
 @dataclass
 class Album:
@@ -20,11 +22,15 @@ class Album:
     pictures: list[Picture] = field(default_factory=list)
     shown: list[Picture] = field(default_factory=list)
 
-    def add(self, figure: Figure, caption: str, alt: str, is_map: bool = False) -> Picture:
+    def add(self, figure: Figure, caption: str, alt: str) -> Picture:
         """Embed a figure."""
         from adaptive_flot.report.kit.style import data_uri
 
-        return self._kept(Picture(data_uri(figure), caption, alt, is_map=is_map))
+        return self._kept(Picture(data_uri(figure), caption, alt))
+
+    def heat(self, heat: HeatMap, caption: str, alt: str) -> Picture:
+        """Embed a map."""
+        return self._kept(Picture("", caption, alt, heat=heat))
 
     def chart(self, chart: Chart, caption: str, alt: str) -> Picture:
         """Embed a chart, and a picture of it for readers without scripts."""

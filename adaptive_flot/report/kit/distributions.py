@@ -58,39 +58,6 @@ def spread_figure(spreads: Sequence[Spread], roles: Mapping[str, tuple[Role, int
 
 
 @style.styled
-def cumulative_figure(spreads: Sequence[Spread], roles: Mapping[str, tuple[Role, int]]) -> Figure:
-    """Empirical cumulative distribution over the seeds, a panel a quantity and a line for each who has it.
-
-    Parameters
-    ----------
-    spreads
-        Values of each quantity.
-    roles
-        Role and colour index of each line.
-
-    Returns
-    -------
-    Figure
-        Steps from 0 to 1, thin lines at 5, 50 and 95 %.
-    """
-    figure = Figure(figsize=(style.WIDTH, 3.0))
-    axes: list[Axes] = list(figure.subplots(1, len(spreads), sharey=True, squeeze=False)[0])
-    for ax, spread in zip(axes, spreads, strict=True):
-        for name, role in roles.items():
-            values = spread.values.get(name, np.empty(0))
-            if np.isfinite(values).any():
-                ax.ecdf(values[np.isfinite(values)], color=look(*role)["color"], lw=1.6, label=name)
-        for share in (0.05, 0.5, 0.95):
-            ax.axhline(share, color="#c8c8c8", lw=0.8, zorder=0)
-        ax.set_xlabel(spread.label)
-        ax.xaxis.set_major_locator(MaxNLocator(4))
-    axes[0].set_ylabel("share of the runs [–]")
-    axes[0].set_yticks([0.05, 0.25, 0.5, 0.75, 0.95])
-    legend_above(figure, axes)
-    return figure
-
-
-@style.styled
 def plane_figure(
     points: Mapping[str, tuple[FloatArray, FloatArray]], roles: Mapping[str, tuple[Role, int]], limit: float
 ) -> Figure:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 
 from adaptive_flot.charts.plotdata import Chart
 from adaptive_flot.greybox.model import FloatArray
+
+if TYPE_CHECKING:  # what prints tables has no need of Matplotlib
+    from adaptive_flot.report.kit.heat import HeatMap
 
 
 @dataclass(frozen=True)
@@ -51,10 +54,9 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure of the page: data URI, caption, what it shows for readers who do not see it, and the chart if it is one.
+    """A figure of the page: data URI, caption, what it shows for readers who do not see it, and chart or map if any.
 
-    The data URI of a chart is for readers without scripts. The colours of a map mean something: on dark paper it stays
-    as it is, where other figures are inverted.
+    The data URI of a chart is for readers without scripts; a map has none.
     """
 
     kind: ClassVar[str] = "picture"
@@ -62,7 +64,7 @@ class Picture:
     caption: str
     alt: str
     chart: Chart | None = None
-    is_map: bool = False
+    heat: HeatMap | None = None
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,5 @@ Map
 ---
 page.py     The page: answer, matrix, distributions, and the tables of `compare` for each scenario.
 answer.py   The answer in words and numbers.
-figures.py  Distributions over the seeds, to point at.
 seeds.py    Seeds worth a look: those that failed, and those that did worst.
 """

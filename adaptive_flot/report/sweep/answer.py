@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.compare import answer as compared
+from adaptive_flot.report.compare.answer import is_earned, outcome
 from adaptive_flot.report.kit.parts import Fact, Table
 from adaptive_flot.report.kit.wording import number, spaced
 from adaptive_flot.report.sweep.seeds import Failed
@@ -15,19 +16,6 @@ from adaptive_flot.runner.commands.comparison import ORACLE, Comparison, Contend
 
 FEWEST_FOR_SHARES = 10
 """Seeds from which nine in ten mean something."""
-
-
-def is_earned(comparison: Comparison) -> bool:
-    """Whether the scenario has economics."""
-    return any(c.has(compared.VALUE) for c in comparison.contenders)
-
-
-def outcome(comparison: Comparison, contender: Contender) -> FloatArray:
-    """What counts, a value a seed (S,): value [cu/h], or the mean of all fits [%]."""
-    if is_earned(comparison):
-        return contender.values(compared.VALUE)
-    names = compared.fit_names(comparison)
-    return np.mean([contender.values(n) for n in names], axis=0) if names else np.full(len(contender.seeds), np.nan)
 
 
 def title(comparisons: Sequence[Comparison]) -> str:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from adaptive_flot.files import write_text
 from adaptive_flot.report.compare import answer as compared
+from adaptive_flot.report.compare.distribution import distribution_picture
 from adaptive_flot.report.compare.page import sections as compared_sections
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Part, Section, present
 from adaptive_flot.report.kit.wording import seed_list
 from adaptive_flot.report.sweep import answer
-from adaptive_flot.report.sweep.figures import distribution_picture
 from adaptive_flot.report.sweep.seeds import Failed, worst_table
 from adaptive_flot.runner.commands.comparison import Comparison, compare, seeds_of
 from adaptive_flot.runner.commands.runs_table import read_runs
@@ -73,7 +73,9 @@ def _first(comparisons: Sequence[Comparison], album: Album) -> list[Part]:
 
 def _sections(comparisons: Sequence[Comparison], failed: Failed, album: Album) -> list[Section]:
     several = len(comparisons) > 1
-    found = [s for i, c in enumerate(comparisons, 1) for s in compared_sections(c, i, several, album)]
+    found = [
+        s for i, c in enumerate(comparisons, 1) for s in compared_sections(c, i, several, album, distribution=several)
+    ]
     worst = [table for c in comparisons if (table := worst_table(c)) is not None]
     if worst:
         found.append(Section("worst", "Worst seeds", "where to look first", worst))

@@ -107,6 +107,24 @@
     }
   }
 
+  /* The cell of a map under the pointer: its words below the map, its row and column marked. */
+  function startMaps() {
+    for (const table of document.querySelectorAll("table.heat")) {
+      const told = table.closest("figure").querySelector(".told");
+      told.hidden = false;
+      const mark = (cell) => {
+        table.querySelectorAll(".at").forEach((one) => one.classList.remove("at"));
+        if (!cell?.title && !cell?.dataset.words) return;
+        if (cell.title) [cell.dataset.words, cell.title] = [cell.title, ""]; // told here, and not by the browser too
+        told.textContent = cell.dataset.words;
+        [cell, cell.parentElement.cells[0], table.tHead.rows[0].cells[cell.cellIndex]].forEach((one) => one.classList.add("at"));
+      };
+      table.addEventListener("pointerover", (event) => mark(event.target.closest("td")));
+      table.addEventListener("pointerdown", (event) => mark(event.target.closest("td")));
+      table.addEventListener("pointerleave", () => mark(null));
+    }
+  }
+
   /* Paper is white, shows all chapters, and is as wide as paper. */
   function startPrint() {
     let closed = [];
@@ -133,6 +151,7 @@
   startThemes();
   startContents();
   startTables();
+  startMaps();
   startPrint();
   AdaptiveFlotChart.start();
 })();

@@ -1,4 +1,4 @@
-"""Distributions over the seeds of a study, as charts to point at."""
+"""Distributions over the seeds, as charts to point at."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ import numpy as np
 
 from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.report.compare import answer as compared
+from adaptive_flot.report.compare.answer import fit_names, is_earned, outcome
 from adaptive_flot.report.compare.contenders import roles
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Picture
 from adaptive_flot.report.kit.wording import spaced
-from adaptive_flot.report.sweep.answer import is_earned, outcome
 from adaptive_flot.runner.commands.comparison import Comparison
 
 FEWEST_SEEDS = 5
@@ -37,7 +36,7 @@ def distribution_picture(comparisons: Sequence[Comparison], album: Album) -> Pic
     if one and not earned:
         sets = [
             (f"runs below, {spaced(n.removeprefix('fit_'))}", _values(comparisons[0], n))
-            for n in compared.fit_names(comparisons[0])
+            for n in fit_names(comparisons[0])
         ]
         looks = [roles(comparisons[0])] * len(sets)
     else:
