@@ -117,7 +117,7 @@ class Strip:
         states = np.asarray(self.states)
         first = np.flatnonzero(np.r_[True, states[1:] != states[:-1]])
         dt = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 1.0
-        starts = self.time[first] - dt
+        starts = np.r_[self.time[0] - dt, self.time[:-1]][first]
         return list(
             zip(states[first].tolist(), starts.tolist(), [*starts[1:].tolist(), float(self.time[-1])], strict=True)
         )

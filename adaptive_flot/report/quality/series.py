@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from adaptive_flot.charts.plotdata import Panel, Role, Strip, Trace
@@ -9,6 +11,8 @@ from adaptive_flot.greybox.quantities import FloatArray
 from adaptive_flot.records.grid import MEASURED, STATUSES, Codes
 from adaptive_flot.records.importing import Imported
 
+GAP = "no rows"
+"""What a strip says between two stretches."""
 MOST_SPELLS = 600
 """Parts of a strip, beyond which the most frequent status of each part is drawn."""
 
@@ -30,12 +34,18 @@ def strips(imported: Imported) -> list[Strip]:
     """A strip a quantity: how each row came about."""
     rows = imported.rows
     time = (rows.time - rows.time[0]) / 1e9
-    groups = max(1, -(-len(time) // MOST_SPELLS))
+    size = max(1, -(-len(time) // MOST_SPELLS))
+    edges = [0, *(np.flatnonzero(np.diff(rows.stretch)) + 1).tolist(), len(time)]
     found = []
     for c in imported.cleaned:
-        status = _most_frequent(rows.statuses[c.quantity.name], groups)
-        words = [STATUSES[k] for k in status]
-        found.append(Strip(c.quantity.name.replace("_", " "), time[::groups], words, STATUSES[MEASURED]))
+        status, ends, words = rows.statuses[c.quantity.name], [np.empty(0)], []
+        for a, b in pairwise(edges):
+            if a:
+                ends.append(time[a : a + 1] - rows.step / 1e9)
+                words.append(GAP)
+            ends.append(time[np.minimum(np.arange(a, b, size) + size, b) - 1])
+            words += [STATUSES[k] for k in _most_frequent(status[a:b], size)]
+        found.append(Strip(c.quantity.name.replace("_", " "), np.concatenate(ends), words, STATUSES[MEASURED]))
     return found
 
 
