@@ -23,6 +23,8 @@ class Schedule:
         Model, sampling interval and the table of planned inputs.
     """
 
+    open_loop = True
+
     def __init__(self, setup: ControllerSetup) -> None:
         self.setup = setup
 

@@ -118,7 +118,11 @@ class ControllerSetup:
 
 
 class Controller(Protocol[State]):
-    """Chooses the inputs of the next interval. Made by `Name(setup, **options)`."""
+    """Chooses the inputs of the next interval. Made by `Name(setup, **options)`.
+
+    One that uses neither sample nor estimate may say `open_loop = True`: runs of many seeds may then go side by side,
+    and both are None at every decision.
+    """
 
     def init(self, time: float) -> State:
         """State before the first decision, at a time [s]."""

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -16,6 +17,7 @@ import pandas as pd
 from distributed import Client, Future, KilledWorker, as_completed
 
 from adaptive_flot.errors import AdaptiveFlotError, StudyError, located
+from adaptive_flot.runner.commands.side_by_side import can_go_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.studies import worker
@@ -29,6 +31,8 @@ LOST = (asyncio.CancelledError, concurrent.futures.CancelledError, OSError, Time
 """What a lost scheduler looks like from here."""
 AHEAD = 4
 """Runs handed to the cluster for each of its threads, so that none waits for the next one."""
+MOST_TOGETHER = 16
+"""Most seeds that go side by side: two blocks of eight lanes, and what an interruption loses."""
 
 Rows = Sequence[Mapping[str, Any]]
 AnyFuture = Future[Any]
@@ -99,7 +103,7 @@ def sweep(
         groups = list(_missing(study, grid, set(before["run"])))
         advance = progress(len(grid.runs()), _rows(before))
         if groups:
-            _check_plugins(groups, study)
+            groups = _check_plugins(groups, study)
             with _said_in_words(scheduler), connected(workers, scheduler) as client:
                 remember(path, grid)  # not before there is somewhere to run
                 for results in _results(client, groups):
@@ -135,8 +139,12 @@ def _order(arm: Arm) -> worker.Order:
     return worker.Order(arm.scenario.path, content, dict(arm.estimators), dict(arm.controllers), shared, compiled)
 
 
-def _check_plugins(groups: Sequence[_Group], study: Study) -> None:
-    """Build each plug-in that will run once here: a wrong option is said now, and not by every run."""
+def _check_plugins(groups: Sequence[_Group], study: Study) -> list[_Group]:
+    """Build each plug-in that will run once here: a wrong option is said now, and not by every run.
+
+    Returns the groups, whose orders now say which combinations may go side by side.
+    """
+    together: dict[Path, frozenset[tuple[str, str]]] = {}
     used = {(g.order.path, g.controller, c.estimator) for g in groups for c in g.cases}
     for arm in study.arms:
         prepared = Prepared(arm.scenario, arm.estimators, arm.controllers)
@@ -147,24 +155,45 @@ def _check_plugins(groups: Sequence[_Group], study: Study) -> None:
                 prepared.controller(controller, first, arm.scenario.setup)
             for estimator in sorted({e for _, e in mine}):
                 prepared.estimator(estimator, first)
+            together[arm.scenario.path] = frozenset(c for c in mine if can_go_side_by_side(prepared, c[1], c[0], first))
+    return [replace(g, order=replace(g.order, together=together[g.order.path])) for g in groups]
+
+
+def _bundles(groups: Sequence[_Group], threads: int) -> Iterator[Sequence[_Group]]:
+    """Groups that are handed over at once: one alone, or several seeds that go side by side."""
+    beside: dict[tuple[Path, str, tuple[str, ...]], list[_Group]] = {}
+    for group in groups:
+        pairs = [(case, (group.controller, case.estimator) in group.order.together) for case in group.cases]
+        alone, together = (tuple(case for case, side in pairs if side is wanted) for wanted in (False, True))
+        if alone:
+            yield [replace(group, cases=alone)]
+        if together:
+            key = group.order.path, group.controller, tuple(case.estimator for case in together)
+            beside.setdefault(key, []).append(replace(group, cases=together))
+    for same in beside.values():
+        size = max(1, min(MOST_TOGETHER, -(-len(same) // threads)))
+        yield from (same[i : i + size] for i in range(0, len(same), size))
 
 
 def _results(client: Client, groups: Sequence[_Group]) -> Iterator[list[worker.Result]]:
     """Results as they come in; at any time only a few runs for each thread are with the cluster."""
-    token, waiting = uuid4().hex[:8], deque(groups)
-    heads: dict[str, dict[str, Any]] = {}
+    threads = max(1, sum(client.ncores().values()))
+    token, waiting = uuid4().hex[:8], deque(_bundles(groups, threads))
+    heads: dict[str, list[dict[str, Any]]] = {}
     finished = as_completed([], with_results=True, raise_errors=False)
 
     def top_up() -> None:
         threads = max(1, sum(client.ncores().values()))
         while waiting and finished.count() < AHEAD * threads:
-            for future, head in _submit(client, waiting.popleft(), token):
+            bundle = waiting.popleft()
+            beside = (bundle[0].controller, bundle[0].cases[0].estimator) in bundle[0].order.together
+            for future, head in _submit_many(client, bundle, token) if beside else _submit(client, bundle[0], token):
                 heads[str(future.key)] = head
                 finished.add(future)
 
     top_up()
     for batch in finished.batches():
-        results = [_result(what, heads.pop(str(future.key))) for future, what in batch]
+        results = [result for future, what in batch for result in _result(what, heads.pop(str(future.key)))]
         good = [r for r in results if isinstance(r, worker.Result)]
         if good:
             yield good
@@ -173,7 +202,25 @@ def _results(client: Client, groups: Sequence[_Group]) -> Iterator[list[worker.R
         top_up()
 
 
-def _submit(client: Client, group: _Group, token: str) -> Iterator[tuple[AnyFuture, dict[str, Any]]]:
+def _submit_many(
+    client: Client, bundle: Sequence[_Group], token: str
+) -> Iterator[tuple[AnyFuture, list[dict[str, Any]]]]:
+    order, controller, estimators = bundle[0].order, bundle[0].controller, [c.estimator for c in bundle[0].cases]
+    names = [{"run": case.run(g.seed), "scenario": case.scenario} for g in bundle for case in g.cases]
+    seeds = [g.seed for g in bundle]
+    key = f"runs-{names[0]['run']}-{token}"
+    future = client.submit(worker.run_many, order, names, controller, estimators, seeds, key=key, pure=False)
+    what = product(seeds, estimators)
+    yield (
+        future,
+        [
+            {**name, "controller": controller, "estimator": estimator, "seed": seed}
+            for name, (seed, estimator) in zip(names, what, strict=True)
+        ],
+    )
+
+
+def _submit(client: Client, group: _Group, token: str) -> Iterator[tuple[AnyFuture, list[dict[str, Any]]]]:
     order, controller, seed = group.order, group.controller, group.seed
     start = None
     sharing = [case for case in group.cases if case.estimator in order.shared]
@@ -185,23 +232,27 @@ def _submit(client: Client, group: _Group, token: str) -> Iterator[tuple[AnyFutu
         key = f"run-{names['run']}-{token}"
         fit = start if case in sharing else None
         future = client.submit(worker.run, order, names, controller, case.estimator, seed, fit, key=key, pure=False)
-        yield future, {**names, "controller": controller, "estimator": case.estimator, "seed": seed}
+        yield future, [{**names, "controller": controller, "estimator": case.estimator, "seed": seed}]
 
 
-def _result(returned: Any, head: dict[str, Any]) -> worker.Result | BaseException:
-    """Result of a run, or the error that ends the study."""
+def _result(returned: Any, heads: list[dict[str, Any]]) -> list[worker.Result | BaseException]:
+    """Results of runs that were handed over at once, or the error that ends the study."""
     if isinstance(returned, worker.Result):
-        return returned
+        return [returned]
+    if isinstance(returned, list):
+        return list(returned)
     error: BaseException = returned[1] if isinstance(returned, tuple) else returned
     if isinstance(error, KilledWorker):
         message = f"the worker process died {error.allowed_failures + 1} times with this run (too little memory?)"
-        return worker.Result({**head, "outcome": "failed", "message": message}, {"run": head["run"]})
+        return [worker.Result({**h, "outcome": "failed", "message": message}, {"run": h["run"]}) for h in heads]
     if isinstance(error, (AdaptiveFlotError, *LOST)):
-        return error
-    return StudyError(
-        f"run {head['run']}: a worker can not work ({type(error).__name__}: {error}); "
-        "install the same version of adaptive-flot and its plug-ins for all workers"
-    )
+        return [error]
+    return [
+        StudyError(
+            f"run {heads[0]['run']}: a worker can not work ({type(error).__name__}: {error}); "
+            "install the same version of adaptive-flot and its plug-ins for all workers"
+        )
+    ]
 
 
 @contextmanager

@@ -7,8 +7,9 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from adaptive_flot.errors import PluginError, StudyError
 from adaptive_flot.plugins import plugin_failure
 from adaptive_flot.runner.commands.run import initial_fit, run_one
 from adaptive_flot.runner.commands.run_files import plain, run_summary
+from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.commands.runs_table import run_rows
+from adaptive_flot.runner.commands.side_by_side import run_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario
@@ -46,6 +49,8 @@ class Order:
         Estimators whose runs of a seed share the initial fit.
     compiled
         Whether the step and the estimators run as machine code.
+    together
+        Controllers and estimators whose runs of many seeds go side by side.
     """
 
     path: Path
@@ -54,6 +59,7 @@ class Order:
     controllers: Mapping[str, Plugin]
     shared: frozenset[str]
     compiled: bool = False
+    together: frozenset[tuple[str, str]] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -123,14 +129,68 @@ def run(
             prepared = _prepare(order)
             realisation = Realisation(prepared.scenario, seed)
             finished = run_one(prepared, estimator, controller, realisation, {} if start is None else {"fit": start})
-            row = run_rows(plain(run_summary(prepared.scenario, [finished])))[0]
-            del row["code"]  # a study that goes on after a commit gives the same table to the byte
+            row = _outcome(prepared, finished)
     except (PluginError, StudyError):
         raise
     except (Exception, SystemExit) as error:
         return Result({**head, "outcome": "failed", "message": _message(error)}, _timing(head, begin))
     times = {key: row.pop(key) for key in TIMES if key in row}
-    return Result({**row, **head, "outcome": "ok", "message": ""}, {**times, **_timing(head, begin)})
+    return Result({**row, **head}, {**times, **_timing(head, begin)})
+
+
+def run_many(
+    order: Order, names: Sequence[Mapping[str, str]], controller: str, estimators: Sequence[str], seeds: Sequence[int]
+) -> list[Result]:
+    """Run combinations of a controller and several estimators with many seeds, side by side; see `run`.
+
+    Parameters
+    ----------
+    order
+        The scenario.
+    names
+        Columns that name each run: seed by seed, all estimators of one behind one another.
+    controller, estimators, seeds
+        The combinations, each with every seed.
+
+    Raises
+    ------
+    StudyError, PluginError
+        As of `run`.
+    """
+    begin = time.perf_counter(), time.process_time()
+    heads = [
+        {**name, "controller": controller, "estimator": estimator, "seed": seed}
+        for name, (seed, estimator) in zip(names, product(seeds, estimators), strict=True)
+    ]
+    try:
+        with _turn:
+            begin = time.perf_counter(), time.process_time()
+            prepared = _prepare(order)
+            realisations = [Realisation(prepared.scenario, seed) for seed in seeds]
+            fits: list[dict[str, BatchFit]] = [{} for _ in seeds]  # all estimators of a seed share one
+            found = [run_side_by_side(prepared, e, controller, realisations, fits) for e in estimators]
+            rows = [_outcome(prepared, one[i]) for i in range(len(seeds)) for one in found]
+    except (PluginError, StudyError):
+        raise
+    except (Exception, SystemExit) as error:
+        rows = [{"outcome": "failed", "message": _message(error)}] * len(heads)
+    results = []
+    for head, row in zip(heads, rows, strict=True):
+        times = {key: row[key] for key in TIMES if key in row}
+        kept = {key: value for key, value in row.items() if key not in times}
+        results.append(Result({**kept, **head}, {**times, **_timing(head, begin, len(heads))}))
+    return results
+
+
+def _outcome(prepared: Prepared, found: Run | Exception) -> dict[str, Any]:
+    """Row of a run, or of what went wrong with it."""
+    if isinstance(found, (PluginError, StudyError)):
+        raise found
+    if isinstance(found, Exception):
+        return {"outcome": "failed", "message": _message(found)}
+    row = run_rows(plain(run_summary(prepared.scenario, [found])))[0]
+    del row["code"]  # a study that goes on after a commit gives the same table to the byte
+    return {**row, "outcome": "ok", "message": ""}
 
 
 def _prepare(order: Order) -> Prepared:
@@ -152,9 +212,10 @@ def _prepare(order: Order) -> Prepared:
     return known[key]
 
 
-def _timing(head: Mapping[str, Any], begin: tuple[float, float]) -> dict[str, Any]:
-    """Wall-clock and processor time since `begin`, and where."""
+def _timing(head: Mapping[str, Any], begin: tuple[float, float], runs: int = 1) -> dict[str, Any]:
+    """Wall-clock and processor time since `begin`, for each of so many runs, and where."""
     spent = {"seconds": time.perf_counter() - begin[0], "cpu_seconds": time.process_time() - begin[1]}
+    spent = {key: value / runs for key, value in spent.items()}
     where = f"{socket.gethostname()}:{os.getpid()}"
     return {"run": head["run"], "worker": where, **{key: round(value, 4) for key, value in spent.items()}}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,10 +12,12 @@ from pandas.testing import assert_frame_equal
 
 from adaptive_flot.errors import AdaptiveFlotError, ModelError, PluginError, StudyError
 from adaptive_flot.greybox.stepping import compiled as machine_code
+from adaptive_flot.runner.commands import side_by_side
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.commands.runs_table import read_runs, run_rows
 from adaptive_flot.runner.scenario.loading import load_scenario
+from adaptive_flot.studies import sweep as sweep_module
 from adaptive_flot.studies import worker
 from adaptive_flot.studies.folder import locked
 from adaptive_flot.studies.study_file import load_study
@@ -169,6 +172,50 @@ def test_compiled_runs_have_the_fits_of_plain_ones_and_do_not_mix_with_them(
     assert not set(quick["run"]) & set(plain["run"])
     with pytest.raises(StudyError, match="holds results with compiled = True, now it is False"):
         sweep(study, tmp_path / "quick")
+
+
+@pytest.mark.slow
+def test_results_do_not_depend_on_which_runs_went_side_by_side(
+    write_study: WriteStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Groups of any size, and a study that goes on after it was interrupted, give the same file to the byte."""
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "cache")
+    problem = machine_code.compiler_problem()
+    if problem is not None:
+        pytest.skip(problem)
+    files = []
+    for most in (1, 2, 16):
+        monkeypatch.setattr(sweep_module, "MOST_TOGETHER", most)
+        folder = tmp_path / f"groups-of-{most}"
+        if most == 16:
+            sweep(load_study(write_study({"seeds.count": 1})), folder, compiled=True)
+        done = sweep(load_study(write_study()), folder, compiled=True)
+        assert (done.table["outcome"] == "ok").all() and done.from_before == (2 if most == 16 else 0)
+        files.append((folder / "runs.parquet").read_bytes())
+    assert files[0] == files[1] == files[2]
+
+
+@pytest.mark.slow
+def test_a_seed_that_fails_beside_others_becomes_a_row(
+    write_study: WriteStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "cache")
+    problem = machine_code.compiler_problem()
+    if problem is not None:
+        pytest.skip(problem)
+    usual = side_by_side.run_side_by_side
+
+    def second_fails(*arguments: Any) -> list[Any]:
+        found = usual(*arguments)
+        return [
+            ValueError("not\ntoday") if realisation.seed == 2 else one
+            for one, realisation in zip(found, arguments[3], strict=True)
+        ]
+
+    monkeypatch.setattr(worker, "run_side_by_side", second_fails)
+    table = sweep(load_study(write_study({"estimators": ["rpem"]})), tmp_path / "out", compiled=True).table
+    assert table["outcome"].tolist() == ["ok", "failed", "ok"]
+    assert table["message"].tolist() == ["", "ValueError: not today", ""]
 
 
 def test_two_sweeps_do_not_write_to_one_folder(write_study: WriteStudy) -> None:

@@ -12,9 +12,10 @@ from adaptive_flot.errors import located
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.runner.adaptation.supervision import supervision
 from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.side_by_side import can_go_side_by_side, run_side_by_side
 from adaptive_flot.runner.loop.loop import MakePrior, Step, Supervise, run_loop, unwatched
 from adaptive_flot.runner.loop.prepared import Prepared
-from adaptive_flot.runner.loop.starts import nominal_start, record_of
+from adaptive_flot.runner.loop.starts import prior_of, record_of
 from adaptive_flot.runner.plants.fault_injection import with_controller_faults, with_plant_faults
 from adaptive_flot.runner.plants.scenario_plant import make_plant
 from adaptive_flot.runner.scenario.checks import check_realisation
@@ -22,6 +23,8 @@ from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 Progress = Callable[[], None]
+AT_ONCE = 64
+"""Most seeds of a combination that run side by side: their plants alone take a megabyte each."""
 
 
 def run_scenario(
@@ -54,14 +57,30 @@ def run_scenario(
     runs: list[Run] = []
     with located(scenario.path):
         prepared = Prepared.of(scenario, estimators, controllers)
-        for seed in dict.fromkeys(seeds or scenario.file.seeds):
-            realisation = Realisation(scenario, seed)
-            # before it starts, no estimator has touched a run: one fit for all with the same controller (and model)
-            initial: dict[tuple[str, bool], dict[str, BatchFit]] = {}
-            for controller, name in scenario.combinations(estimators, controllers):
-                fitted = initial.setdefault((controller, prepared.shares_fit(name)), {})
-                runs.append(run_one(prepared, name, controller, realisation, fitted))
-                progress()
+        every = list(dict.fromkeys(seeds or scenario.file.seeds))
+        combinations = scenario.combinations(estimators, controllers)
+        first = Realisation(scenario, every[0])
+        together = {c for c in combinations if can_go_side_by_side(prepared, c[1], c[0], first)}
+        for group in (every[i : i + AT_ONCE] for i in range(0, len(every), AT_ONCE)):
+            realisations = [Realisation(scenario, seed) for seed in group]
+            # before it starts, no estimator has touched a run: one fit for all with the same controller (and model);
+            # plants side by side are the same as others to rounding only, so they have their own
+            initial: dict[tuple[str, bool, bool], list[dict[str, BatchFit]]] = {}
+            found: dict[tuple[str, str], list[Run | Exception]] = {}
+            for i, realisation in enumerate(realisations):
+                for controller, name in combinations:
+                    key = (controller, prepared.shares_fit(name), (controller, name) in together)
+                    fitted = initial.setdefault(key, [{} for _ in group])
+                    if (controller, name) in together:
+                        if not i:
+                            found[controller, name] = run_side_by_side(prepared, name, controller, realisations, fitted)
+                        run = found[controller, name][i]
+                    else:
+                        run = run_one(prepared, name, controller, realisation, fitted[i])
+                    if isinstance(run, Exception):
+                        raise run
+                    runs.append(run)
+                    progress()
     return runs
 
 
@@ -82,16 +101,13 @@ def run_one(
         An input of this seed, or the steady state it starts from, leaves the model's range.
     """
     begin = time.perf_counter()
-    scenario, starts_at = prepared.scenario, prepared.estimators[estimator_name].start
+    scenario = prepared.scenario
     setup = prepared.setup(estimator_name, realisation)
 
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
             initial["fit"] = prepared.batch.fit(record_of(scenario, scenario.setup, steps))
-        prior = initial["fit"].prior(steps[-1].plant.sample.time)
-        if starts_at == "initial_estimate" and setup.model is scenario.model:
-            return prior
-        return nominal_start(scenario, setup, steps, prior)
+        return prior_of(prepared, estimator_name, setup, steps, initial["fit"])
 
     estimator = prepared.estimator(estimator_name, realisation)
     controller = prepared.controller(controller_name, realisation, setup)

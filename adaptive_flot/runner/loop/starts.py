@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.contracts import Prior, Setup
+from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.contracts.delayed_measurements import in_time
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.plants.scenario_plant import initial_state
 from adaptive_flot.runner.scenario.scenario import Scenario
 
@@ -32,6 +34,14 @@ def record_of(scenario: Scenario, setup: Setup, steps: Sequence[Step]) -> Datase
         outputs=np.vstack([np.full(samples[0].outputs.size, np.nan), *(s.outputs for s in samples)]),
         initial_state=_start(scenario, setup, samples[0].inputs) if scenario.file.initial_state else None,
     )
+
+
+def prior_of(prepared: Prepared, estimator: str, setup: Setup, steps: Sequence[Step], fit: BatchFit) -> Prior:
+    """Where an estimator that is built for `setup` starts after these steps: at the batch fit, or as it asks for."""
+    prior = fit.prior(steps[-1].plant.sample.time)
+    if prepared.estimators[estimator].start == "initial_estimate" and setup.model is prepared.scenario.model:
+        return prior
+    return nominal_start(prepared.scenario, setup, steps, prior)
 
 
 def nominal_start(scenario: Scenario, setup: Setup, steps: Sequence[Step], fitted: Prior) -> Prior:
