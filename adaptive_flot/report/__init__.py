@@ -9,6 +9,7 @@ sweep/      A study of many runs.
 discovery/  What a model lacks.
 estimate/   A measured record replayed through estimators.
 quality/    An imported record.
+draws/      Draws of uncertain constants.
 templates/  The page (jinja2), its style and its script. Charts that move are in `adaptive_flot.charts`.
 
 A page gives the answer first: a title that says it, sentences with sizes, a few numbers, one picture. All else is in

@@ -22,12 +22,18 @@ from tests.runner.commands.test_runs_table import closed_loop_summary
 MODULE = "from estimators.fixed import Fixed as Own\n"
 ESTIMATE = ["estimate", "rec.csv", "--cell", "cell.yaml", "--estimator", "own.py:Own"]
 RUN = ["run", "short.yaml", "--estimator", "own.py:Own"]
+DRAWS = ["--cell", "ranges.yaml", "--draws", "32"]
 STUDY = {"description": "Two", "scenarios": ["short.yaml"], "estimators": ["fixed"], "seeds": [1]}
 
 # command without its outputs, the option of an output, and the inputs that it must not overwrite
 CASES = [
     (["simulate", "rec.csv", "--cell", "cell.yaml"], "--out", ["rec.csv", "cell.yaml"]),
     (["simulate", "rec.csv", "--model", "model.yaml"], "--out", ["rec.csv", "model.yaml", "cell.yaml"]),
+    (["simulate", "rec.csv", *DRAWS], "--out", ["rec.csv", "ranges.yaml", "cell.yaml"]),
+    *(
+        (["simulate", "rec.csv", *DRAWS, "--out", "new.csv"], option, ["rec.csv", "ranges.yaml", "cell.yaml"])
+        for option in ("--report", "--json")
+    ),
     *((ESTIMATE, option, ["rec.csv", "cell.yaml", "own.py"]) for option in ("--json", "--save-cell")),
     (["estimate", "rec.csv", "--model", "model.yaml"], "--save-model", ["rec.csv", "model.yaml", "cell.yaml"]),
     *((["discover", "rec.csv", "--model", "model.yaml"], "--json", [name]) for name in ("rec.csv", "cell.yaml")),
@@ -73,6 +79,7 @@ def inputs(scenario: WriteScenario, table: WriteTable, tmp_path: Path) -> dict[P
     (tmp_path / "nowhere").mkdir()
     (tmp_path / "cell.yaml").write_bytes(cell_file().read_bytes())
     (tmp_path / "model.yaml").write_text("model: flotation\ncell: cell.yaml\n")
+    (tmp_path / "ranges.yaml").write_text("cell: cell.yaml\nuncertain:\n  n: {share: 0.02}\n  C: {share: 0.05}\n")
     (tmp_path / "own.py").write_text(MODULE)
     (tmp_path / "map.yaml").write_text("grid: {step: 1 s}\n")
     drift = load_scenario("closed_loop_drift")
@@ -121,6 +128,11 @@ def test_no_result_in_a_folder_overwrites_an_input(
     call: Call, inputs: dict[Path, bytes], tmp_path: Path, command: list[str], folder: str
 ) -> None:
     check(call(*command, "--out", folder), inputs, tmp_path, "--out: ", "is an input", command[1])
+
+
+def test_no_output_of_draws_overwrites_another(call: Call, inputs: dict[Path, bytes], tmp_path: Path) -> None:
+    result = call("simulate", "rec.csv", *DRAWS, "--out", "new.csv", "--report", "nowhere/../new.csv")
+    check(result, inputs, tmp_path, "--report: ", "is written by --out already")
 
 
 def test_no_output_overwrites_another(call: Call, inputs: dict[Path, bytes], tmp_path: Path) -> None:

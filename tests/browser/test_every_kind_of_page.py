@@ -52,6 +52,18 @@ def test_a_long_record_makes_a_small_page(tmp_path: Path, right: Check) -> None:
     right(tmp_path / "page.html")
 
 
+def test_page_of_draws(call: Call, table: WriteTable, tmp_path: Path, right: Check) -> None:  # noqa: F811
+    """Bands of grade and recovery before the first fold, and which constant makes them wide."""
+    (tmp_path / "ranges.yaml").write_text("uncertain:\n  floatability: {share: 0.1}\n  n: {share: 0.02}\n")
+    inputs = table(lambda t: t[["time_s", "air_flow_m3_s", "feed_flow_m3_s", "level_setpoint_m"]])
+    options = ["--draws", 64, "--out", "bands.csv", "--report", "page.html"]
+    result = call("simulate", inputs, "--cell", "ranges.yaml", *options)
+    assert result.code == 0, result.err
+    top = (tmp_path / "page.html").read_text().split('<details class="fold"')[0]
+    assert "Shares in its variance" in top and "Figure 1" in top
+    right(tmp_path / "page.html")
+
+
 def test_page_of_a_study(tmp_path: Path, right: Check) -> None:
     """Distributions are drawn over fits, and not over time; a line of equal values is seen."""
     page = sweep.page(tmp_path, sweep.runs(failed=2))
