@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo live-demo test browser check format docs bench bench-discovery bench-discovery-quick bench-live bench-measured lock clean
+.PHONY: help install demo live-demo test browser postgresql check format docs bench bench-discovery bench-discovery-quick bench-live bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,11 +26,14 @@ install: $(READY) ## Create .venv with the pinned dependencies and this project
 demo: $(READY) ## Run the demonstration
 	@$(BIN)/python -m adaptive_flot.demo
 
-test: check browser ## Run all checks and the test suite
+test: check browser postgresql ## Run all checks and the test suite
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 browser: ## Install Chromium for the tests of pages where this system lets us; without it they are skipped
 	@$(install_chromium)
+
+postgresql: ## Install PostgreSQL for the test of the live link's memory, where this system lets us; else it is skipped
+	@$(install_postgresql)
 
 check: $(READY) ## Run the static checks: ruff, mypy, import contracts
 	$(BIN)/ruff check --quiet .
@@ -106,4 +109,16 @@ if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
   { apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --yes --no-install-recommends \
     chromium fonts-dejavu-core >/dev/null; } || echo "Chromium could not be installed; tests of pages are skipped" >&2; \
 else echo "No Chromium on this system; tests of pages are skipped" >&2; fi
+endef
+
+# The test starts a server of its own: no cluster is made by the package, and none is left to run.
+define install_postgresql
+for place in /usr/lib/postgresql/*/bin $$(echo "$$PATH" | tr : ' '); do \
+  test -x "$$place/initdb" && test -x "$$place/pg_ctl" && exit 0; done; \
+if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+  { mkdir -p /etc/postgresql-common/createcluster.d && \
+    echo 'create_main_cluster = false' > /etc/postgresql-common/createcluster.d/adaptive-flot.conf && \
+    apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --yes --no-install-recommends \
+    postgresql >/dev/null; } || echo "PostgreSQL could not be installed; its test is skipped" >&2; \
+else echo "No PostgreSQL on this system; its test is skipped" >&2; fi
 endef

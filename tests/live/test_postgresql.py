@@ -29,7 +29,7 @@ SERVER, INIT = shutil.which("pg_ctl", path=PLACES), shutil.which("initdb", path=
 def url() -> Iterator[str]:
     """URL of an empty database in a server of its own."""
     if SERVER is None or INIT is None:
-        pytest.skip("needs the programs initdb and pg_ctl of PostgreSQL")
+        pytest.skip("no PostgreSQL on this system; `make postgresql` installs it where it may (Debian, as root)")
     # a short path below the system's own folder: sockets ask for it, and PostgreSQL, which refuses to run as root, may
     # not look into the folders of the tests, which belong to whoever runs them
     place = Path(tempfile.mkdtemp(prefix="flot-"))
