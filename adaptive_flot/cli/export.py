@@ -17,7 +17,8 @@ def export(
     begin: Annotated[datetime | None, typer.Option("--from", help="First time (UTC, plant's clock).")] = None,
     end: Annotated[datetime | None, typer.Option("--to", help="Last time (UTC, plant's clock).")] = None,
     replay: Annotated[bool, typer.Option("--replay", help="Replay the session and compare it to the bit.")] = False,
-    session: Annotated[int | None, typer.Option(min=1, help="Session to replay; default the last.")] = None,
+    shadows: Annotated[bool, typer.Option("--shadows", help="Compare what ran in shadow with what acted.")] = False,
+    session: Annotated[int | None, typer.Option(min=1, help="Session to replay or compare; default the last.")] = None,
 ) -> None:
     """Write what a live link has stored as a record for `discover`, `estimate` and `run`."""
     from adaptive_flot.errors import LinkError
@@ -27,8 +28,8 @@ def export(
     from adaptive_flot.live.store.record import chosen_stretch, record_table, stretches
 
     loaded = load_link(link)
-    if out is None and not replay:
-        raise LinkError("export: nothing to do; give --out RECORD.csv, or --replay")
+    if out is None and not replay and not shadows:
+        raise LinkError("export: nothing to do; give --out RECORD.csv, --replay or --shadows")
     if out is not None:
         check_targets([link, loaded.scenario.path], [("--out", out)])
         check_table_path(out)
@@ -40,6 +41,16 @@ def export(
         write_table(table, out)
         whole = "" if len(known) < 2 else f", of {len(known)} stretches between long gaps"
         typer.echo(f"{len(table)} rows: {out}{whole}")
+    if shadows:
+        from rich.console import Console
+        from rich.table import Table
+
+        from adaptive_flot.live.store.shadows import compare
+
+        table_of = Table("in shadow", "quantity", "rows", "acting", "in shadow")
+        for one in compare(engine, loaded, session):
+            table_of.add_row(one.role, one.quantity, str(one.rows), f"{one.acting:.4g}", f"{one.shadow:.4g}")
+        Console(width=120).print(table_of)
     if replay:
         from adaptive_flot.live.link.replay import replay as replay_session
 

@@ -1,4 +1,7 @@
-"""`make live-demo`: a test plant, a link and its page on this machine, until Ctrl-C."""
+"""`make live-demo`: a test plant, a link and its page on this machine with one command, until Ctrl-C.
+
+The plant has an effect that the link's model lacks. Discovery finds it after some minutes; a person then decides.
+"""
 
 from __future__ import annotations
 
@@ -6,42 +9,48 @@ import subprocess
 import sys
 from pathlib import Path
 
-from adaptive_flot.live.certificates import make_certificates
+from adaptive_flot.files import write_text
+from adaptive_flot.live.certificates import make_certificates, token_file
 from adaptive_flot.live.link_file import load_link
+from adaptive_flot.live.plant.link_text import link_text
+from adaptive_flot.live.plant.server import ServerPlace
 from adaptive_flot.live.program import live
+from adaptive_flot.runner.scenario.loading import load_scenario
 
-SCENARIO, SPEED, HOURS = "closed_loop_drift", 5.0, 24.0
+SCENARIO, SPEED, HOURS = "undeclared_effect", 5.0, 24.0
+CASE = ("economic_mpc", "rpem_discovery")
+SHADOWS = {"fixed": {"estimator": "fixed", "controller": "economic_mpc"}}
 FOLDER = Path("results/live_demo")
 
 
-def main(folder: Path = FOLDER, port: int = 4840, cycles: int | None = None) -> None:
-    """Start the plant in a process of its own, and run the link in this one.
+def main(folder: Path = FOLDER, port: int = 4840, page: int = 8050, cycles: int | None = None) -> None:
+    """Start the plant in a process of its own, and run the link and its page in this one.
 
     Parameters
     ----------
     folder
-        For certificates, link file and database.
+        For certificates, tokens, link file and database.
     port
         Where the plant listens, on this machine only.
+    page
+        Where the page is served, on this machine only; 0 for any free port.
     cycles
         Cycles of the link; default until Ctrl-C.
     """
-    certificates, link = folder / "certificates", folder / "link.yaml"
-    if not certificates.is_dir():
+    certificates, link = folder.absolute() / "certificates", folder / "link.yaml"
+    if not token_file(certificates, "act").is_file():
         make_certificates(certificates)
+    url = ServerPlace(certificates, port=port).url
+    scenario = load_scenario(SCENARIO)
+    write_text(link, link_text(scenario, url, certificates, speed=SPEED, page=page, case=CASE, shadows=SHADOWS))
     command = [sys.executable, "-m", "adaptive_flot", "serve-plant", SCENARIO, "--auto-operator"]
-    options = {"--certificates": certificates, "--speed": SPEED, "--hours": HOURS, "--port": port, "--write-link": link}
-    link.unlink(missing_ok=True)
+    options = {"--certificates": certificates, "--speed": SPEED, "--hours": HOURS, "--port": port}
     plant = subprocess.Popen([*command, *(str(part) for pair in options.items() for part in pair)])
     try:
-        while not link.is_file() and plant.poll() is None:
-            try:
-                plant.wait(0.1)
-            except subprocess.TimeoutExpired:
-                continue
-        if plant.poll() is None:
-            print(f"Memory: {folder / 'live.sqlite'}; read it with `adaptive-flot export {link} --out record.csv`")
-            live(load_link(link), print, cycles)
+        print(f"Memory: {folder / 'live.sqlite'}; read it with `adaptive-flot export {link} --out record.csv`")
+        print(f"Token for acting: {token_file(certificates, 'act').read_text().strip()}")
+        print(f"Token for viewing: {token_file(certificates, 'view').read_text().strip()}", flush=True)
+        live(load_link(link), lambda words: print(words, flush=True), cycles)
     finally:
         plant.terminate()
         plant.wait()

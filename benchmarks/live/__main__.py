@@ -1,4 +1,4 @@
-"""Command line: `python -m benchmarks.live [--cycles N] [--network]`."""
+"""Command line: `python -m benchmarks.live [--cycles N] [--network N] [--page S] [--soak H]`."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ def main(
     scenario: Annotated[str, typer.Option(help="Shipped scenario with limits.")] = "closed_loop_drift",
     seed: Annotated[int, typer.Option(min=0, help="Of the faults.")] = 1,
     network: Annotated[int, typer.Option(min=0, help="Rounds of kills over OPC UA, a minute each.")] = 0,
+    page: Annotated[float, typer.Option(min=0, help="Seconds of tag to pixel in Chromium, at each speed.")] = 0,
+    soak: Annotated[float, typer.Option(min=0, help="Simulated hours with the page open in Chromium.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder of the figures.")] = Path("results/live"),
 ) -> None:
     """Cycles of the live link under faults: unsafe writes, lost rows, bumps, times."""
@@ -44,6 +46,12 @@ def main(
             from benchmarks.live.network import network_figures
 
             figures |= network_figures(folder, scenario, network)
+        if page or soak:
+            from benchmarks.live.page import latency_figures, soak_figures
+
+            for speed in (1.0, 5.0) if page else ():
+                figures |= latency_figures(folder, scenario, speed, page)
+            figures |= soak_figures(folder, scenario, soak) if soak else {}
     table = Table("figure", "measured")
     for what, measured in figures.items():
         table.add_row(Text(what), Text(str(measured)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -49,11 +49,13 @@ def outcome(link: Link, time: float, innovation: float) -> Outcome:
     return Outcome(round(time), Mode.MONITOR, "", (), {}, sample, estimate, None, {}, {}, False)
 
 
-def said(discovery: LiveDiscovery, link: Link, offset: float, rows: int = 400) -> list[str]:
-    """What is said while innovations have this mean, in units of their standard deviation."""
+def said(discovery: LiveDiscovery, link: Link, offset: float, rows: int = 400, lost: Collection[int] = ()) -> list[str]:
+    """What is said while innovations have this mean, in units of their standard deviation; some samples are lost."""
     noise = np.random.default_rng(1).standard_normal(rows)
     found = []
     for k in range(rows):
+        if k in lost:
+            continue
         words = discovery.look(outcome(link, k + 1.0, noise[k] + offset))
         if words.startswith("search begins"):
             while discovery._found is not None and not discovery._found.done():
@@ -72,6 +74,25 @@ def test_an_alarm_starts_a_search_whose_verdict_is_said(watched: Link) -> None:
     assert words[1].startswith("search begins after an alarm of concentrate_grade mean")
     assert words[2] == "search ended: none: link.yaml with 100 rows, 0 effects"
     assert words[-1].endswith("with 150 rows, 0 effects"), "no record is longer than asked"
+
+
+def test_a_few_lost_samples_are_rows_without_values_and_no_new_beginning(watched: Link) -> None:
+    discovery = LiveDiscovery(watched, judge)
+    try:
+        words = said(discovery, watched, offset=2.0, rows=130, lost=(20, 21, 50, 80))
+    finally:
+        discovery.close()
+    assert words[-1].startswith("search ended") and "with 100 rows" in words[-1]
+
+
+def test_a_long_gap_begins_a_new_record(watched: Link) -> None:
+    longest = round(watched.file.cycle.longest_gap_s / watched.scenario.dt)
+    discovery = LiveDiscovery(watched, judge)
+    try:
+        words = said(discovery, watched, offset=2.0, rows=150, lost=range(40, 42 + longest))
+    finally:
+        discovery.close()
+    assert words == [], "neither a window nor a record is whole"
 
 
 def test_white_innovations_raise_no_alarm(watched: Link) -> None:

@@ -23,6 +23,7 @@ from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.beside import ShadowResult
 from adaptive_flot.live.store.memory import Memory, open_database
 from adaptive_flot.live.store.numbers import as_array, as_text
+from adaptive_flot.live.store.shadows import compare
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.live.desk_bench import DeskBench
 
@@ -142,6 +143,16 @@ def test_a_twin_in_shadow_makes_the_same_errors_and_is_stored_under_its_role(
     seen = [(as_array(r["innovation"]), as_array(r["own"])) for r in rows if r["innovation"] is not None]
     mine, own = (np.vstack(both) for both in zip(*seen, strict=True))
     assert np.corrcoef(mine[:, 0], own[:, 0])[0, 1] > 0.9, "each beside the acting one of its own cycle"
+    table = {row.quantity: row for row in compare(engine, shadowed)}
+    for j, name in enumerate(shadowed.scenario.model.names("outputs")):
+        unit = shadowed.scenario.model.outputs[j].unit
+        if np.isfinite(own[:, j]).any():
+            row = table.pop(f"one-step error of {name} [{unit}]")
+            assert (row.role, row.rows) == ("twin", len(own))
+            assert row.acting == pytest.approx(np.sqrt(np.mean(own[:, j] ** 2)))
+            assert row.shadow == pytest.approx(np.sqrt(np.mean(mine[:, j] ** 2)))
+    assert set(table) == {"mean air_flow decided [m3/s]", "mean level_setpoint decided [m]"}
+    assert all(row.shadow == pytest.approx(row.acting, rel=0.05) for row in table.values())
     engine.dispose()
 
 

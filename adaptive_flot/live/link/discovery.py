@@ -19,6 +19,7 @@ from adaptive_flot.contracts.delayed_measurements import in_time
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.live.finding import Finding
+from adaptive_flot.live.link.estimation import missing
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.outcome import Outcome
 from adaptive_flot.runner.adaptation.supervisor import measured_record
@@ -82,6 +83,7 @@ class LiveDiscovery:
         self._setup: Setup = link.scenario.setup
         self._pool: ProcessPoolExecutor | None = None
         self._found: Future[Finding] | None = None
+        self._longest = round(link.file.cycle.longest_gap_s / self._setup.dt)
         self._alarm, self._quiet_until, self._window = "", -np.inf, 0
         rows = 0 if self._options is None else max(self._options.record_s, self._options.window_s) / self._setup.dt
         self._steps: deque[Step] = deque(maxlen=round(rows) + 1)
@@ -91,9 +93,15 @@ class LiveDiscovery:
         if self._options is None or outcome.sample is None:
             return ""
         last = self._steps[-1].plant.sample.time if self._steps else outcome.sample.time - self._setup.dt
-        if outcome.sample.time > last + 1.5 * self._setup.dt:
-            self._steps.clear()  # a record has no holes
+        missed = round((outcome.sample.time - last) / self._setup.dt) - 1
+        if missed > self._longest:
+            self._steps.clear()
             self._window = 0
+        elif missed > 0:  # a record has no holes: samples that nobody has seen, with inputs as before
+            before = self._steps[-1].plant.sample
+            times = [last + (k + 1) * self._setup.dt for k in range(missed)]
+            self._steps += [_step(missing(before, time), None) for time in times]
+            self._window += missed if self._window else 0
         self._steps.append(_step(outcome.sample, outcome.estimate))
         if self._found is not None:
             return self._result(outcome.sample.time)

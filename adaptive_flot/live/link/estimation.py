@@ -79,7 +79,7 @@ class Estimation:
                 state = self._restarted(state, sample)
             else:
                 for k in range(missed):
-                    state = self._next(state, _missing(last, last.time + (k + 1) * self._dt))
+                    state = self._next(state, missing(last, last.time + (k + 1) * self._dt))
         return replace(self._next(state, sample), last=sample)
 
     def _next(self, state: EstimationState, sample: Sample) -> EstimationState:
@@ -124,7 +124,7 @@ class Estimation:
         return replace(prior, time=begin, state=steady_state(setup.model, sample.inputs, full).state)
 
 
-def _missing(before: Sample, time: float) -> Sample:
+def missing(before: Sample, time: float) -> Sample:
     """A sample that nobody has seen: inputs as before, no output."""
     return replace(before, time=time, outputs=np.full_like(before.outputs, np.nan), delayed=())
 

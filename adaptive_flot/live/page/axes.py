@@ -11,6 +11,7 @@ import numpy as np
 
 from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.contracts import Plan, Status
+from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.running.progress import Progress
 
@@ -26,6 +27,11 @@ def plain(value: float, digits: int = 6) -> float | None:
     (0.123457, None)
     """
     return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+
+
+def is_share(q: Quantity) -> bool:
+    """Whether a quantity is a share, which is shown in per cent."""
+    return q.unit == "-" and q.upper <= 1.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ class Axes:
         for name, (low, high) in limits.outputs.items():
             j = model.index("outputs", name)
             q = model.outputs[j]
-            shown = Shown.of(name, q.unit, (low, high), q.unit == "-" and q.upper <= 1.0)
+            shown = Shown.of(name, q.unit, (low, high), is_share(q))
             ends = tuple(shown.factor * end for end in (low, high) if math.isfinite(end))
             lines: tuple[Line, ...] = (
                 Line("measured", MEASURED),

@@ -11,7 +11,7 @@ from adaptive_flot.contracts import Estimate, OperatingPoint, Plan, Sample, Stat
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.live.link_file import Link
-from adaptive_flot.live.page.axes import Axes, Shown, plain
+from adaptive_flot.live.page.axes import Axes, Shown, is_share, plain
 from adaptive_flot.live.running.progress import Card, Progress
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.safety.modes import Mode
@@ -34,6 +34,8 @@ LOOKS = {
     Check.FUTURE.value: 3,
     Check.UNCERTAIN.value: 5,
 }
+MOST_SAID = 300
+"""Characters of what discovery says."""
 OTHER = 4
 """Colour of states that are neither usual nor above."""
 
@@ -56,6 +58,7 @@ class Pictures:
         self._time = math.nan
         self._solved, self._solves = math.nan, False
         self._plan: Plan | None = None
+        self._said = ""
         self._outputs: tuple[Model, FastCall] | None = None
 
     def spec(self) -> dict[str, Any]:
@@ -77,6 +80,7 @@ class Pictures:
         """Row of the panels (time, numbers of the lines, states of the strips), and what is shown of now."""
         told = progress.snapshot.time
         self._time = told if math.isfinite(told) else self._time + self.link.scenario.dt
+        self._said = progress.found.split("\n")[0][:MOST_SAID] or self._said
         self._take(progress)
         states = self._states(progress)
         row = [plain(self._time, 14), *self.axes.row(progress), *states]
@@ -101,6 +105,7 @@ class Pictures:
                 for a in progress.alarms.values()
             ],
             "card": None if progress.card is None else self._card(progress.card, progress),
+            "discovery": self._said,
             "shadows": [self._shadow(v) for v in progress.shadows.values()],
             "plan": self._planned(progress),
         }
@@ -242,9 +247,9 @@ class Pictures:
     def _unit(self, output: str) -> str:
         return self.link.scenario.model.outputs[self._names.index(output)].unit
 
-    @staticmethod
-    def _error(name: str, unit: str, before: float, after: float) -> dict[str, Any]:
-        shown = Shown.of(name, unit, (before, after))
+    def _error(self, name: str, unit: str, before: float, after: float) -> dict[str, Any]:
+        share = name in self._names and is_share(self.link.scenario.model.outputs[self._names.index(name)])
+        shown = Shown.of(name, unit, (before, after), share)
         factor = shown.factor
         return {
             "name": shown.label,

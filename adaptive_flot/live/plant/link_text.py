@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ def link_text(
     highest: str = "closed",
     speed: float = 1.0,
     page: int | None = None,
+    case: tuple[str, str] | None = None,
+    shadows: Mapping[str, Mapping[str, str]] | None = None,
 ) -> str:
     """Content of a link file for a scenario's test plant (YAML).
 
@@ -53,8 +56,12 @@ def link_text(
         How much faster than real time the plant runs.
     page
         Port of the page of the control room; None for no page.
+    case
+        Controller and estimator; default the scenario's first case.
+    shadows
+        Estimator and controller of each that runs in shadow, by its name.
     """
-    case = scenario.combinations()[0]
+    case = case or scenario.combinations()[0]
     me, plant = identity(certificates, LINK), identity(certificates, PLANT)
     content: dict[str, Any] = {
         "scenario": scenario.name,
@@ -84,6 +91,7 @@ def link_text(
         },
         "cycle": {"speed": speed},
         **({} if page is None else {"page": _page(certificates, page)}),
+        **({} if not shadows else {"shadows": {name: dict(part) for name, part in shadows.items()}}),
     }
     return HEAD + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=118)
 

@@ -5,6 +5,7 @@ Map
 schema.py    The tables.
 beside.py    What is stored beside a cycle: persons' actions, shadows, changes of the model.
 memory.py    Open a database, store cycles, find where to go on.
+shadows.py   What ran in shadow beside what acted.
 numbers.py   Arrays as text that comes back to the bit.
 record.py    What was stored as a record that `discover`, `estimate` and `run` read, and as snapshots to replay.
 """

@@ -70,6 +70,7 @@ const AdaptiveFlotLive = (() => {
 
   function show(now, row) {
     heard = performance.now();
+    byId("clock").dataset.time = now.time;
     byId("clock").textContent = `Plant's clock ${AdaptiveFlotText.clock(now.time)}`;
     AdaptiveFlotHead.show(now);
     AdaptiveFlotSide.show(now);

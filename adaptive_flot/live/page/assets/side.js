@@ -12,6 +12,8 @@ const AdaptiveFlotSide = (() => {
     document.querySelector(`#${id} .inside`).replaceChildren(...make(content));
   }
 
+  const amount = (value, unit) => `${number(value)}${unit === "–" ? "" : unit.startsWith("10") ? ` × ${unit}` : ` ${unit}`}`;
+
   function alarms(list) {
     document.getElementById("alarms").classList.toggle("bad", list.some((a) => a.active && !a.by));
     if (!list.length) return [element("p", "soft", "No alarm.")];
@@ -39,13 +41,14 @@ const AdaptiveFlotSide = (() => {
       const row = body.insertRow();
       row.append(element("th", "", e.name));
       const better = e.after !== null && e.before !== null && e.after < e.before;
-      row.append(element("td", "", `${number(e.before)} ${e.unit === "–" ? "" : e.unit}`), element("td", better ? "good" : "", `${number(e.after)} ${e.unit === "–" ? "" : e.unit}`));
+      row.append(element("td", "", amount(e.before, e.unit)), element("td", better ? "good" : "", amount(e.after, e.unit)));
     }
     return [table];
   }
 
-  function card(found) {
-    if (!found) return [element("p", "soft", "Nothing was found that the model lacks.")];
+  function card({ found, words }) {
+    const said = words ? [element("p", "soft said", `Last: ${words}`)] : [];
+    if (!found) return [element("p", "soft", "Nothing was found that the model lacks."), ...said];
     const parts = [element("p", "stage", `${found.stage}${found.by ? ` by ${found.by}` : ""}`)];
     parts.push(element("p", "reason", `${found.since === null ? "" : `At ${clock(found.since)}: `}${found.reason}`));
     if (found.evidence.length) {
@@ -65,7 +68,7 @@ const AdaptiveFlotSide = (() => {
     row.append(button("Try in shadow", () => ask("shadow"), { off: !can || !["found", "reverted"].includes(found.stage) }));
     row.append(button("Apply", () => ask("apply"), { sure: true, off: found.stage !== "in shadow" }));
     row.append(button("Revert", () => ask("revert"), { sure: true, off: found.stage !== "applied" }));
-    parts.push(row);
+    parts.push(row, ...said);
     return parts;
   }
 
@@ -78,7 +81,7 @@ const AdaptiveFlotSide = (() => {
       const late = shadow.left_out ? `; ${shadow.left_out} samples left out` : "";
       box.append(element("p", shadow.runs ? "" : "bad", `${shadow.status}${late}; ${shadow.rows} rows`));
       box.append(...errors(shadow.errors, "acting", "shadow"));
-      if (shadow.wants.length) box.append(element("p", "soft", `would set ${shadow.wants.map((w) => `${w.name.toLowerCase()} ${number(w.value)} ${w.unit}`).join(", ")}`));
+      if (shadow.wants.length) box.append(element("p", "soft", `would set ${shadow.wants.map((w) => `${w.name.toLowerCase()} ${amount(w.value, w.unit)}`).join(", ")}`));
       return box;
     });
   }
@@ -105,7 +108,7 @@ const AdaptiveFlotSide = (() => {
 
   function show(now) {
     fill("alarms", now.alarms, alarms);
-    fill("found", now.card, card);
+    fill("found", { found: now.card, words: now.discovery }, card);
     fill("shadows", now.shadows, shadows);
     fill("strips", { tags: now.tags, solver: { state: now.solver.state } }, tags);
     fill("answers", now.answers, answers);
