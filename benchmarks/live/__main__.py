@@ -51,7 +51,7 @@ def main(
 
             for speed in (1.0, 5.0) if page else ():
                 figures |= latency_figures(folder, scenario, speed, page)
-            figures |= soak_figures(folder, scenario, soak) if soak else {}
+            figures |= soak_figures(folder, scenario, soak, print) if soak else {}
     table = Table("figure", "measured")
     for what, measured in figures.items():
         table.add_row(Text(what), Text(str(measured)))

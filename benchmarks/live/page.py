@@ -9,7 +9,7 @@ import socket
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -175,7 +175,9 @@ def latency_figures(folder: Path, scenario: str, speed: float, seconds: float) -
     return figures
 
 
-def soak_figures(folder: Path, scenario: str, hours: float) -> dict[str, object]:
+def soak_figures(
+    folder: Path, scenario: str, hours: float, say: Callable[[str], None] = lambda words: None
+) -> dict[str, object]:
     """Simulated hours as fast as they go, without the network, page and browser open: memory and times of cycles."""
     link = page_link(folder, scenario, 4840, 1.0, hours + 0.1)
     inbox = Inbox()
@@ -197,6 +199,8 @@ def soak_figures(folder: Path, scenario: str, hours: float) -> dict[str, object]
                 sign = 1.0 if k > WARM else -1.0
                 grown["process"] += sign * resident_mb()
                 grown["browser"] += sign * _heap_mb(tab)
+            if k % WARM == 0:
+                say(f"{k} of {cycles} cycles: {resident_mb():.1f} MB, browser {_heap_mb(tab):.1f} MB")
             direct.interval()
             snapshot = direct.snapshot()
             begin = time.perf_counter()

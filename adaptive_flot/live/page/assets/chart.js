@@ -3,7 +3,7 @@ const AdaptiveFlotOverTime = (() => {
   "use strict";
   const HOUR = 3600;
   const LEAST_S = 300; // the axis shows this much at least
-  const EVERY_MS = 200; // at most five drawings a second
+  const EVERY_MS = 100; // at most ten drawings a second
   const EMPTY = { o: 0, s: 1, v: [] };
   let spec = null;
   let charts = null;
