@@ -40,10 +40,11 @@ _HEAD = """
 #include <math.h>
 #include <stdint.h>
 #define L {lanes}
+#define INLINE static inline __attribute__((always_inline)) /* else the loop is none of vector instructions */
 {simd}
-static inline double lane_sign(double x) {{ return x < 0. ? -1. : x > 0. ? 1. : x; }}
-static inline double lane_min(double x, double y) {{ double r = x < y ? x : y; return y != y ? x : r; }}
-static inline double lane_max(double x, double y) {{ double r = x > y ? x : y; return y != y ? x : r; }}
+INLINE double lane_sign(double x) {{ return x < 0. ? -1. : x > 0. ? 1. : x; }}
+INLINE double lane_min(double x, double y) {{ double r = x < y ? x : y; return y != y ? x : r; }}
+INLINE double lane_max(double x, double y) {{ double r = x > y ? x : y; return y != y ? x : r; }}
 {power}
 """
 _VECTOR_FUNCTIONS = (
@@ -54,16 +55,16 @@ _VECTOR_PAIRS = ("atan2", "hypot")
 _DECLARED = "#pragma omp declare simd notinbranch simdlen(L)\nextern double {0}({1}) __attribute__((const));"
 _SCALAR_POWER = "#define lane_pow pow"
 _VECTOR_POWER = """
-static inline double lane_pow(double x, double y) {
-    double r = exp(y * log(fabs(x)));
-    double whole = floor(y) == y ? 1. : 0., odd = floor(0.5 * y) == 0.5 * y ? 0. : whole;
-    r = fabs(x) == 1. ? 1. : r;
-    r = odd != 0. ? copysign(r, x) : r;
-    r = x < 0. ? (whole != 0. ? r : NAN) : r;
-    r = x == 1. ? 1. : r;
-    return y == 0. ? 1. : r;
+INLINE double lane_pow(double x, double y) {
+    double size = log(fabs(x)), power = y * size;
+    double whole = floor(y) == y, even = floor(0.5 * y) == 0.5 * y, below = x < 0.;
+    power = (y == 0.) | (size == 0.) ? 0. : power;                             /* 1, whatever the other argument */
+    double sign = 1. + (whole - even) * (copysign(1., x) - 1.);                /* -1 for an odd power of a negative x */
+    double r = sign * exp(power);
+    return below - below * whole > 0. ? NAN : r;
 }
 """
+"""Few branches, and none inside another: from nested ones compilers make jumps, and then no vector instructions."""
 
 _DRIVER = """
 static const int64_t arg_size[] = {{{arg_sizes}}}, res_size[] = {{{res_sizes}}}, carried[] = {{{carried}}};

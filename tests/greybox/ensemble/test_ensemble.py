@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
+from adaptive_flot.greybox.ensemble.instruction_sets import AVX2, AVX512, InstructionSet, supported
+from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping import compiled as compiled_functions
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
 PROBLEM = compiler_problem()
+needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be compiled here: {PROBLEM}")
 COMPILED = [
     False,
     pytest.param(
@@ -45,6 +50,21 @@ def test_records_of_the_cell(model: Model, compiled: bool) -> None:
         for what in ("states", "outputs", "signals"):
             np.testing.assert_allclose(getattr(run, what)[m], getattr(expected, what), rtol=1e-12)
         np.testing.assert_array_equal(run.last_state[m], run.states[m, -1])
+
+
+@needs_compiler
+@pytest.mark.parametrize(("instructions", "name"), [(AVX2, b"_ZGVdN4v_exp"), (AVX512, b"_ZGVeN8v_exp")])
+def test_the_step_of_the_cell_is_made_of_vector_instructions(
+    model: Model, instructions: InstructionSet, name: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A compiler that makes no vectors of a loop says nothing, and the results are the same: it calls plain `exp`."""
+    if instructions not in supported():
+        pytest.skip(f"this machine has no {instructions.name}")
+    monkeypatch.setattr(compiled_functions, "cache_folder", lambda: tmp_path / "compiled")
+    LaneLibrary(Stepper(model, 1.0).step, [0, -1, -1, -1], instructions)
+    (library,) = (tmp_path / "compiled").glob("step_lanes-*.so")
+    content = library.read_bytes()
+    assert name in content and b"\0exp\0" not in content and b"\0pow\0" not in content
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
