@@ -51,9 +51,11 @@ def file_hash(path: Path) -> str:
 
 
 def hashed(files: Iterable[Path]) -> list[tuple[str, str]]:
-    """(what, name and hash) of each file that can be read, for the foot of a page."""
-    known = ((file, file_hash(file)) for file in dict.fromkeys(files))
-    return [(f"SHA-256 of {file.name}", f"{digits} …") for file, digits in known if digits]
+    """(what, name and hash) of each file that can be read, for the foot of a page; of one name with their folder."""
+    known = [(file, digits) for file in dict.fromkeys(files) if (digits := file_hash(file))]
+    names = [file.name for file, _ in known]
+    shown = [f"{f.parent.name}/{f.name}" if names.count(f.name) > 1 and f.parent.name else f.name for f, _ in known]
+    return [(f"SHA-256 of {name}", f"{digits} …") for name, (_, digits) in zip(shown, known, strict=True)]
 
 
 def values_hash(arrays: Iterable[FloatArray]) -> str:

@@ -5,6 +5,7 @@ Map
 safety           What must hold whatever happens: checks of values, limits, modes. Pure functions.
 link_keys        The parts of a link file.
 link_file        A link file with the scenario that it names.
+map_tags         Tags of it that the map of an import gives.
 certificates     Certificates, keys, passwords and tokens.
 snapshot         What the plant told by the begin of a cycle.
 outcome          What a cycle came to.

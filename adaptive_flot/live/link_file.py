@@ -21,6 +21,7 @@ from adaptive_flot.live.link_keys import (
     ShadowPart,
     WritePart,
 )
+from adaptive_flot.live.map_tags import with_map
 from adaptive_flot.live.safety.modes import ModeRules
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.scenario import Scenario
@@ -42,7 +43,9 @@ class LinkFile(Part):
     highest_mode: Literal["monitor", "advisory", "closed"] = "advisory"
     database: str = "sqlite:///live.sqlite"
     server: ServerPart
-    tags: dict[str, LiveTag]
+    map: str | None = None
+    """Map of an import (YAML): gives the tags that `tags` does not, and the keys of a tag that it leaves out."""
+    tags: dict[str, LiveTag] = Field(default_factory=dict)
     writes: dict[str, WritePart]
     handshake: HandshakePart
     cycle: CyclePart = CyclePart()
@@ -92,7 +95,7 @@ def load_link(path: Path) -> Link:
     """
     content = read_yaml(path, LinkError, "holds no keys; write one with `adaptive-flot serve-plant --write-link`")
     try:
-        file = LinkFile.model_validate(content)
+        file = LinkFile.model_validate(with_map(content, path))
     except ValidationError as error:
         raise LinkError(f"{path}: {first_problem(error, LinkFile)}") from error
     beside = path.parent / file.scenario

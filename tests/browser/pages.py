@@ -9,7 +9,7 @@ from tests.browser.chromium import Browser, Tab
 WIDTHS = (1400, 900, 390)
 """Widths of the window [px]."""
 TALLEST = 6000
-"""Height of a page as it opens [px]."""
+"""Height of a page [px], as it opens and with any one of its chapters unfolded."""
 LARGEST = 2_000_000
 """Size of a page [bytes]."""
 CHECKS = Path(__file__).with_name("checks.js").read_text(encoding="utf-8")
@@ -20,8 +20,19 @@ SETTLED = """
     })
 """
 """Four frames on: what observers of sizes and of places on the screen have to do is done by then, however slow."""
+OPENED = """
+    (() => {
+      const folds = [...document.querySelectorAll('details.fold')];
+      return folds.map((fold) => {
+        folds.forEach((other) => other.open = false);
+        for (let at = fold; at; at = at.parentElement) if (at.tagName === 'DETAILS') at.open = true;
+        return [fold.id, document.documentElement.scrollHeight];
+      });
+    })()
+"""
+"""Of each chapter: its name, and the height of the page with it open and no other one beside it."""
 DRAW_ALL = f"""
-    document.querySelectorAll('details').forEach((part) => part.open = true);
+    document.querySelectorAll('details').forEach((part) => {{ part.name = ''; part.open = true; }});
     if (typeof AdaptiveFlotChart !== 'undefined') AdaptiveFlotChart.all();
     {SETTLED}
 """
@@ -51,6 +62,8 @@ def problems(browser: Browser, page: Path) -> list[str]:
             found += [f"{where}: {problem}" for problem in tab.run("pageProblems()")]
             if is_dark(tab) != dark:
                 found.append(f"{where}: the paper has the wrong colour")
+        tall = [(name, height) for name, height in tab.run(OPENED) if height > TALLEST]
+        found += [f"{width} px wide: {height} px tall with {name} open" for name, height in tall]
     found += errors(tab)
     found += fetched(tab, page)
     tab.close()

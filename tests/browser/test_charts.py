@@ -10,7 +10,7 @@ import pytest
 from adaptive_flot.charts.plotdata import Chart, Mark, Panel, Role, Strip, Trace
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
-from adaptive_flot.report.kit.parts import Fact, Section, Table
+from adaptive_flot.report.kit.parts import Fact, Section, Table, Text
 from tests.browser.chromium import Browser, Tab
 from tests.browser.pages import DRAW_ALL, SETTLED, errors, is_dark, opened
 
@@ -175,3 +175,27 @@ def test_a_chart_grows_and_follows_the_newest_values(tab: Tab) -> None:
     )
     assert grown == [[1001, 1002], [7, 8], [None, 9], 1002]
     assert errors(tab) == []
+
+
+def test_one_chapter_is_open_at_a_time_and_stays_in_sight(browser: Browser, tmp_path: Path) -> None:
+    """A chapter within another one does not close that."""
+    tall = [Text("word " * 3000)]
+    chapters = [Section(f"in-{k}", f"In {k}", "", tall) for k in range(2)]
+    sections = [Section("one", "One", "", tall), Section("two", "Two", "", [], chapters)]
+    made = Page("Test", "Chapters", "", ["An answer."], [], [], sections, made_by(""))
+    (tmp_path / "page.html").write_text(render(made, Album()), encoding="utf-8")
+    tab = opened(browser)
+    tab.look(1200, 900, dark=False)
+    tab.load(tmp_path / "page.html")
+    opens = "[...document.querySelectorAll('details.fold[open]')].map((fold) => fold.id)"
+    for anchor, expected in (("one", ["one"]), ("two", ["two"]), ("in-0", ["two", "in-0"]), ("in-1", ["two", "in-1"])):
+        tab.run(f"document.querySelector('#{anchor} > summary').click(); {SETTLED}")
+        assert tab.run(opens) == expected
+        top = tab.run(f"document.getElementById('{anchor}').getBoundingClientRect().top")
+        assert -1 <= top < 900
+    tab.run("dispatchEvent(new Event('beforeprint'))")
+    assert len(tab.run(opens)) == 4
+    tab.run("dispatchEvent(new Event('afterprint'))")
+    tab.run(f"document.querySelector('#one > summary').click(); {SETTLED}")
+    assert "two" not in tab.run(opens)
+    tab.close()

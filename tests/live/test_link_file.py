@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.link_keys import LiveTag, Scale
 from adaptive_flot.runner.scenario.scenario import Scenario
@@ -41,3 +43,46 @@ def test_a_bad_code_is_found_in_the_tags_unit(write_link: Callable[..., Link], s
     link = write_link(scenario, {"tags.air_flow": {"tag": "air_flow", "unit": "L/min", "bad": [-9999]}})
     scale = Scale.of("L/min", "m3/s")
     assert scale.model(-9999.0) in link.file.tags["air_flow"].rules(scale, 0.0, 1.0).bad
+
+
+MAP = """\
+time: {column: Timestamp, zone: Europe/London}
+grid: {step: 1 s, hold_at_most: 3 s}
+air_flow: {tag: FIC_101.PV, unit: L/min, bad: [Bad Input, -9999]}
+feed_flow: {tag: FIC_102.PV, unit: L/min}
+level_setpoint: {tag: LIC_201.SP, unit: mm}
+concentrate_grade: {tag: AI_401.PV, unit: "%", delay: 90 s, range: [0, 60]}
+"""
+
+
+def test_the_map_of_an_import_gives_the_tags(
+    write_link: Callable[..., Link], scenario: Scenario, tmp_path: Path
+) -> None:
+    """What the link file says of a tag goes before the map, key by key."""
+    (tmp_path / "plant.map.yaml").write_text(MAP)
+    own = {"concentrate_grade": {"stale": "5 min", "range": [5, 60]}}
+    tags = write_link(scenario, {"map": str(tmp_path / "plant.map.yaml"), "tags": own}).file.tags
+    air, grade = tags["air_flow"], tags["concentrate_grade"]
+    assert (air.tag, air.unit, air.bad) == ("FIC_101.PV", "L/min", ("Bad Input", "-9999"))
+    assert (grade.tag, grade.delay_s, grade.range, grade.stale) == ("AI_401.PV", 90.0, (5.0, 60.0), "5 min")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("tag: FIC_102.PV, unit: L/min", "constant: 10, unit: L/min", "as a constant, which a running plant does not"),
+        (", unit: mm", "", "gives no unit for 'level_setpoint'"),
+        ("unit: mm", "unit: kg", "tags.level_setpoint: unit 'kg' can not be converted"),
+        ("feed_flow: {tag: FIC_102.PV, unit: L/min}\n", "", "'feed_flow' has no tag"),
+        ("feed_flow:", "fed_flow:", "the model has no 'fed_flow'"),
+        ("zone: Europe/London", "zone: Europe/Londn", "line 1: time.zone: no time zone"),
+    ],
+)
+def test_a_map_that_does_not_do_for_a_link_is_one_line(
+    write_link: Callable[..., Link], scenario: Scenario, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    assert old in MAP
+    (tmp_path / "plant.map.yaml").write_text(MAP.replace(old, new))
+    with pytest.raises(AdaptiveFlotError, match=said) as caught:
+        write_link(scenario, {"map": str(tmp_path / "plant.map.yaml"), "tags": {}})
+    assert len(str(caught.value).splitlines()) == 1

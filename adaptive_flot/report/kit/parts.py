@@ -114,12 +114,16 @@ class Fact:
 
 @dataclass(frozen=True)
 class Section:
-    """A folded chapter: anchor, title, what is inside in a few words, and its parts."""
+    """A folded chapter: anchor, title, what is inside in a few words, its parts, and chapters within it.
+
+    Chapters beside each other are open one at a time, so that a page never grows beyond what a reader looks through.
+    """
 
     anchor: str
     title: str
     inside: str
     parts: Sequence[Part]
+    chapters: Sequence[Section] = ()
 
 
 def present(*parts: Part | None) -> list[Part]:

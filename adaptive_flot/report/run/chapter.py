@@ -9,7 +9,7 @@ from adaptive_flot.report.kit import distributions
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Bullets, Part, Picture, present
 from adaptive_flot.report.run import pictures, series, tables
-from adaptive_flot.report.run.closed_loop_figures import closed_loop_pictures
+from adaptive_flot.report.run.closed_loop_figures import operation_picture, plan_pictures
 from adaptive_flot.report.run.cramer_rao_limit import limit_part
 from adaptive_flot.report.run.fault_table import fault_table
 from adaptive_flot.report.run.inquiries import watch_section
@@ -39,7 +39,9 @@ def topics(case: CaseRuns, album: Album) -> list[Topic]:
     which = pictures.first_seed(case)
     found = []
     if case.closed_loop:
-        found.append(Topic("Operation", "inputs, limits, plans, who decided", closed_loop_pictures(case, which, album)))
+        found.append(Topic("Operation", "inputs, limits, who decided", [operation_picture(case, which, album)]))
+        if plans := plan_pictures(case, which, album):
+            found.append(Topic("Plans", "what the controller expected, and what came", plans))
     watch = watch_section(case, which, album)
     if watch is not None:
         parts = present(Bullets(watch.inquiries), watch.picture, watch.predictions)

@@ -18,14 +18,15 @@ SELDOM = 0.001
 """Share of the intervals up to which it is not shown who else decided: the first one is always the schedule's."""
 
 
-def closed_loop_pictures(case: CaseRuns, which: str, album: Album) -> list[Picture]:
-    """Operation with statuses, and plans where the controller makes any, of the first seed; `which` names it."""
+def plan_pictures(case: CaseRuns, which: str, album: Album) -> list[Picture]:
+    """Plans of each estimator's controller, where it makes any, of the first seed; `which` names it."""
     name = f"{case.scenario.name}, {case.controller}"
-    plans = [_plans(case, who, name, which, album) for who, run in case.first.items() if not run.plans.empty]
-    return [_operation(case, name, which, album), *plans]
+    return [_plans(case, who, name, which, album) for who, run in case.first.items() if not run.plans.empty]
 
 
-def _operation(case: CaseRuns, name: str, which: str, album: Album) -> Picture:
+def operation_picture(case: CaseRuns, which: str, album: Album) -> Picture:
+    """Operation with statuses, of the first seed; `which` names it."""
+    name = f"{case.scenario.name}, {case.controller}"
     limits = case.scenario.limits
     assert limits is not None
     panels = closed_loop.operation_panels(case)

@@ -119,16 +119,16 @@ def _compared(loops: Sequence[tuple[Comparison, list[CaseRuns]]], album: Album) 
 
 
 def _sections(cases: Sequence[CaseRuns], album: Album) -> list[Section]:
-    """The topics of each case: a chapter each where there is one case, else one chapter a case."""
+    """The topics of each case: a chapter each where there is one case, else one chapter a case, with theirs within."""
     sections = []
     for i, case in enumerate(cases, 1):
         found = [_fits(case, album), *topics(case, album)]
         if len(cases) == 1:
             sections += [Section(f"part-{k}", t.title, t.inside, t.parts) for k, t in enumerate(found, 1)]
             continue
-        parts = [part for t in found for part in (Heading(t.title), *t.parts)]
+        chapters = [Section(f"case-{i}-{k}", t.title, t.inside, t.parts) for k, t in enumerate(found, 1)]
         several = len({c.scenario.name for c in cases}) > 1
-        sections.append(Section(f"case-{i}", title(case, several), ", ".join(case.roles), parts))
+        sections.append(Section(f"case-{i}", title(case, several), ", ".join(case.roles), (), chapters))
     return sections
 
 

@@ -4,7 +4,6 @@
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const theme = document.getElementById("theme");
-  const unfold = document.getElementById("unfold");
   const folds = [...document.querySelectorAll("details.fold")];
 
   function kept(value) {
@@ -58,12 +57,13 @@
       if (link.hash === location.hash) open();
     });
     open();
-    unfold.hidden = folds.length === 0;
-    unfold.addEventListener("click", () => {
-      const all = folds.every((fold) => fold.open);
-      folds.forEach((fold) => (fold.open = !all));
-      unfold.textContent = all ? "Unfold all" : "Fold all";
-    });
+    /* Chapters of one name close each other: the one that opens stays in sight, though what is above it has shrunk. */
+    for (const fold of folds) {
+      fold.addEventListener("toggle", () => {
+        const { top } = fold.getBoundingClientRect();
+        if (fold.open && (top < 0 || top > innerHeight)) fold.scrollIntoView();
+      });
+    }
     const links = [...toc.querySelectorAll("a")];
     const mark = new IntersectionObserver((seen) => {
       for (const one of seen) if (one.isIntersecting) links.forEach((link) => link.classList.toggle("here", link.hash === `#${one.target.id}`));
@@ -131,6 +131,7 @@
     let before = "";
     addEventListener("beforeprint", () => {
       closed = folds.filter((fold) => !fold.open);
+      folds.forEach((fold) => ([fold.dataset.name, fold.name] = [fold.name, ""]));
       closed.forEach((fold) => (fold.open = true));
       before = root.dataset.theme ?? "";
       root.dataset.theme = "light";
@@ -140,6 +141,7 @@
     });
     addEventListener("afterprint", () => {
       closed.forEach((fold) => (fold.open = false));
+      folds.forEach((fold) => (fold.name = fold.dataset.name));
       if (before) root.dataset.theme = before;
       else delete root.dataset.theme;
       AdaptiveFlotChart.recolour();
