@@ -9,7 +9,7 @@ from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.loop import quiet_libraries, until_stopped
 from adaptive_flot.live.page.server import PageServer
 from adaptive_flot.live.requests import Inbox
-from adaptive_flot.live.running.progress import Progress
+from adaptive_flot.live.running.progress import Progress, Stage
 from adaptive_flot.live.running.run import LinkRun
 from adaptive_flot.live.store.memory import Memory, open_database
 
@@ -76,6 +76,7 @@ class Speaker:
         self._say = say
         self._faults: tuple[str, ...] = ()
         self._estimating = False
+        self._stage: Stage | None = None
 
     def __call__(self, progress: Progress) -> None:
         """Look at a cycle."""
@@ -88,6 +89,10 @@ class Speaker:
         for answered in progress.answered:
             asked = answered.request
             self._say(f"{outcome.number}: {asked.person}: {asked.action.value} {asked.about}: {answered.answer}")
+        if progress.card is not None and progress.card.stage is not self._stage:
+            self._stage = progress.card.stage
+            by = f" by {progress.card.by}" if progress.card.by else ""
+            self._say(f"{outcome.number}: extension of the model: {self._stage.value}{by}")
         if progress.found:
             self._say(f"{outcome.number}: discovery: {progress.found}")
         if outcome.faults != self._faults:

@@ -100,6 +100,7 @@ def opened(page: PageServer, folder: Path) -> Iterator[Tab]:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(program, Path(profile))
         tab = browser.open()
+        tab.call("Network.disable")  # every message of the stream would be told here too, and kept
         tab.look(1400, 900, dark=False)
         tab.go(page.address)
         token = json.dumps(token_file(folder / "certificates", "act").read_text().strip())

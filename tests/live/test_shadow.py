@@ -13,7 +13,11 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
+from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.errors import LinkError
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome
 from adaptive_flot.live.safety.modes import Mode
@@ -24,6 +28,7 @@ from adaptive_flot.live.store.beside import ShadowResult
 from adaptive_flot.live.store.memory import Memory, open_database
 from adaptive_flot.live.store.numbers import as_array, as_text
 from adaptive_flot.live.store.shadows import compare
+from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.live.desk_bench import DeskBench
 
@@ -154,6 +159,30 @@ def test_a_twin_in_shadow_makes_the_same_errors_and_is_stored_under_its_role(
     assert set(table) == {"mean air_flow decided [m3/s]", "mean level_setpoint decided [m]"}
     assert all(row.shadow == pytest.approx(row.acting, rel=0.05) for row in table.values())
     engine.dispose()
+
+
+def test_an_extended_model_starts_at_the_state_that_was_fitted_with_it(link: Link) -> None:
+    """The acting estimator's state is off by what its model lacks; the fitted one, run on, is not."""
+    scenario = link.scenario
+    effect = Effect("bubble_size", "air_flow", "linear", {"slope": 0.4}, {"reference": 1.5e-3})
+    model = scenario.model.with_effects((effect,))
+    realisation = Realisation(scenario, 1)
+    inputs = realisation.schedule[:40]
+    fitted = steady_state(model, inputs[0], model.parameter_values).state
+    truth = Stepper(model, scenario.dt).simulate(fitted, inputs, model.parameter_values, 5.0)
+    q, known = len(scenario.setup.parameters), model.parameter_values
+    values = known[model.indices("parameters", scenario.setup.parameters)]
+    off = Prior(43.0, 0.5 * truth.states[37, : len(scenario.model.states)], values, 1e-9 * np.eye(q), np.array([1e-3]))
+    plan = ShadowPlan("extended", "rpem", None, (effect,), (), (fitted, 5.0, inputs[:30]))
+    stepper = ShadowStepper(link, plan)
+    unseen = np.full(len(model.outputs), np.nan)
+    for k in (38, 39, 40):  # the last eight inputs before the start are taken to be those of row 30
+        sample = Sample(5.0 + k, inputs[min(k - 1, 29)], unseen)
+        result = stepper.step(Task(k, sample, sample.inputs, off))
+    assert result.estimate is not None
+    played = np.vstack([inputs[:30], np.repeat(inputs[29:30], 10, axis=0)])
+    expected = Stepper(model, scenario.dt).simulate(fitted, played, known, 5.0)
+    np.testing.assert_allclose(result.estimate.state, expected.states[-1], rtol=1e-9)
 
 
 def test_nothing_in_the_process_of_a_shadow_knows_how_to_write() -> None:

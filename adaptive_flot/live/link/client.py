@@ -197,7 +197,7 @@ class PlantClient:
             if name != "plant_heartbeat":
                 self._told[name] = read
         interval = 1000 * self._link.scenario.dt / self._link.file.cycle.speed
-        subscription = await client.create_subscription(min(max(interval / 5, 5.0), 500.0), self)
+        subscription = await client.create_subscription(min(max(interval / 10, 5.0), 500.0), self)
         each = ua.DataChangeFilter(ua.DataChangeTrigger.StatusValueTimestamp, ua.DeadbandType.None_, 0.0)
         await self._monitor(subscription, nodes, each)
 

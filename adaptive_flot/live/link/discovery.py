@@ -18,6 +18,7 @@ from adaptive_flot.contracts import Decision, Estimate, PlantRecord, Sample, Set
 from adaptive_flot.contracts.delayed_measurements import in_time
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.finding import Finding
 from adaptive_flot.live.link.estimation import missing
 from adaptive_flot.live.link_file import Link, load_link
@@ -54,7 +55,8 @@ def search(link_file: Path, record: Dataset, effects: tuple[Effect, ...]) -> Fin
     evidence += [f"{e.effect.label}: {e.meaning}" for e in verdict.effects]
     errors = tuple((c.output, c.unit, c.before, c.after) for c in verdict.error)
     more = (*evidence, *verdict.drift, *verdict.notes)
-    return Finding(verdict.word, verdict.reason, more, errors, extension.effects, tuple(extension.parameters.items()))
+    fitted = tuple(extension.parameters.items()), float(record.time[0]), extension.initial_state
+    return Finding(verdict.word, verdict.reason, more, errors, extension.effects, *fitted)
 
 
 class LiveDiscovery:
@@ -114,6 +116,14 @@ class LiveDiscovery:
             self._alarm = ""
             return begun
         return words
+
+    def inputs_since(self, time: float) -> FloatArray | None:
+        """Inputs of all samples after a time [s], (rows, nu); None where the record does not reach back so far."""
+        times = [step.plant.sample.time for step in self._steps]
+        if not times or times[0] > time + 1.5 * self._setup.dt:
+            return None
+        later = [step.plant.sample.inputs for step, at in zip(self._steps, times, strict=True) if at > time + 1e-9]
+        return np.vstack(later) if later else None
 
     def close(self) -> None:
         """End a search whose result nobody waits for."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.alarms import Alarms, acknowledged, after_cycle, conditions, lasting
 from adaptive_flot.live.finding import Finding
 from adaptive_flot.live.link.cycle import CycleState
@@ -40,6 +41,8 @@ class Desk:
         The model in use.
     make
         Makes what runs in shadow, in its process.
+    inputs_since
+        See `LiveDiscovery.inputs_since`.
 
     Attributes
     ----------
@@ -51,12 +54,18 @@ class Desk:
         What discovery found last; None before.
     """
 
-    def __init__(self, link: Link, use: ModelUse, make: Make = make_stepper) -> None:
+    def __init__(
+        self,
+        link: Link,
+        use: ModelUse,
+        make: Make = make_stepper,
+        inputs_since: Callable[[float], FloatArray | None] = lambda time: None,
+    ) -> None:
         self.allowed = Mode.CLOSED
         self.alarms: Alarms = {}
         self.card: Card | None = None
         self.use = use
-        self._link, self._make = link, make
+        self._link, self._make, self._inputs_since = link, make, inputs_since
         self._shadows: dict[str, Shadow] = {}
         self._lasting: dict[str, int] = {}
         self._said: dict[str, str] = {}
@@ -165,9 +174,13 @@ class Desk:
             return "there is nothing to try in shadow"
         if TRIED in self._shadows:
             self._shadows.pop(TRIED).close()
-        file = self._link.file
-        effects = (*self.use.cycle.effects, *card.finding.effects)
-        self._start(ShadowPlan(TRIED, file.estimator, file.controller, effects, card.finding.parameters))
+        file, finding = self._link.file, card.finding
+        effects = (*self.use.cycle.effects, *finding.effects)
+        played = None if finding.initial_state is None else self._inputs_since(finding.begin)
+        history = None
+        if played is not None and finding.initial_state is not None:
+            history = (finding.initial_state, finding.begin, played)
+        self._start(ShadowPlan(TRIED, file.estimator, file.controller, effects, finding.parameters, history))
         self.card = replace(card, stage=Stage.SHADOW, by=request.person)
         return "the extended model runs in shadow"
 

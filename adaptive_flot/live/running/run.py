@@ -66,7 +66,7 @@ class LinkRun:
     ) -> None:
         self.link, self.memory, self.inbox = link, memory, inbox or Inbox()
         self.use, self.discovery = ModelUse(link), LiveDiscovery(link)
-        self.desk = Desk(link, self.use)
+        self.desk = Desk(link, self.use, inputs_since=lambda time: self.discovery.inputs_since(time))
         self.state: CycleState = self.use.cycle.start(None if memory.resumed is None else memory.resumed.prior)
         self._show = show
         self._interval = link.scenario.dt / link.file.cycle.speed  # of this machine

@@ -19,6 +19,7 @@ import numpy as np
 from adaptive_flot.contracts import Decision, Estimate, Prior, Sample, TracksInputs
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.live.link.estimation import Estimation, EstimationState
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.store.beside import ShadowResult
@@ -45,6 +46,9 @@ class ShadowPlan:
         What its model has beyond the scenario's.
     parameters
         Values of adapted parameters, by full name, that were fitted with the effects.
+    history
+        State that was fitted with them (nx,), its time [s], and the inputs of the intervals since (rows, nu); None
+        where the record does not reach back so far: the acting estimator's state is carried over then.
     """
 
     role: str
@@ -52,6 +56,7 @@ class ShadowPlan:
     controller: str | None = None
     effects: tuple[Effect, ...] = ()
     parameters: tuple[tuple[str, float], ...] = ()
+    history: tuple[FloatArray, float, FloatArray] | None = None
 
 
 @dataclass(frozen=True)
@@ -129,12 +134,25 @@ class ShadowStepper:
             values[setup.parameters.index(name)] = value
         if self._nominal:
             values = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
-        if len(setup.model.states) > own:
+        if self.plan.history is not None:
+            state = self._run_on(*self.plan.history, values, task.sample.time)
+        elif len(setup.model.states) > own:
             full = setup.model.parameter_values
             full[setup.model.indices("parameters", setup.parameters)] = values
             rest = states_at_rest(setup.model, state, task.sample.inputs, full, task.sample.time)
             state = np.concatenate([state, rest])
         return replace(start, time=task.sample.time, state=state, parameters=values)
+
+    def _run_on(
+        self, fitted: FloatArray, begin: float, inputs: FloatArray, values: FloatArray, now: float
+    ) -> FloatArray:
+        """State now of the free run from the fitted one: what the model lacked has put the acting one's state off."""
+        setup = self._setup
+        rows = max(1, round((now - begin) / setup.dt))
+        played = np.vstack([inputs, np.repeat(inputs[-1:], max(0, rows - len(inputs)), axis=0)])[:rows]
+        full = setup.model.parameter_values
+        full[setup.model.indices("parameters", setup.parameters)] = values
+        return np.asarray(Stepper(setup.model, setup.dt).simulate(fitted, played, full, begin).states[-1])
 
     def _decided(self, sample: Sample, estimate: Estimate, acting: FloatArray) -> Decision | None:
         if self._controller is None:

@@ -47,7 +47,7 @@ const AdaptiveFlotSide = (() => {
   }
 
   function card({ found, words }) {
-    const said = words ? [element("p", "soft said", `Last: ${words}`)] : [];
+    const said = words && !(found && words.startsWith("search ended")) ? [element("p", "soft said", `Last: ${words}`)] : [];
     if (!found) return [element("p", "soft", "Nothing was found that the model lacks."), ...said];
     const parts = [element("p", "stage", `${found.stage}${found.by ? ` by ${found.by}` : ""}`)];
     parts.push(element("p", "reason", `${found.since === null ? "" : `At ${clock(found.since)}: `}${found.reason}`));
