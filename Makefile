@@ -49,7 +49,7 @@ docs: $(READY) ## Build the documentation site in build/docs
 	$(BIN)/python -m sphinx -q -W --keep-going -j auto -b html docs build/docs
 	@echo "Built: build/docs/index.html"
 
-live-demo: $(READY) ## Run a test plant and a live link beside it until Ctrl-C
+live-demo: $(READY) ## Run a test plant, a live link and its page until Ctrl-C
 	@$(BIN)/python -m adaptive_flot.live.demo
 
 bench: $(READY) ## Run the benchmarks

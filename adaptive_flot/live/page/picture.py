@@ -59,6 +59,7 @@ class Pictures:
         self._solved, self._solves = math.nan, False
         self._plan: Plan | None = None
         self._said = ""
+        self._offset = math.nan
         self._outputs: tuple[Model, FastCall] | None = None
 
     def spec(self) -> dict[str, Any]:
@@ -81,6 +82,8 @@ class Pictures:
         told = progress.snapshot.time
         self._time = told if math.isfinite(told) else self._time + self.link.scenario.dt
         self._said = progress.found.split("\n")[0][:MOST_SAID] or self._said
+        if progress.outcome.sample is not None:
+            self._offset = self._time - progress.outcome.sample.time
         self._take(progress)
         states = self._states(progress)
         row = [plain(self._time, 14), *self.axes.row(progress), *states]
@@ -98,13 +101,13 @@ class Pictures:
                 {
                     "key": a.key,
                     "words": a.words,
-                    "since": plain(self._clock(a.since, progress), 14),
+                    "since": plain(self._clock(a.since), 14),
                     "active": a.active,
                     "by": a.acknowledged,
                 }
                 for a in progress.alarms.values()
             ],
-            "card": None if progress.card is None else self._card(progress.card, progress),
+            "card": None if progress.card is None else self._card(progress.card),
             "discovery": self._said,
             "shadows": [self._shadow(v) for v in progress.shadows.values()],
             "plan": self._planned(progress),
@@ -128,10 +131,9 @@ class Pictures:
         """Age of the last good solve [s]."""
         return plain(self._time - self._solved)
 
-    def _clock(self, record_time: float, progress: Progress) -> float:
+    def _clock(self, record_time: float) -> float:
         """A time of the record by the plant's clock [s]."""
-        sample = progress.outcome.sample
-        return math.nan if sample is None else record_time - sample.time + self._time
+        return record_time + self._offset
 
     def _states(self, progress: Progress) -> list[str]:
         decision, checks = progress.outcome.decision, progress.outcome.checks
@@ -202,10 +204,10 @@ class Pictures:
             found.append({"name": name.replace("_", " "), "state": state, "age": plain(age)})
         return found
 
-    def _card(self, card: Card, progress: Progress) -> dict[str, Any]:
+    def _card(self, card: Card) -> dict[str, Any]:
         finding = card.finding
         return {
-            "since": plain(self._clock(card.since, progress), 14),
+            "since": plain(self._clock(card.since), 14),
             "word": finding.word,
             "reason": finding.reason,
             "evidence": list(finding.evidence),
@@ -261,5 +263,5 @@ class Pictures:
     def _planned(self, progress: Progress) -> dict[str, Any] | None:
         if self._plan is None or progress.outcome.sample is None:
             return None
-        ends = [plain(self._clock(float(t), progress), 14) for t in self._plan.time]
+        ends = [plain(self._clock(float(t)), 14) for t in self._plan.time]
         return {"time": ends, "values": self.axes.plan(self._plan)}
