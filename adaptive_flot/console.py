@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -57,6 +57,14 @@ def stage_bar(label: str) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(label, total=None)
         yield lambda stage: progress.update(task, advance=1, description=f"{label}: {stage}")
+
+
+def print_sentences(sentences: Iterable[str]) -> None:
+    """Print sentences, each on lines of its own."""
+    console = standard_output()
+    for sentence in sentences:
+        console.print(sentence, highlight=False)
+    console.file.flush()
 
 
 def print_verdict(verdict: Verdict) -> None:

@@ -31,7 +31,7 @@ def run(
     compile_: Compile = False,
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
-    from adaptive_flot.console import print_closed_loop, print_fits, progress_bar
+    from adaptive_flot.console import print_closed_loop, print_fits, print_sentences, progress_bar
     from adaptive_flot.errors import ScenarioError
     from adaptive_flot.processes.registry import read_measurements
     from adaptive_flot.records.tag_map import load_tag_map
@@ -51,8 +51,7 @@ def run(
     who = once(estimator), once(controller)
     folder = results_folder(out, loaded.name, "run")
     check_targets(scenario_inputs(loaded, *who), [*in_folder(folder, "summary.json", "report.html"), ("--json", json)])
-    for said in dict.fromkeys(played.said for played in loaded.recorded.values()):
-        typer.echo(f"Inputs of {said}")
+    print_sentences(dict.fromkeys(f"Inputs of {played.said}" for played in loaded.recorded.values()))
     count = len(loaded.combinations(*who)) * len(once(seed) or set(loaded.file.seeds))
     with progress_bar(loaded.name, count) as advance:
         runs = run_scenario(loaded, who[0], once(seed), advance, who[1])

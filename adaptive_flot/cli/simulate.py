@@ -60,6 +60,7 @@ def _simulate_draws(
 ) -> None:
     from dataclasses import replace
 
+    from adaptive_flot.console import print_sentences
     from adaptive_flot.files import write_text
     from adaptive_flot.greybox.data.dataset import read_dataset
     from adaptive_flot.greybox.data.tables import check_table_path, write_table
@@ -90,6 +91,5 @@ def _simulate_draws(
         write_text(report, page)
     if json is not None:
         write_json(json, summary(made, ranked))
-    for sentence in sentences(made, ranked):
-        typer.echo(sentence)
+    print_sentences(sentences(made, ranked))
     typer.echo(f"{len(made.values)} draws: {', '.join(str(p) for p in (out, report, json) if p is not None)}")

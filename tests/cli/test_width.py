@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from adaptive_flot.console import print_comparison
+from adaptive_flot.console import print_comparison, print_sentences
 from adaptive_flot.console_tables import fitted, print_table
 from adaptive_flot.report.compare.tables import compare_tables
 from adaptive_flot.report.kit.parts import Table
@@ -54,3 +54,9 @@ def test_every_cell_is_printed_whole(cells: list[str], width: int) -> None:
     assert all(cell in text for cell in cells)
     shown = [h for part in fitted(content, width) for h in part.header if h != "Estimator"]
     assert shown == list(header[1:])
+
+
+def test_sentences_of_any_length_are_wrapped(capsys: pytest.CaptureFixture[str]) -> None:
+    print_sentences(["word " * 60, "[bold] is text"])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= WIDTH and lines[-1] == "[bold] is text"
