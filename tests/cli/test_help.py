@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -39,9 +40,11 @@ def test_help_lists_every_command(call: Call) -> None:
 
 def test_scenarios_lists_each_shipped_one_with_its_description(call: Call) -> None:
     result = call("scenarios")
-    lines = dict(line.split(maxsplit=1) for line in result.out.splitlines())
+    listed = re.sub(r"\n +", " ", result.out)
+    lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
     assert result.code == 0 and set(lines) == set(shipped_scenarios())
     assert all(len(text) > 20 for text in lines.values())
+    assert max(map(len, result.out.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("arguments", [["run"], ["nope"], ["run", "x", "--nope"], ["simulate", "x.csv"]])
