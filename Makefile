@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo live-demo test browser postgresql check format docs bench bench-discovery bench-discovery-quick bench-live bench-measured lock clean
+.PHONY: help install demo live-demo test browser postgresql check format docs bench bench-discovery bench-discovery-quick bench-live bench-lanes bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -63,6 +63,9 @@ bench-discovery-quick: $(READY) ## The same on the first 30 records, one rival (
 
 bench-live: $(READY) ## The live link under faults: unsafe writes, lost rows, times (minutes)
 	@$(BIN)/python -m benchmarks.live $(BENCH_ARGS)
+
+bench-lanes: $(READY) ## Many members side by side, beside SciPy and (BENCH_ARGS="--jax PYTHON") JAX (minutes)
+	@$(BIN)/python -m benchmarks.lanes $(BENCH_ARGS)
 
 bench-measured: $(READY) ## Discovery on measured records and shared examples in ../shared (minutes)
 	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)

@@ -11,6 +11,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from adaptive_flot.contracts import Setup, full_parameters
 from adaptive_flot.errors import DataError, RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.ensemble.one_member import OneMember
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -42,7 +43,8 @@ class FreeRuns:
     def __init__(self, setup: Setup, initial_state: InitialState, free: Sequence[str] | None) -> None:
         self.setup, self.initial_state = setup, initial_state
         self.columns = setup.model.indices("outputs", setup.outputs)
-        self.simulator = RecordSimulator(setup.model, setup.dt)
+        quick = OneMember.where_compiled(setup.model, setup.dt)
+        self.simulator = RecordSimulator(setup.model, setup.dt, stepper=quick)
         names = setup.model.names("states") if free is None else free
         self._free = setup.model.indices("states", names) if initial_state == "estimated" else []
 

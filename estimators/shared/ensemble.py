@@ -43,7 +43,9 @@ def samples_of(record: EnsembleRecord, member: int) -> list[Sample]:
     ]
 
 
+_BY_CODE = np.array([Status.MISSING, Status.OK, Status.PROJECTED], dtype=object)
+
+
 def statuses(projected: Flags, present: Flags) -> tuple[Status, ...]:
     """Status of each sample (N,), whose result is finite."""
-    pairs = zip(projected.tolist(), present.tolist(), strict=True)
-    return tuple(Status.PROJECTED if moved else Status.OK if there else Status.MISSING for moved, there in pairs)
+    return tuple(_BY_CODE[np.where(projected, 2, present)].tolist())

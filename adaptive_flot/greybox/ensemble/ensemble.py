@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.ensemble.instruction_sets import InstructionSet
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -75,6 +76,8 @@ class Ensemble:
         Sampling interval [s].
     substeps
         Steps an interval of the fast method; default as many as the model's `max_step_s` asks for.
+    instructions
+        Instruction set of the machine code; default the widest of this machine.
 
     Raises
     ------
@@ -82,7 +85,14 @@ class Ensemble:
         `dt` or `substeps` is not positive.
     """
 
-    def __init__(self, model: Model, dt: float, *, substeps: int | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        dt: float,
+        *,
+        substeps: int | None = None,
+        instructions: InstructionSet | None = None,
+    ) -> None:
         if not (np.isfinite(dt) and dt > 0 and (substeps is None or substeps >= 1)):
             raise ModelError(f"an ensemble needs dt > 0 and substeps >= 1, got dt = {dt}, substeps = {substeps}")
         self.model, self.dt = model, float(dt)
@@ -90,6 +100,7 @@ class Ensemble:
         # steps too many for one function are rows of their own, as in `Stepper`
         self._rows_each = count if count > MOST_UNROLLED else 1
         self._interval = Interval(self.dt / self._rows_each, count // self._rows_each)
+        self._instructions = instructions
         self._lanes: FunctionCache[Lanes] = FunctionCache()
 
     def step(
@@ -195,7 +206,8 @@ class Ensemble:
         matrices: Collection[str] = (),
     ) -> Lanes:
         function = self.model.derived(builder, self._interval, *more)
-        return Lanes(function, carried, matrices, as_machine_code=self.model.compiled)
+        quick = self.model.compiled
+        return Lanes(function, carried, matrices, as_machine_code=quick, instructions=self._instructions)
 
     def _tables(
         self, x0: FloatArray, inputs: FloatArray, parameters: FloatArray | None, t0: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,27 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.nodes import Nodes, NodeStepper
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
+
+
+class SimulatesRecords(Protocol):
+    """What simulates N intervals, as `Stepper` does."""
+
+    def simulate(self, x0: FloatArray, inputs: FloatArray, parameters: FloatArray, t0: float = 0.0) -> Trajectory:
+        """States, outputs and signals."""
+        ...
+
+    def simulate_sensitivities(
+        self,
+        x0: FloatArray,
+        inputs: FloatArray,
+        parameters: FloatArray,
+        wrt: Sequence[str],
+        x0_gradient: FloatArray,
+        t0: float = 0.0,
+    ) -> Sensitivities:
+        """Outputs with their derivatives."""
+        ...
 
 
 class RecordSimulator:
@@ -25,11 +47,16 @@ class RecordSimulator:
         Sampling interval of the records [s].
     nodes
         Rows of the one record to simulate; those between are interpolated. Default all.
+    stepper
+        What simulates all rows in the place of a `Stepper`.
     """
 
-    def __init__(self, model: Model, dt: float, nodes: Nodes | None = None) -> None:
+    def __init__(
+        self, model: Model, dt: float, nodes: Nodes | None = None, stepper: SimulatesRecords | None = None
+    ) -> None:
         self.model, self.nodes = model, nodes
-        self.stepper = Stepper(model, dt) if nodes is None else NodeStepper(model)
+        usual = Stepper(model, dt) if nodes is None else NodeStepper(model)
+        self.stepper: SimulatesRecords = usual if stepper is None else stepper
         self._first = FastCall(model.derived(_first_row))
 
     def outputs(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:

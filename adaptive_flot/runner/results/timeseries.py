@@ -50,8 +50,8 @@ def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.D
 
 
 def _inputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
-    known = np.vstack([s.plant.sample.inputs for s in steps])
-    acted = np.vstack([s.plant.inputs for s in steps])
+    known = np.array([s.plant.sample.inputs for s in steps])
+    acted = np.array([s.plant.inputs for s in steps])
     columns: dict[str, object] = {}
     for j, q in enumerate(scenario.model.inputs):
         columns[q.column] = known[:, j]
@@ -64,12 +64,12 @@ def _outputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
     model, setup = scenario.model, scenario.setup
     estimates = [s.estimate for s in steps]
     columns: dict[str, object] = {}
-    true = np.vstack([s.plant.outputs for s in steps])
-    measured = np.vstack([s.outputs for s in in_time([s.plant.sample for s in steps], setup)])
+    true = np.array([s.plant.outputs for s in steps])
+    measured = np.array([s.outputs for s in in_time([s.plant.sample for s in steps], setup)])
     unknown = np.full(len(model.outputs), np.nan)
-    predicted = np.vstack([e.prediction if e else unknown for e in estimates])
-    innovation = np.vstack([s.outputs for s in in_time(innovations(steps), setup)])
-    expected = np.vstack([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
+    predicted = np.array([e.prediction if e else unknown for e in estimates])
+    innovation = np.array([s.outputs for s in in_time(innovations(steps), setup)])
+    expected = np.array([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
     for j, q in enumerate(model.outputs):
         columns[f"{q.column}_true"] = true[:, j]
         columns[f"{q.column}_predicted"] = predicted[:, j]
@@ -97,9 +97,9 @@ def _adapted(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[st
     estimates = [s.estimate for s in steps]
     columns: dict[str, object] = {}
     blank = np.full(len(setup.parameters), np.nan)
-    true = np.vstack([s.plant.parameters for s in steps])
-    theta = np.vstack([e.parameters if e else blank for e in estimates])
-    std = np.vstack([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
+    true = np.array([s.plant.parameters for s in steps])
+    theta = np.array([e.parameters if e else blank for e in estimates])
+    std = np.array([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
     for name in scenario.setup.parameters:
         label = model.parameters[model.index("parameters", name)].label
         columns[f"{label}_true"] = _column(true, plant, name)
@@ -136,9 +136,9 @@ def _others(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str
     plant, model = scenario.plant_model, setup.model
     measured = [scenario.model.parameters[i] for i in scenario.measured_parameters]
     moved = [plant.parameters[plant.index("parameters", name)] for name, _ in scenario.moving_parameters]
-    true = np.vstack([s.plant.parameters for s in steps])
+    true = np.array([s.plant.parameters for s in steps])
     blank = np.full(len(model.parameters), np.nan)
-    known = np.vstack([blank if s.plant.sample.parameters is None else s.plant.sample.parameters for s in steps])
+    known = np.array([blank if s.plant.sample.parameters is None else s.plant.sample.parameters for s in steps])
     columns: dict[str, object] = {}
     for p in dict.fromkeys((*moved, *measured)):
         if p.name not in scenario.setup.parameters:

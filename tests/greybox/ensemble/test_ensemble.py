@@ -12,6 +12,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
 from adaptive_flot.greybox.ensemble.instruction_sets import AVX2, AVX512, InstructionSet, supported
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
+from adaptive_flot.greybox.ensemble.one_member import OneMember
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping import compiled as compiled_functions
@@ -50,6 +51,22 @@ def test_records_of_the_cell(model: Model, compiled: bool) -> None:
         for what in ("states", "outputs", "signals"):
             np.testing.assert_allclose(getattr(run, what)[m], getattr(expected, what), rtol=1e-12)
         np.testing.assert_array_equal(run.last_state[m], run.states[m, -1])
+
+
+@needs_compiler
+def test_one_member_is_the_compiled_stepper_to_the_bit(model: Model) -> None:
+    """A fit of a compiled model gives the numbers that it gave before, in less time."""
+    quick = replace(model, compiled=True)
+    x, u, p = cell_members(model)
+    one, stepper = OneMember.where_compiled(quick, 1.0), Stepper(quick, 1.0)
+    assert one is not None and OneMember.where_compiled(model, 1.0) is None
+    found, expected = (s.simulate(x[0], u[0], p[0], 3.0) for s in (one, stepper))
+    for what in ("time", "states", "outputs", "signals"):
+        np.testing.assert_array_equal(getattr(found, what), getattr(expected, what))
+    start = np.ones((len(model.states), 2))
+    one_way, other = (s.simulate_sensitivities(x[0], u[0], p[0], NAMES, start, 3.0) for s in (one, stepper))
+    for what in ("outputs", "gradient", "last_state", "last_state_gradient"):
+        np.testing.assert_array_equal(getattr(one_way, what), getattr(other, what))
 
 
 @needs_compiler
