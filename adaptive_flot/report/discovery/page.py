@@ -33,7 +33,7 @@ TITLES = {
     "class": "one of a few effects is missing",
     "unnamed": "a missing effect without a name",
     "insufficient": "the record does not say enough",
-    "abstain": "something is missing, but not told what",
+    "abstain": "something is missing, and the record does not tell what",
 }
 
 

@@ -26,14 +26,14 @@ TITLES = {
     "none": "nothing has changed that the records show",
     "named": "what has changed, by name",
     "class": "one of a few parts has changed",
-    "abstain": "something has changed, but not told what",
+    "abstain": "something has changed, and the records do not tell what",
     "insufficient": "the records do not say enough",
 }
 WITHOUT_REFERENCE = {
     "none": "no effect is missing",
     "named": "a missing effect, by name",
     "class": "one of a few effects is missing",
-    "abstain": "something is missing, but not told what",
+    "abstain": "something is missing, and the records do not tell what",
     "insufficient": "the records do not say enough",
 }
 

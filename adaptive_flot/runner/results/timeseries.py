@@ -99,7 +99,8 @@ def _adapted(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[st
     blank = np.full(len(setup.parameters), np.nan)
     true = np.array([s.plant.parameters for s in steps])
     theta = np.array([e.parameters if e else blank for e in estimates])
-    std = np.array([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
+    with np.errstate(invalid="ignore"):  # a variance that rounding has made negative says nothing: NaN
+        std = np.array([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
     for name in scenario.setup.parameters:
         label = model.parameters[model.index("parameters", name)].label
         columns[f"{label}_true"] = _column(true, plant, name)
