@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import signal
 from collections.abc import AsyncIterator
@@ -15,6 +16,12 @@ def quiet_libraries() -> None:
     """The logs of asyncua and uvicorn repeat what this program says in its own words, or what strangers send."""
     for name in ("asyncua", "uvicorn"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def settle() -> None:
+    """Leave what the start has made out of later garbage collections: one over all of it would stop a cycle."""
+    gc.collect()
+    gc.freeze()
 
 
 @asynccontextmanager

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 from adaptive_flot.live.link_file import Link
-from adaptive_flot.live.loop import quiet_libraries, until_stopped
+from adaptive_flot.live.loop import quiet_libraries, settle, until_stopped
 from adaptive_flot.live.page.server import PageServer
 from adaptive_flot.live.requests import Inbox
 from adaptive_flot.live.running.progress import Progress, Stage
@@ -43,6 +43,7 @@ def live(link: Link, say: Callable[[str], None] = print, cycles: int | None = No
             shows = (speaker, page.show)
             say(f"Page: {page.address}")
         run = LinkRun(link, memory, lambda progress: _show(shows, progress), inbox)
+        settle()
         asyncio.run(_run(run, cycles))
         say(f"Session {memory.session}: ended after {run.state.number} cycles; control is with the plant")
     finally:

@@ -23,7 +23,7 @@ from asyncua import ua
 from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.live.certificates import token_file
 from adaptive_flot.live.link_file import Link, load_link
-from adaptive_flot.live.loop import quiet_libraries
+from adaptive_flot.live.loop import quiet_libraries, settle
 from adaptive_flot.live.page.server import PageServer
 from adaptive_flot.live.plant.direct import DirectPlant
 from adaptive_flot.live.plant.link_text import link_text
@@ -143,7 +143,9 @@ def latency_figures(folder: Path, scenario: str, speed: float, seconds: float) -
         memory = Memory(open_database(link.file.database, folder), link)
         event = asyncio.Event()
         stop.append((asyncio.get_running_loop(), event))
-        await LinkRun(link, memory, show, inbox).run(event)
+        linked_run = LinkRun(link, memory, show, inbox)
+        settle()
+        await linked_run.run(event)
         memory.close()
 
     linked = threading.Thread(target=lambda: asyncio.run(run()))

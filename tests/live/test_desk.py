@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,11 +16,12 @@ from adaptive_flot.live.finding import Finding
 from adaptive_flot.live.link.replay import replay
 from adaptive_flot.live.link_file import TRIED, Link
 from adaptive_flot.live.requests import Action, Inbox, Request
-from adaptive_flot.live.running.desk import FEWEST_ROWS
+from adaptive_flot.live.running.desk import FEWEST_ROWS, ITSELF
 from adaptive_flot.live.running.progress import Stage
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.memory import Memory, open_database
+from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.live.desk_bench import DeskBench
 
 EFFECT = Effect("bubble_size", "air_flow", "linear", {"slope": 0.2}, {"reference": 1.5e-3})
@@ -91,10 +93,10 @@ def test_the_inbox_takes_no_more_than_it_holds() -> None:
     assert sum(taken) == len(inbox.take()) < 100 and inbox.take() == []
 
 
-async def tried(bench: DeskBench) -> None:
-    """Intervals until the extended model has run long enough in shadow, and one that it would be applied in."""
+async def tried(bench: DeskBench, rows: int = FEWEST_ROWS) -> None:
+    """Intervals until the extended model has run so long in shadow."""
     limit = time.monotonic() + 120
-    while bench.desk.shadows()[TRIED].compared.rows < FEWEST_ROWS:
+    while bench.desk.shadows()[TRIED].compared.rows < rows:
         bench.interval()
         await asyncio.sleep(0.02)
         assert time.monotonic() < limit, bench.desk.shadows()[TRIED]
@@ -157,16 +159,37 @@ def test_a_person_tries_applies_and_reverts_an_extension_and_all_of_it_replays(l
     engine.dispose()
 
 
-def test_the_link_applies_by_itself_only_where_its_file_says_so(
-    write_link: Callable[..., Link], write_live_scenario: Callable[..., object]
+@pytest.mark.parametrize(
+    ("extend", "slope", "stage"),
+    [("by a person", 0.0, Stage.FOUND), ("by itself", 0.0, Stage.APPLIED), ("by itself", 1.5, Stage.SHADOW)],
+)
+def test_the_link_applies_by_itself_only_what_its_file_lets_it_and_what_predicts_no_worse(
+    write_link: Callable[..., Link],
+    write_live_scenario: Callable[..., Scenario],
+    extend: str,
+    slope: float,
+    stage: Stage,
 ) -> None:
-    scenario = write_live_scenario({"discovery": {"delay_s": 40}})
-    for extend, stage in (("by a person", Stage.FOUND), ("by itself", Stage.SHADOW)):
-        bench = DeskBench(write_link(scenario, {"controller": "pi", "extend": extend}))
-        try:
-            bench.to_closed()
-            bench.finding = FOUND
+    delay = 60
+    scenario = write_live_scenario({"discovery": {"delay_s": delay}})
+    bench = DeskBench(write_link(scenario, {"controller": "pi", "extend": extend}))
+
+    async def run() -> None:
+        bench.to_closed()
+        bench.finding = replace(FOUND, effects=(replace(EFFECT, coefficients={"slope": slope}),))
+        if stage is Stage.FOUND:
+            bench.run(2 * delay)
+        elif stage is Stage.SHADOW:
             bench.run(3)
-            assert bench.desk.card is not None and bench.desk.card.stage is stage
-        finally:
-            bench.desk.close()
+            await tried(bench, 2 * delay)
+        else:
+            await went(bench, stage)
+
+    try:
+        asyncio.run(run())
+        card = bench.desk.card
+        assert card is not None and card.stage is stage
+        if stage is Stage.APPLIED:
+            assert card.by == ITSELF and all(after <= 1.02 * before for _, before, after in card.errors)
+    finally:
+        bench.desk.close()

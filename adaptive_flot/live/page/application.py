@@ -154,8 +154,7 @@ class PageApplication:
         if listener is None:
             return PlainTextResponse("refused: too many browsers listen", 503)
         who = {"name": session.name, "may": session.role.value, "csrf": session.csrf}
-        valid: Callable[[], bool] = lambda: self._access.session(key) is not None  # noqa: E731
-        return _Stream(self._hub, listener, who, valid)
+        return _Stream(self._hub, listener, who, lambda: self._access.session(key) is not None)
 
     def _session(self, request: HttpRequest) -> Session | None:
         return self._access.session(request.cookies.get(COOKIE))
