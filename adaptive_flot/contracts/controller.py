@@ -120,8 +120,8 @@ class ControllerSetup:
 class Controller(Protocol[State]):
     """Chooses the inputs of the next interval. Made by `Name(setup, **options)`.
 
-    One that uses neither sample nor estimate may say `open_loop = True`: runs of many seeds may then go side by side,
-    and both are None at every decision.
+    One that uses neither sample nor estimate may say `open_loop = True` in its class; it is not inherited. Runs of many
+    seeds may then go side by side, and both are None at every decision.
     """
 
     def init(self, time: float) -> State:

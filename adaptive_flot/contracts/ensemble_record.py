@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
@@ -42,10 +42,18 @@ class EnsembleRecord:
         ]
 
 
-@runtime_checkable
 class TracksEnsembles(Protocol):
     """An estimator that tracks many members at once, each as `track` or `update` would alone (to 1e-9)."""
 
     def track_ensemble(self, states: Sequence[Any], record: EnsembleRecord) -> list[tuple[Any, Track]]:
         """State after the last sample, and the estimates, of each member; `states` are those before the first."""
         ...
+
+
+def tracks_ensembles(estimator: object) -> TypeGuard[TracksEnsembles]:
+    """Whether an estimator tracks ensembles as it updates: not where a derived class has an `update` of its own."""
+    first = {
+        name: next((c for c in type(estimator).__mro__ if name in vars(c)), None)
+        for name in ("update", "track_ensemble")
+    }
+    return first["track_ensemble"] is not None and first["update"] is first["track_ensemble"]

@@ -14,7 +14,7 @@ import numpy as np
 
 from adaptive_flot.contracts import AnyController, Decision, Estimate, PlantRecord, Sample, Setup
 from adaptive_flot.contracts.batch import BatchFit
-from adaptive_flot.contracts.ensemble_record import EnsembleRecord, TracksEnsembles
+from adaptive_flot.contracts.ensemble_record import EnsembleRecord, tracks_ensembles
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.ensemble.ensemble import EnsembleRun
 from adaptive_flot.greybox.model import FloatArray
@@ -48,9 +48,10 @@ def can_go_side_by_side(prepared: Prepared, estimator: str, controller: str, fir
     if not (scenario.model.compiled and plain and prepared.shares_fit(estimator)):
         return False
     setup = prepared.setup(estimator, first)
-    if setup.truth is not None or not isinstance(prepared.estimator(estimator, first), TracksEnsembles):
+    if setup.truth is not None or not tracks_ensembles(prepared.estimator(estimator, first)):
         return False
-    return bool(getattr(prepared.controller(controller, first, setup), "open_loop", False))
+    # of the class itself: one that is derived from it may well look at the estimate
+    return bool(vars(type(prepared.controller(controller, first, setup))).get("open_loop", False))
 
 
 def run_side_by_side(
@@ -167,7 +168,7 @@ def _estimated(
     if not started or rows >= len(scenario.starts):
         tracks: list[Track | None] = [None] * len(started)
     else:
-        assert isinstance(estimator, TracksEnsembles)
+        assert tracks_ensembles(estimator)
         tracks = [track for _, track in estimator.track_ensemble(states, _record(started, rows))]
     for member, track in zip(started, tracks, strict=True):
         fit = initial[member.place]["fit"]

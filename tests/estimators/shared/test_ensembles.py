@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.contracts import Prior, Sample, Setup, Status
-from adaptive_flot.contracts.ensemble_record import EnsembleRecord, TracksEnsembles
+from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.ensemble_record import EnsembleRecord, tracks_ensembles
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady_state import steady_state
@@ -18,7 +18,9 @@ from adaptive_flot.greybox.stepping import compiled
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.ekf import Ekf
+from estimators.fixed import Fixed
 from estimators.rpem import Rpem, rpem_full
+from estimators.rpem.state import RpemState
 from tests.estimators.toys import decay
 
 Make = Callable[[Setup], Any]
@@ -76,7 +78,7 @@ def alone(estimator: Any, state: Any, record: EnsembleRecord, member: int) -> tu
 
 def same_as_alone(estimator: Any, priors: list[Prior], record: EnsembleRecord) -> list[Track]:
     """Estimates, statuses, and the state that the next sample needs."""
-    assert isinstance(estimator, TracksEnsembles)
+    assert tracks_ensembles(estimator)
     states = [estimator.init(prior) for prior in priors]  # type: ignore[attr-defined]
     tracks = []
     for m, (state, track) in enumerate(estimator.track_ensemble(states, record)):
@@ -122,6 +124,23 @@ def test_what_is_known_of_parameters_is_used(name: str) -> None:
 
 def _first(prior: Prior) -> Prior:
     return replace(prior, parameters=prior.parameters[:1], covariance=prior.covariance[:1, :1])
+
+
+class Other(Rpem):
+    """It updates in a way of its own, which the lanes of the class it is derived from know nothing of."""
+
+    def update(self, state: RpemState, sample: Sample) -> tuple[RpemState, Estimate]:
+        return super().update(state, sample)
+
+
+class Named(Rpem):
+    """It changes nothing of the update."""
+
+
+def test_an_update_of_its_own_is_not_passed_over() -> None:
+    setup = Setup(decay(), 0.5, ("a", "b"), ("y",))
+    assert tracks_ensembles(Rpem(setup)) and tracks_ensembles(Named(setup))
+    assert not tracks_ensembles(Other(setup)) and not tracks_ensembles(Fixed(setup))
 
 
 @needs_compiler

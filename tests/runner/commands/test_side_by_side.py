@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from pandas.testing import assert_frame_equal
 
+from adaptive_flot.contracts import Decision, Estimate, Sample
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.stepping import compiled
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
@@ -22,7 +24,7 @@ from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
-from controllers.schedule import Schedule
+from controllers.schedule import Schedule, ScheduleState
 from tests.runner.conftest import WriteScenario
 
 PROBLEM = compiler_problem()
@@ -111,9 +113,13 @@ def test_the_command_takes_seeds_together_where_it_may(
 
 
 class Watching(Schedule):
-    """An open loop that does not say so."""
+    """One that looks at the estimate, made from one that does not: it does not inherit what that one says."""
 
-    open_loop = False
+    def decide(
+        self, state: ScheduleState, sample: Sample | None, estimate: Estimate | None
+    ) -> tuple[ScheduleState, Decision]:
+        state, decision = super().decide(state, sample, estimate)
+        return state, decision if estimate is None else replace(decision, inputs=decision.inputs * 1.0001)
 
 
 @pytest.mark.parametrize(
