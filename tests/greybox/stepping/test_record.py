@@ -7,6 +7,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.greybox.stepping.stepper import Stepper
 
 ROWS = 40
 
@@ -27,13 +28,13 @@ def test_row_k_holds_the_inputs_of_the_interval_that_ends_there(
     model: Model, record: Dataset, start: FloatArray
 ) -> None:
     """Row 0: outputs of the initial state with the inputs of row 0; row k: after a step with the inputs of row k."""
-    simulator, p = RecordSimulator(model, 1.0), model.parameter_values
+    simulator, stepper, p = RecordSimulator(model, 1.0), Stepper(model, 1.0), model.parameter_values
     outputs = simulator.outputs(record, start, p)
     ny = len(model.outputs)
-    np.testing.assert_allclose(outputs[0], simulator.stepper.outputs_at(start, 100.0, record.inputs[0], p)[:ny])
+    np.testing.assert_allclose(outputs[0], stepper.outputs_at(start, 100.0, record.inputs[0], p)[:ny])
     x = start
     for k in range(1, ROWS):
-        x, y, _ = simulator.stepper.call(x, 99.0 + k, record.inputs[k], p)
+        x, y, _ = stepper.call(x, 99.0 + k, record.inputs[k], p)
         np.testing.assert_allclose(outputs[k], y, rtol=1e-12)
     np.testing.assert_allclose(simulator.last_state(record, start, p), x, rtol=1e-12)
 
