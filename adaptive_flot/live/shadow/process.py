@@ -93,8 +93,7 @@ class Shadow:
             return
         try:
             self._connection.send(task)
-        except OSError:
-            self._end("")
+        except OSError:  # it has ended: `collect` reads its last words
             return
         self._behind += 1
 
