@@ -21,14 +21,12 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.rows import noise_floor
 from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, is_short
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
 LACKING = ("lag", "store", "depends", "sign")
 """Kinds of effects that a model may lack on its reference."""
-MOST_WORK = 4_000
-"""Rows times states up to which events are looked for."""
 
 
 @one_thread()
@@ -49,7 +47,7 @@ def find_changes(
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
     if not references or len(records) != 1 or compared.verdict.word == "insufficient":
         return compared
-    if len(records[0]) * len(model.states) > MOST_WORK:
+    if not is_short(records[0], model):
         return compared
     reference = max(references, key=len)
     with np.errstate(all="ignore"):

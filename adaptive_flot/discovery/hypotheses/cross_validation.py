@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint_fit import MOST_EVALUATIONS, JointFit, JointFitter
-from adaptive_flot.discovery.hypotheses.known_before import Constants, first_states
+from adaptive_flot.discovery.hypotheses.known_before import Constants, first_states, stores_at_rest
 from adaptive_flot.discovery.hypotheses.rows import TAIL, BoolArray, Rows
 from adaptive_flot.greybox.model import FloatArray, Model
 
@@ -122,7 +122,7 @@ def fit_all_rows(
     """
     extended = model_with(model, hypothesis)
     own = hypothesis.parameters if hypothesis else ()
-    initial = [_with_effect_states(extended, hypothesis, x) for x in first_states(model, rows.records)]
+    initial = [_with_effect_states(extended, x) for x in first_states(model, rows.records)]
     fitter = JointFitter(extended, rows, constants, own, initial)
     fit = (
         fitter.fit(fitter.start())
@@ -263,12 +263,6 @@ def refined(model: Model, rows: Rows, first: Fitted, refresh: int = REFRESH) -> 
     return replace(first, fit=fit) if fit.cost <= first.fit.cost else first
 
 
-def _with_effect_states(model: Model, hypothesis: Hypothesis | None, x: FloatArray) -> FloatArray:
-    """Initial state (nx,) with those of the effect behind: a hidden store starts where its balance stands."""
-    further = len(model.states) - len(x)
-    if not further or hypothesis is None:
-        return x
-    start = 1.0
-    if hypothesis.kind == "store":
-        start = float(x[model.index("states", hypothesis.driver)])
-    return np.concatenate([x, np.full(further, start)])
+def _with_effect_states(model: Model, x: FloatArray) -> FloatArray:
+    """Initial state (nx,) with those of the effect behind: a lag starts where it follows, a store at rest."""
+    return stores_at_rest(model, np.concatenate([x, np.ones(len(model.states) - len(x))]))

@@ -39,6 +39,8 @@ LEAST_MOVE = 1e-3
 """A driver that moves by a smaller share of its size can not be told from a constant."""
 ROUNDING = 1e-3
 """Rounding of corners, as a share of the range of the value."""
+FOREVER = 1e7
+"""Duration [s] of what is switched on and stays on."""
 
 
 @dataclass(frozen=True)

@@ -60,9 +60,9 @@ def scattered_starts(model: Model, constants: Constants) -> list[FloatArray]:
     return starts
 
 
-def _stores_at_rest(model: Model, x: FloatArray) -> FloatArray:
-    """The state (nx,) with every hidden store where its balance stands."""
-    names = model.names("states")
+def stores_at_rest(model: Model, state: FloatArray) -> FloatArray:
+    """A state (nx,), copied, with every hidden store where its balance stands."""
+    names, x = model.names("states"), state.copy()
     for effect in model.effects:
         if effect.form == "store" and effect.driver in names:
             x[names.index(f"{effect.label}.store")] = x[names.index(effect.driver)]
@@ -79,5 +79,5 @@ def first_states(model: Model, records: Sequence[Dataset]) -> tuple[FloatArray, 
         elif model.starts_steady:
             with suppress(RangeError):
                 guess = steady_state(model, record.inputs[0], model.parameter_values).state
-        states.append(_stores_at_rest(model, guess))
+        states.append(stores_at_rest(model, guess))
     return tuple(states)

@@ -6,14 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 
 MOST_TIMES = 6
 """Times that a sentence lists at most."""
-FOREVER = 1e7
-"""Duration [s] of what is switched on and stays on."""
 
 
 def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:

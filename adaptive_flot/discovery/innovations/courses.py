@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from adaptive_flot.discovery.hypotheses.families import Hypothesis, offset_limits, span_limits
+from adaptive_flot.discovery.hypotheses.families import (
+    ENDS,
+    LEAST_MOVE,
+    ROUNDING,
+    Hypothesis,
+    Kind,
+    offset_limits,
+    span_limits,
+)
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -21,12 +29,6 @@ STORES = (10.0, 30.0, 100.0, 300.0)
 """Time constants of a hidden store, likewise."""
 LONGEST = 0.1
 """Longest time constant of a lag, as a share of the record; of a store, three times that."""
-ENDS = (0.05, 0.95)
-"""Quantiles of a driver between which a dependence is drawn as a straight line."""
-LEAST_MOVE = 1e-3
-"""A driver that moves by a smaller share of its size can not be told from a constant."""
-ROUNDING = 1e-3
-"""Rounding of corners, as a share of the range of the value."""
 
 
 @dataclass(frozen=True)
@@ -85,67 +87,14 @@ def _at_site(
 ) -> Iterator[Suspect]:
     low, high = float(v.min()), float(v.max())
     spread, size = high - low, float(np.median(np.abs(v)))
-    moves = spread > LEAST_MOVE * max(size, 1e-300)
-    name = site.name
-    one = np.ones((len(v), 1))
-    if site.role in ("actuator", "sensor") and moves:
-        for level in low + LEVELS * spread:
-            yield _fixed(
-                name,
-                "own_value",
-                "stuck",
-                "stuck",
-                {"amplitude": 1.0, "level": float(level)},
-                {},
-                ("level",),
-                level - v,
-                1,
-            )
+    if spread > LEAST_MOVE * max(size, 1e-300):
+        if site.role in ("actuator", "sensor"):
+            yield from _stuck_or_late(site.name, v, size, dt)
         if site.role == "actuator":
-            width = {"width": ROUNDING * spread}
-            for level in low + LEVELS[1:] * spread:
-                there = {"amplitude": 1.0, "level": float(level)}
-                yield _fixed(name, "own_value", "leaks", "leak", there, width, ("level",), np.maximum(v, level) - v, 1)
-            for level in low + LEVELS[1:-1] * spread:
-                there = {"amplitude": 1.0, "limit": float(level)}
-                yield _fixed(
-                    name, "saturation", "range", "saturation", there, width, ("limit",), np.minimum(v, level) - v, 1
-                )
-        for intervals in LAGS:
-            tau = intervals * dt
-            if 1.0 <= tau <= LONGEST * len(v) * dt:
-                yield _fixed(
-                    name, "lag", "lag", "lag", {"amplitude": 1.0, "time_constant": tau}, {"scale": size or 1.0},
-                    ("time_constant",), _lagged(v, tau, dt) - v, 1,
-                )  # fmt: skip
-    if site.role == "sensor" and moves:
-        if low < 0 < high:
-            yield _fixed(
-                name,
-                "own_value",
-                "sign",
-                "rectified",
-                {"amplitude": 1.0},
-                {"width": ROUNDING * spread},
-                ("amplitude",),
-                np.abs(v) - v,
-                1,
-            )
-        middle = float(np.median(v))
-        effect = Effect(name, "own_value", "span", settings={"middle": middle})
-        yield Suspect(
-            Hypothesis(name, "own_value", "span", effect, ("offset", "slope"), ({},), span_limits(spread)),
-            np.column_stack([one[:, 0], v - middle]), ("offset", "slope"),
-        )  # fmt: skip
-    if site.role in ("sensor", "actuator") or site.mode == "offset":
-        effect = Effect(name, "constant", "shift", mode="offset")
-        limits = offset_limits(spread or size)
-        yield Suspect(
-            Hypothesis(name, "constant", "offset", effect, ("amplitude",), ({},), limits), one, ("amplitude",)
-        )
-    if site.role != "sensor" and size > 0 and site.mode == "factor":
-        effect = Effect(name, "constant", "shift", mode="factor")
-        yield Suspect(Hypothesis(name, "constant", "gain", effect, ("amplitude",), ({},)), v[:, None], ("amplitude",))
+            yield from _leaks_or_ends(site.name, v)
+        if site.role == "sensor":
+            yield from _wrong_scale(site.name, v)
+    yield from _constant(site, v, spread or size)
     if site.role in ("process", "flow", "feed"):
         by = v if site.mode == "factor" else np.ones_like(v)
         for driver, d in drivers.items():
@@ -154,6 +103,54 @@ def _at_site(
         for state in model.states:
             if site.role == "flow" and state.name in drivers and "." not in state.name:
                 yield from _stores(site, state.name, drivers[state.name], v, dt)
+
+
+def _stuck_or_late(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
+    """What a sensor and an actuator have in common: one level for all that is asked, or a lag."""
+    for level in v.min() + LEVELS * np.ptp(v):
+        told = {"amplitude": 1.0, "level": float(level)}
+        yield _fixed(Effect(site, "own_value", "stuck", told), "stuck", "level", level - v)
+    for tau in (intervals * dt for intervals in LAGS):
+        if 1.0 <= tau <= LONGEST * len(v) * dt:
+            told = {"amplitude": 1.0, "time_constant": tau}
+            effect = Effect(site, "lag", "lag", told, {"scale": size or 1.0})
+            yield _fixed(effect, "lag", "time_constant", _lagged(v, tau, dt) - v)
+
+
+def _leaks_or_ends(site: str, v: FloatArray) -> Iterator[Suspect]:
+    """An actuator that lets something through when closed, or does not open fully."""
+    low, spread = float(v.min()), float(np.ptp(v))
+    width = {"width": ROUNDING * spread}
+    for level in low + LEVELS[1:] * spread:
+        told = {"amplitude": 1.0, "level": float(level)}
+        yield _fixed(Effect(site, "own_value", "leak", told, width), "leaks", "level", np.maximum(v, level) - v)
+    for limit in low + LEVELS[1:-1] * spread:
+        told = {"amplitude": 1.0, "limit": float(limit)}
+        yield _fixed(Effect(site, "saturation", "saturation", told, width), "range", "limit", np.minimum(v, limit) - v)
+
+
+def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:
+    """A sensor that does not see the sign, or whose zero and span are off."""
+    spread = float(np.ptp(v))
+    if v.min() < 0 < v.max():
+        effect = Effect(site, "own_value", "rectified", {"amplitude": 1.0}, {"width": ROUNDING * spread})
+        yield _fixed(effect, "sign", "amplitude", np.abs(v) - v)
+    middle = float(np.median(v))
+    effect = Effect(site, "own_value", "span", settings={"middle": middle})
+    hypothesis = Hypothesis(site, "own_value", "span", effect, ("offset", "slope"), ({},), span_limits(spread))
+    yield Suspect(hypothesis, np.column_stack([np.ones_like(v), v - middle]), ("offset", "slope"))
+
+
+def _constant(site: Site, v: FloatArray, spread: float) -> Iterator[Suspect]:
+    """A constant error: added at sensors, actuators and balances, a factor elsewhere."""
+    free = ("amplitude",)
+    if site.role in ("sensor", "actuator") or site.mode == "offset":
+        effect = Effect(site.name, "constant", "shift", mode="offset")
+        hypothesis = Hypothesis(site.name, "constant", "offset", effect, free, ({},), offset_limits(spread))
+        yield Suspect(hypothesis, np.ones((len(v), 1)), free)
+    if site.role != "sensor" and site.mode == "factor" and np.median(np.abs(v)) > 0:
+        effect = Effect(site.name, "constant", "shift", mode="factor")
+        yield Suspect(Hypothesis(site.name, "constant", "gain", effect, free, ({},)), v[:, None], free)
 
 
 def _known_at(model: Model, site: Site) -> set[str]:
@@ -186,12 +183,10 @@ def _stores(site: Site, state: str, x: FloatArray, v: FloatArray, dt: float) -> 
         )  # fmt: skip
 
 
-def _fixed(
-    site: str, driver: str, kind: str, form: str, coefficients: Mapping[str, float], settings: Mapping[str, float],
-    free: tuple[str, ...], course: FloatArray, shapes: int,
-) -> Suspect:  # fmt: skip
-    effect = Effect(site, driver, form, coefficients, settings)
-    return Suspect(Hypothesis(site, driver, kind, effect, free, ({},)), course[:, None], (), shapes)  # type: ignore[arg-type]
+def _fixed(effect: Effect, kind: Kind, fitted: str, course: FloatArray) -> Suspect:
+    """A change that is all or nothing; one number of its shape is fitted, or its amplitude."""
+    hypothesis = Hypothesis(effect.site, effect.driver, kind, effect, (fitted,), ({},))
+    return Suspect(hypothesis, course[:, None], (), 1)
 
 
 def _lagged(v: FloatArray, tau: float, dt: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -71,18 +71,33 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     What is certain must be in every explanation about as good, and must predict stretches of rows that did not fit its
     coefficients better than the rest of the explanation does without it. Where the rest is one of a few, it is a class.
     """
-    best = found[0]
-    if best.criterion - base.criterion < LEAST_GAIN:
+    given_up: list[Hypothesis] = []
+    while found[0].criterion - base.criterion >= LEAST_GAIN:
+        best = found[0]
+        without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}
+        failed = _contradicted(search, best, without)
+        if not failed:
+            return _told(search, base, found, without)
+        given_up.append(failed[0])
+        if len(best.hypotheses) == 1:
+            break
+        # the one that does least is given up, and the rest judged anew
+        found = [e for e in found if not _has(e, failed[0])]
+    if not given_up:
         return Told("none", base, (), (), (base,), "constants and process noise explain it")
-    alike = (best, *(e for e in found[1:] if not told_apart(search, base, best, e)))
+    said = ", ".join(h.label for h in given_up)
+    why = f"{said} predict{'s' if len(given_up) == 1 else ''} no rows that did not fit it"
+    if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
+        return Told("abstain", base, (), (), (base,), why)
+    return Told("abstain", found[0], (), (), _alike(search, base, found), why)
+
+
+def _told(
+    search: Search, base: Explanation, found: Sequence[Explanation], without: Mapping[str, Explanation]
+) -> Told:  # fmt: skip
+    """What is said of the best explanation, whose effects all predict rows that did not fit them."""
+    best, alike = found[0], _alike(search, base, found)
     certain = tuple(h for h in best.hypotheses if all(_has(e, h) for e in alike))
-    failed = _contradicted(search, best, best.hypotheses)
-    if failed and len(best.hypotheses) > 1:  # the one that does least is given up, and the rest judged anew
-        others = [e for e in found if not _has(e, failed[0])]
-        return judge(search, base, others)
-    if failed:
-        said = ", ".join(h.label for h in failed)
-        return Told("abstain", best, (), (), alike, f"{said} predicts no rows that did not fit it")
     rest = [(e, h) for e in alike for h in e.hypotheses if not any(_same(h, c) for c in certain)]
     events = [(e, h) for e, h in rest if h.kind == "switch"]
     if {id(e) for e, _ in events} == {id(e) for e in alike}:  # whatever else there is, something is switched
@@ -91,28 +106,29 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
             return Told("class", best, certain, members, alike, "")
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
-        return _without_small_ones(search, base, Told("named", best, certain, (), alike, ""))
+        return _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
     if 2 <= len(members) <= LARGEST_CLASS and all(len(e.hypotheses) == len(best.hypotheses) for e in alike):
         return Told("class", best, certain, members, alike, "")
     if not certain:
         why = f"{len(alike)} explanations are about as good, and have no effect in common"
         return Told("abstain", best, (), (), alike, why)
-    kept = best
-    for h in best.hypotheses:
-        if h not in certain:
-            kept = search.without(kept, next(k for k in kept.hypotheses if k is h))
-    return Told("named", kept, certain, (), alike, "")
+    open_one = next(h for h in best.hypotheses if h not in certain)
+    return Told("named", without[open_one.label], certain, (), alike, "")
 
 
-def _without_small_ones(search: Search, base: Explanation, told: Told) -> Told:
-    """A name without effects that do little beside another one: these take up what else is wrong with the model."""
-    best, total = told.best, told.best.criterion - base.criterion
-    for h in told.certain:
-        without = search.without(best, h) if len(best.hypotheses) > 1 else base
-        if best.criterion - without.criterion < SMALL * total:
-            kept = tuple(k for k in told.certain if k is not h)
-            return _without_small_ones(search, base, replace(told, best=without, certain=kept))
-    return told
+def _without_small_ones(base: Explanation, told: Told, without: Mapping[str, Explanation]) -> Told:
+    """A name without an effect that does little beside the other one: it takes up what else is wrong with the model."""
+    total = told.best.criterion - base.criterion
+    small = min(told.certain, key=lambda h: told.best.criterion - without[h.label].criterion)
+    rest = without[small.label]
+    if len(told.certain) == 1 or told.best.criterion - rest.criterion >= SMALL * total:
+        return told
+    return replace(told, best=rest, certain=tuple(h for h in told.certain if h is not small))
+
+
+def _alike(search: Search, base: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """The best explanation, and those that the record does not tell from it."""
+    return (found[0], *(e for e in found[1:] if not told_apart(search, base, found[0], e)))
 
 
 def _one_a_site(pairs: Sequence[tuple[Explanation, Hypothesis]]) -> tuple[tuple[Explanation, Hypothesis], ...]:
@@ -157,15 +173,17 @@ def _same(a: Hypothesis, b: Hypothesis) -> bool:
     return a.site == b.site and (a.driver == "time") == (b.driver == "time")
 
 
-def _contradicted(search: Search, explanation: Explanation, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+def _contradicted(
+    search: Search, explanation: Explanation, without: Mapping[str, Explanation]
+) -> tuple[Hypothesis, ...]:
     """Effects without which the other ones predict fresh rows as well, the one that gains least first."""
     fresh = _fresh_rows(search, explanation)
     failed: list[tuple[float, Hypothesis]] = []
-    for h in asked:
-        without = search.without(explanation, h)
-        extra = explanation.numbers - without.numbers - len(h.free)
-        if low_end(fresh - _fresh_rows(search, without), extra) <= 0:
-            failed.append((explanation.criterion - without.criterion, h))
+    for h in explanation.hypotheses:
+        rest = without[h.label]
+        extra = explanation.numbers - rest.numbers - len(h.free)
+        if low_end(fresh - _fresh_rows(search, rest), extra) <= 0:
+            failed.append((explanation.criterion - rest.criterion, h))
     return tuple(h for _, h in sorted(failed, key=lambda f: f[0]))
 
 
@@ -187,8 +205,4 @@ def _fresh_rows(search: Search, explanation: Explanation) -> FloatArray:
         fit = fitter.fit(explanation.fit.p, explanation.fit.size, hold_noise=True)
         return fit.rows[edges[k] : edges[k + 1]]
 
-    return np.concatenate(parallel_map(one, range(FOLDS), search.processes, _nothing))
-
-
-def _nothing() -> None:
-    """No progress to tell."""
+    return np.concatenate(parallel_map(one, range(FOLDS), search.processes))

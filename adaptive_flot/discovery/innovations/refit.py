@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.known_before import Constants
+from adaptive_flot.discovery.hypotheses.known_before import Constants, stores_at_rest
 from adaptive_flot.discovery.hypotheses.rows import BoolArray
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions
 from adaptive_flot.discovery.innovations.noise_fit import noise_of, search_noise
@@ -109,11 +109,7 @@ class Refitter:
     def start(self, noise: NoiseModel, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """State and covariance before the first row."""
         z, P = first_state(self.model, self.record, noise, p)
-        names = self.model.names("states")
-        for effect in self.model.effects:  # a hidden store starts where its balance stands
-            if effect.form == "store" and effect.driver in names:
-                z[names.index(f"{effect.label}.store")] = z[names.index(effect.driver)]
-        return z, UNSURE**2 * P
+        return stores_at_rest(self.model, z), UNSURE**2 * P
 
     def noise(self, size: tuple[float, float]) -> NoiseModel:
         """Noise of a size."""

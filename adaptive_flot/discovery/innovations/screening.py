@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.hypotheses.wording import FOREVER
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.courses import Suspect, suspects
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
-from adaptive_flot.discovery.innovations.switching import MOST_EDGES, Switch, best_switch
+from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -67,9 +66,12 @@ class Screening:
         by = self._values[site.name] if site.mode == "factor" else np.ones(count)
         if not np.isfinite(by).all() or not np.abs(by).max() > 0:
             return None
-        edges = np.arange(1, count - 1, max(1, -(-count // MOST_EDGES)))
-        steps = (np.arange(count)[:, None] >= edges[None, :]) * by[:, None]
-        switch = best_switch(self._rest(self._response.respond(site.name, steps)), edges, self._left, count)
+        apart = max(1, -(-count // MOST_EDGES))
+        switch = self._best_switch(site.name, by, np.arange(1, count - 1, apart))
+        if switch is not None and apart > 1:
+            near = switch.edges(count)[:, None] + np.arange(1 - apart, apart)
+            again = self._best_switch(site.name, by, np.unique(near[(near > 0) & (near < count - 1)]))
+            switch = again if again is not None and again.gain > switch.gain else switch
         if switch is None:
             return None
         numbers = sum(1 + (b < count) for _, b in switch.pulses)
@@ -77,6 +79,11 @@ class Screening:
         hypothesis = Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))
         suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
+
+    def _best_switch(self, site: str, by: FloatArray, edges: IntArray) -> Switch | None:
+        count = len(by)
+        steps = (np.arange(count)[:, None] >= edges[None, :]) * by[:, None]
+        return best_switch(self._rest(self._response.respond(site, steps)), edges, self._left, count)
 
     def _regressions(self, site: str, group: list[Suspect]) -> list[Screened]:
         X = self._rest(self._response.respond(site, np.column_stack([s.courses for s in group])))

@@ -13,9 +13,8 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.known_before import Constants
-from adaptive_flot.discovery.hypotheses.wording import FOREVER
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -28,8 +27,15 @@ BEAM = 3
 MOST_EFFECTS = 2
 LEAST_GAIN = 12.0
 """Gain of the criterion that another effect must bring."""
+MOST_WORK = 4_000
+"""Rows times states up to which a record is tried: a longer one takes minutes."""
 FURTHEST = 4.0
 """Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
+
+
+def is_short(record: Dataset, model: Model) -> bool:
+    """Whether a record is short enough for the innovations form."""
+    return len(record) * len(model.states) <= MOST_WORK
 
 
 @dataclass(frozen=True)
@@ -139,7 +145,7 @@ class Search:
         events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
         screened = Screening(model, response).all(events=events)
         chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
-        refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes, lambda: None)
+        refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
 
     def _may(self, kind: str) -> bool:

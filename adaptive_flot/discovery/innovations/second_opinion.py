@@ -16,7 +16,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search import Search, is_short
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
@@ -27,8 +27,6 @@ FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
 TELLS = ("named", "class", "unnamed")
 """Words of the free run that the innovations form replaces only where it leaves a smaller error on the report rows."""
-MOST_WORK = 4_000
-"""Rows times states up to which the innovations form is tried: a longer record takes minutes."""
 
 
 def second_opinion(state: State) -> State:
@@ -39,7 +37,7 @@ def second_opinion(state: State) -> State:
     """
     problem, (before, _) = state.known_problem, state.refitted
     asked = (state.judged.word == "abstain" and not state.contradiction) or _leaves_too_much(state)
-    if not asked or len(problem.record) * len(before.model.states) > MOST_WORK:
+    if not asked or not is_short(problem.record, before.model):
         return state
     state.progress("ask the innovations form")
     record = replace(problem.record, initial_state=before.initial_state)

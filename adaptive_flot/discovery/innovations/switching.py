@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adaptive_flot.discovery.hypotheses.rows import BoolArray
 from adaptive_flot.greybox.model import FloatArray
 
 IntArray = NDArray[np.int_]
-BoolArray = NDArray[np.bool_]
 
 MOST_EDGES = 600
-"""Most times between which a switch is looked for; a longer record has a coarser grid, refined at the end."""
+"""Most times between which a switch is looked for. A longer record has a coarse grid, then a fine one at the best."""
 MOST_PULSES = 8
 ROUNDS = 4
 """Rounds in which every pulse is placed anew."""
@@ -47,6 +47,10 @@ class Switch:
     pulses: tuple[tuple[int, int], ...]
     size: float
     gain: float
+
+    def edges(self, count: int) -> IntArray:
+        """Intervals before the last in which it is switched, one way or the other."""
+        return np.array([e for pulse in self.pulses for e in pulse if e < count], dtype=int)
 
     def mask(self, count: int) -> FloatArray:
         """1 in the intervals in which it is on, else 0 (count,)."""

@@ -16,7 +16,7 @@ from benchmarks.hidden_effects.plant.experiment import Experiment, SimulatedRun,
 
 ORDINARY = (5.0, 50.0)  # noise standard deviations, root mean square
 _FLOWS = {"air_flow", "feed_flow", "gas_slip", "burst_rate", "tails_valve"}
-_ANY_OUTPUT = ({*SENSOR_SITES} | _FLOWS) - {"grade_sensor"}  # sites that may show elsewhere than in the grade
+ANY_OUTPUT = ({*SENSOR_SITES} | _FLOWS) - {"grade_sensor"}  # sites that may show elsewhere than in the grade
 _SEARCH = 5  # trials of an amplitude
 Columns = dict[str, Array]
 
@@ -31,7 +31,7 @@ class Sized:
 
     def of(self, site: str) -> float:
         """The size that counts for a site: in the grade, or in the output that shows most."""
-        return max(self.removable.values()) if site in _ANY_OUTPUT else self.removable["concentrate_grade"]
+        return max(self.removable.values()) if site in ANY_OUTPUT else self.removable["concentrate_grade"]
 
 
 def measure(experiment: Experiment, specs: Sequence[Spec], structure: Structure | None = None) -> Sized:

@@ -1,0 +1,90 @@
+"""What is told when an effect does not hold on rows that did not fit it: the search behind is a stand-in."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.innovations import judge as judging
+from adaptive_flot.greybox.effects import Effect
+
+ROWS = 200
+
+
+@dataclass(frozen=True)
+class Given:
+    """An explanation with a criterion and fresh rows that are given, not fitted."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    criterion: float
+    fresh: float
+    numbers: int = 0
+    fit: Any = field(default_factory=lambda: Rows(np.zeros(ROWS)))
+
+
+@dataclass(frozen=True)
+class Rows:
+    rows: np.ndarray
+
+
+class Stand:
+    """A search that knows three explanations; without an effect, an explanation is the rest of it."""
+
+    def __init__(self, *known: Given) -> None:
+        self.known = {tuple(h.site for h in e.hypotheses): e for e in known}
+
+    def without(self, explanation: Given, left_out: Hypothesis) -> Given:
+        return self.known[tuple(h.site for h in explanation.hypotheses if h is not left_out)]
+
+
+def lag(site: str) -> Hypothesis:
+    """A lag at a site."""
+    return Hypothesis(site, "lag", "lag", Effect(site, "lag", "lag", settings={"scale": 1.0}), ("time_constant",), ({},))
+
+
+@pytest.fixture(autouse=True)
+def _given_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fresh rows are those given; better explanations are better by the same in every row, and told apart."""
+    monkeypatch.setattr(judging, "_fresh_rows", lambda search, e: np.full(ROWS, e.fresh))
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: best is not other)
+
+
+def told(*found: Given) -> judging.Told:
+    base = Given((), 0.0, 0.0)
+    search: Any = Stand(base, *found)
+    ranked: Any = sorted([base, *found], key=lambda e: -e.criterion)
+    return judging.judge(search, ranked[-1], ranked)
+
+
+def test_an_effect_that_predicts_no_fresh_rows_is_not_named_and_not_called_nothing() -> None:
+    """A large gain on the rows that fitted is not "constants and process noise explain it"."""
+    said = told(Given((lag("sensor"),), 500.0, -1.0))
+    assert said.word == "abstain"
+    assert "sensor lag predicts no rows" in said.why
+
+
+def test_a_pair_of_which_neither_holds_alone_is_told_as_nothing_named() -> None:
+    one, two = lag("sensor"), lag("valve")
+    said = told(Given((one, two), 500.0, -1.0), Given((one,), 400.0, -0.5), Given((two,), 3.0, -0.2))
+    assert said.word == "abstain"
+    assert "sensor" in said.why or "valve" in said.why
+
+
+def test_an_effect_that_holds_is_named_beside_one_that_does_not() -> None:
+    one, two = lag("sensor"), lag("valve")
+    said = told(Given((one, two), 500.0, 0.5), Given((one,), 400.0, 0.6), Given((two,), 3.0, 0.01))
+    assert said.word == "named"
+    assert [h.site for h in said.certain] == ["sensor"]
+
+
+def test_a_small_effect_beside_a_large_one_is_not_told() -> None:
+    one, two = lag("sensor"), lag("valve")
+    said = told(Given((one, two), 500.0, 0.9), Given((one,), 480.0, 0.5), Given((two,), 30.0, 0.1))
+    assert said.word == "named"
+    assert [h.site for h in said.certain] == ["sensor"]
+
+
+def test_nothing_is_missing_where_no_explanation_gains() -> None:
+    assert told(Given((lag("sensor"),), 5.0, 0.1)).word == "none"
