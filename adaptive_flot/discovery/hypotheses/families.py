@@ -15,7 +15,10 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
-Kind = Literal["switch", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "depends", "store"]
+Kind = Literal[
+    "switch", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis", "dead zone",
+    "depends", "store",
+]  # fmt: skip
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)

@@ -31,6 +31,13 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         return f"{name} does not go above {first:.3g}{unit}"
     if h.kind == "switch":
         return f"{name} {_switched(h.effect, site.mode, first, unit, site.role == 'sensor')}"
+    if h.kind == "periodic":
+        return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], site.mode, unit)}"
+    if h.kind == "hysteresis":
+        return f"{name} sticks: it stays until it is asked to move by more than {first:.3g}{unit}"
+    if h.kind == "dead zone":
+        centre = h.effect.coefficients["centre"]
+        return f"{name} does not move within {first:.3g}{unit} of {centre:.3g}{unit}"
     if h.kind == "gain":
         return f"{name} is {_factor(first)}"
     if h.kind == "offset":
@@ -51,6 +58,9 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     change = values["value_2"] - values["value_1"]
     low, high = h.effect.settings["knots"]  # type: ignore[misc]
     driver = h.driver.replace("_", " ")
+    if h.effect.mode == "offset":
+        more = f"{abs(change):.3g}{unit} {'more' if change > 0 else 'less'}"
+        return f"{name} depends on {driver}: {more} at {driver} {high:.3g} than at {low:.3g}"
     return f"{name} depends on {driver}: {_factor(change)} at {driver} {high:.3g} than at {low:.3g}"
 
 
@@ -61,6 +71,12 @@ def _factor(log: float) -> str:
     if 0.5 < factor < 2.0:
         return f"{abs(100 * (factor - 1)):.0f} % {'larger' if factor > 1 else 'smaller'}"
     return f"{factor:.2g} times as large"
+
+
+def _swings(size: float, period: float, mode: str, unit: str) -> str:
+    """How far it goes up and down, and how often: `swings by 0.4 K up and down every 900 s`."""
+    swing = f"{size:.3g}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
+    return f"swings by {swing} up and down every {period:.3g} s"
 
 
 def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from adaptive_flot.discovery.candidates.dynamics import dragged
 from adaptive_flot.discovery.hypotheses.families import (
     ENDS,
     LEAST_MOVE,
@@ -21,6 +22,12 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
+BANDS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
+"""Half widths of a dead band that are tried, as shares of the range of the value."""
+FASTEST, SLOWEST, MOST_PERIODS = 8, 3, 200
+"""Fewest rows of a period, fewest periods in a record, and most periods that are tried, one a period more a record."""
+FOLLOWS = 0.5
+"""Time constant by which an actuator follows once it moves, in sampling intervals."""
 LEVELS = np.linspace(0.0, 1.0, 11)
 """Levels at which a part may be stuck, leak or end, as shares of the range of its value."""
 LAGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
@@ -61,7 +68,7 @@ class Suspect:
 def suspects(
     model: Model, values: Mapping[str, FloatArray], drivers: Mapping[str, FloatArray], dt: float
 ) -> Iterator[Suspect]:
-    """Yield everything but switches and periodic changes that sites allow by their role.
+    """Yield everything but changes in time that sites allow by their role.
 
     Parameters
     ----------
@@ -82,6 +89,31 @@ def suspects(
                 yield suspect
 
 
+def periodic(site: Site, value: FloatArray, time: FloatArray, dt: float) -> Iterator[Suspect]:
+    """Yield sines and cosines of time at a site.
+
+    Parameters
+    ----------
+    site, value
+        The site, and its value in each interval (n,).
+    time
+        Time of the row at the end of each interval (n,) [s].
+    dt
+        Sampling interval [s].
+    """
+    n, free = len(value), ("sine", "cosine")
+    by = value if site.mode == "factor" else np.ones(n)
+    if not np.isfinite(by).all() or not np.abs(by).max() > 0:
+        return
+    t = time if site.role == "sensor" else time - dt / 2
+    for count in range(SLOWEST, min(n // FASTEST, SLOWEST + MOST_PERIODS) + 1):
+        period = n * dt / count
+        effect = Effect(site.name, "time", "periodic", {"period": period}, mode=site.mode)
+        hypothesis = Hypothesis(site.name, "time", "periodic", effect, (*free, "period"), ({},))
+        angle = 2 * np.pi * t / period
+        yield Suspect(hypothesis, by[:, None] * np.column_stack([np.sin(angle), np.cos(angle)]), free, 1)
+
+
 def _at_site(
     model: Model, site: Site, v: FloatArray, drivers: Mapping[str, FloatArray], dt: float
 ) -> Iterator[Suspect]:
@@ -92,6 +124,7 @@ def _at_site(
             yield from _stuck_or_late(site.name, v, size, dt)
         if site.role == "actuator":
             yield from _leaks_or_ends(site.name, v)
+            yield from _sticks_or_idles(site.name, v, size, dt)
         if site.role == "sensor":
             yield from _wrong_scale(site.name, v)
     yield from _constant(site, v, spread or size)
@@ -127,6 +160,19 @@ def _leaks_or_ends(site: str, v: FloatArray) -> Iterator[Suspect]:
     for limit in low + LEVELS[1:-1] * spread:
         told = {"amplitude": 1.0, "limit": float(limit)}
         yield _fixed(Effect(site, "saturation", "saturation", told, width), "range", "limit", np.minimum(v, limit) - v)
+
+
+def _sticks_or_idles(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
+    """An actuator that moves only when asked to by more than a band, or that does nothing about its zero."""
+    spread = float(np.ptp(v))
+    settings = {"scale": size or 1.0, "follow_s": FOLLOWS * dt}
+    for band in (share * spread for share in BANDS):
+        told = {"amplitude": 1.0, "band": band}
+        yield _fixed(Effect(site, "lag", "stiction", told, settings), "hysteresis", "band", dragged(v, band) - v)
+        if v.min() < 0 < v.max():
+            told = {"amplitude": 1.0, "centre": 0.0, "half_width": band}
+            course = -np.clip(v, -band, band)
+            yield _fixed(Effect(site, "own_value", "dead_zone", told), "dead zone", "half_width", course)
 
 
 def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
-from adaptive_flot.discovery.innovations.courses import Suspect, suspects
+from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
 from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
 from adaptive_flot.greybox.effects import Effect
@@ -17,6 +17,8 @@ from adaptive_flot.greybox.scope import Site
 EDGE = 0.05
 """Width of the edges of a switch, in sampling intervals."""
 NOTHING = 1e-9
+SHARP = 6.0
+"""Gain of log-likelihood by which edges within a row must be better than slow ones."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Screening:
         self._values, self._drivers = response.seen()
 
     def all(self, *, events: bool) -> list[Screened]:
-        """Every suspect, the best first; with switches or without."""
+        """Every suspect, the best first; with changes in time or without."""
         record = self._response.record
         by_site: dict[str, list[Suspect]] = {}
         for s in suspects(self.model, self._values, self._drivers, record.dt):
@@ -58,6 +60,7 @@ class Screening:
         found = [x for site, group in by_site.items() for x in self._regressions(site, group)]
         if events:
             found += [x for site in self.model.sites if (x := self.switch(site)) is not None]
+            found += [x for site in self.model.sites for x in self._swings(site)]
         return sorted(found, key=lambda x: -x.gain)
 
     def switch(self, site: Site) -> Screened | None:
@@ -72,7 +75,7 @@ class Screening:
             near = switch.edges(count)[:, None] + np.arange(1 - apart, apart)
             again = self._best_switch(site.name, by, np.unique(near[(near > 0) & (near < count - 1)]))
             switch = again if again is not None and again.gain > switch.gain else switch
-        if switch is None:
+        if switch is None or not self._is_sharp(site.name, by, switch):
             return None
         numbers = sum(1 + (b < count) for _, b in switch.pulses)
         effect = _switch_effect(site, switch, record.time, record.dt)
@@ -80,10 +83,22 @@ class Screening:
         suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
 
+    def _is_sharp(self, site: str, by: FloatArray, switch: Switch) -> bool:
+        """Whether the record tells the switch from a slow course: what wanders is not switched."""
+        slow = self._rest(self._response.respond(site, (by * switch.slow(len(by)))[:, None]))
+        left = self._linear(slow)[1]
+        gain = self._count / 2 * float(np.log(self._total / max(left, NOTHING * self._total)))
+        return switch.gain - gain >= SHARP
+
     def _best_switch(self, site: str, by: FloatArray, edges: IntArray) -> Switch | None:
         count = len(by)
         steps = (np.arange(count)[:, None] >= edges[None, :]) * by[:, None]
         return best_switch(self._rest(self._response.respond(site, steps)), edges, self._left, count)
+
+    def _swings(self, site: Site) -> list[Screened]:
+        record = self._response.record
+        group = list(periodic(site, self._values[site.name], record.time[1:], record.dt))
+        return self._regressions(site.name, group) if group else []
 
     def _regressions(self, site: str, group: list[Suspect]) -> list[Screened]:
         X = self._rest(self._response.respond(site, np.column_stack([s.courses for s in group])))

@@ -41,7 +41,9 @@ class Stand:
 
 def lag(site: str) -> Hypothesis:
     """A lag at a site."""
-    return Hypothesis(site, "lag", "lag", Effect(site, "lag", "lag", settings={"scale": 1.0}), ("time_constant",), ({},))
+    return Hypothesis(
+        site, "lag", "lag", Effect(site, "lag", "lag", settings={"scale": 1.0}), ("time_constant",), ({},)
+    )
 
 
 @pytest.fixture(autouse=True)

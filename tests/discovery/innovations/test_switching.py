@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.innovations.switching import best_switch
+from adaptive_flot.discovery.innovations.switching import Switch, best_switch
 
 N = 120
 
@@ -45,3 +45,12 @@ def test_noise_alone_has_no_switch() -> None:
     steps, edges = _steps()
     found = [best_switch(steps, edges, np.random.default_rng(k).normal(size=N), N) for k in range(20)]
     assert sum(f is not None for f in found) <= 1
+
+
+def test_slow_edges_are_as_wide_as_half_the_pulse_or_the_pause_before_it() -> None:
+    """Its sum is that of the pulse, and it lasts beyond the pulse on both sides by no more than that."""
+    slow = Switch(((40, 60),), 1.0, 1.0).slow(N)
+    assert slow.sum() == pytest.approx(20.0)
+    assert slow[40:60].min() < 0.6 and slow[:30].max() == 0 and slow[70:].max() == 0
+    stays = Switch(((90, N),), 1.0, 1.0).slow(N)
+    assert stays[-1] == pytest.approx(1.0) and 0.4 < stays[90] < 0.6

@@ -1,0 +1,56 @@
+"""Families of the innovations form, each on a plate with a Peltier element: a process that is not flotation."""
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.hypotheses.rows import noise_floor
+from adaptive_flot.discovery.innovations.in_words import told_in_words
+from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.search import Search
+from tests.discovery.innovations.thermostat import BAND, PERIOD, SWING, ZONE, Wrong, model, record
+
+
+def _told(wrong: Wrong) -> tuple[Told, str, Search]:
+    """What is told, and in words."""
+    data, plain = record(wrong), model()
+    search = Search(plain, data, (0,), noise_floor([data], (0,)), ("conductance", "capacity"))
+    with np.errstate(all="ignore"):
+        base = search.base(plain.parameter_values)
+        told = judge(search, base, search.run(base))
+    return told, told_in_words(search, told), search
+
+
+def _values(search: Search, told: Told, site: str) -> dict[str, float]:
+    """Coefficients of the effect at a site, in the best explanation that has one there."""
+    best = next(e for e in told.alike if e.hypotheses[0].site == site)
+    fitted, h = search.model_of(best), best.hypotheses[0]
+    return {
+        c: fitted.parameters[fitted.index("parameters", n)].value for c, n in zip(h.free, h.parameters, strict=True)
+    }
+
+
+def test_an_element_that_sticks_is_told_with_its_band() -> None:
+    told, words, search = _told("hysteresis")
+    assert [(h.site, h.kind) for h in told.certain] == [("element", "hysteresis")], (told.word, words)
+    assert _values(search, told, "element")["band"] == pytest.approx(BAND, rel=0.15)
+    assert "stays until it is asked to move by more than" in words
+
+
+def test_an_element_that_idles_about_zero_is_told_with_its_zone() -> None:
+    told, words, search = _told("dead zone")
+    assert [(h.site, h.kind) for h in told.certain] == [("element", "dead zone")], (told.word, words)
+    assert _values(search, told, "element")["half_width"] == pytest.approx(ZONE, rel=0.15)
+    assert "does not move within" in words
+
+
+def test_a_disturbance_that_comes_and_goes_is_told_with_its_period() -> None:
+    """Once it has settled, a sine of heat is a sine at the thermometer: the record can not tell the two apart."""
+    told, words, search = _told("periodic")
+    assert told.word in ("named", "class") and {h.kind for e in told.alike for h in e.hypotheses} == {"periodic"}, words
+    values = _values(search, told, "other_heat")
+    assert values["period"] == pytest.approx(PERIOD, rel=0.02)
+    assert np.hypot(values["sine"], values["cosine"]) == pytest.approx(SWING, rel=0.1)
+
+
+def test_nothing_is_told_of_a_plate_that_does_as_it_is_told() -> None:
+    assert _told("nothing")[0].word == "none"
