@@ -14,6 +14,7 @@ from adaptive_flot.console_tables import print_table
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
+from adaptive_flot.report.estimate.innovations import innovations_sentences
 from adaptive_flot.report.kit.parts import Table as Content
 from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.absorbed import absorbed
@@ -144,6 +145,8 @@ def print_estimate(result: RecordEstimate) -> None:
     console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
     if result.batch.agreement:
         console.print(f"Starts: {result.batch.agreement}", highlight=False)
+    for said in innovations_sentences(result):
+        console.print(said, highlight=False)
 
 
 def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:

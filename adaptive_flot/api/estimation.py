@@ -76,6 +76,11 @@ class Estimation:
         fitted = {e.name: e.value for e in self.result.batch.estimates}
         return self.result.setup.model.with_parameters(fitted)
 
+    @property
+    def smoothed(self) -> pd.DataFrame | None:
+        """States and parameters given the whole record, with standard deviations; None without the innovations form."""
+        return None if self.result.innovations is None else self.result.innovations.table
+
     def plot(self, kind: str = "outputs") -> Figure:
         """Draw the record.
 
@@ -183,6 +188,7 @@ def estimate(
     parameters: Sequence[str] = (),
     outputs: Sequence[str] = (),
     fit_share: float = 0.6,
+    innovations: bool | None = None,
     tag_map: AnyMap | None = None,
     compiled: bool = False,
     progress: bool = False,
@@ -204,6 +210,8 @@ def estimate(
         Names of the outputs that drive the estimation; default all that are measured.
     fit_share
         Part of the record to fit on, from its beginning: a number between 0 and 1.
+    innovations
+        Whether to estimate in innovations form as well, with process noise; None where the record asks for it.
     tag_map
         Map file (or `TagMap`) of an export: from its tags to the model's quantities.
     compiled
@@ -247,6 +255,7 @@ def estimate(
         blocks = read_blocks(data, made, fit_share, read_map(tag_map))
     with counted(progress, record_name(data), 1 + len(chosen)) as advance:
         result = estimate_record(
-            blocks, made, estimators=chosen, fit=parameters, outputs=outputs, folder=Path.cwd(), progress=advance
-        )
+            blocks, made, estimators=chosen, fit=parameters, outputs=outputs, folder=Path.cwd(),
+            innovations=innovations, progress=advance,
+        )  # fmt: skip
     return Estimation(result, origin, sources)

@@ -38,6 +38,10 @@ def estimate(
         list[str] | None, typer.Option(help="Output to fit to (repeatable); default all measured.")
     ] = None,
     fit_share: Annotated[float, typer.Option(min=0.05, max=0.95, help="Share of the record to fit on.")] = 0.6,
+    innovations: Annotated[
+        bool | None,
+        typer.Option(help="Estimate with process noise too, states and parameters smoothed; default where needed."),
+    ] = None,
     save_cell: Annotated[Path | None, typer.Option(help="Write the fitted parameters as a cell file.")] = None,
     save_model: Annotated[Path | None, typer.Option(help="Write the fitted model as a model file (YAML).")] = None,
     out: Out = None,
@@ -51,6 +55,7 @@ def estimate(
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.estimate import estimate_record
     from adaptive_flot.runner.commands.estimate_files import (
+        SMOOTHED,
         estimate_summary,
         replay_file,
         save_fitted_cell,
@@ -64,7 +69,7 @@ def estimate(
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
     names = once(estimator) or ["fixed", "rpem", "pem"]
     folder = results_folder(out, data.stem, "estimate")
-    files = [*map(replay_file, names), "summary.json", "report.html"]
+    files = [*map(replay_file, names), SMOOTHED, "summary.json", "report.html"]
     check_targets(
         [data, map_, *model_inputs(model, cell, data.parent, names)],
         [*in_folder(folder, *files), ("--json", json), ("--save-cell", save_cell), ("--save-model", save_model)],
@@ -73,8 +78,9 @@ def estimate(
     blocks = read_blocks(data, made, fit_share, None if map_ is None else load_tag_map(map_))
     with progress_bar(data.stem, 1 + len(names)) as advance:
         result = estimate_record(
-            blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent, progress=advance
-        )
+            blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent,
+            innovations=innovations, progress=advance,
+        )  # fmt: skip
     write_replays(result, folder)
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, estimate_summary(data, result))

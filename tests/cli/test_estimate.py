@@ -15,6 +15,7 @@ import yaml
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.resources import cell_file
 from tests.cli.conftest import Call, WriteTable
+from tests.runner.commands.test_innovations_form import record as plate_record
 from tests.runner.loop.test_plugins import MODEL
 from tests.runner.records import TRUTH, PlantRecord
 
@@ -131,3 +132,15 @@ def test_discovery_on_the_same_record_leaves_the_results_of_an_estimate(
     assert {f.parent.name for f in before} == {"estimate"}
     assert all(f.read_bytes() == content for f, content in before.items())
     assert (tmp_path / "results" / "record" / "discover" / "report.html").is_file()
+
+
+def test_a_record_with_process_noise_is_smoothed_into_a_file_and_onto_the_page(call: Call, tmp_path: Path) -> None:
+    data = plate_record(0.3, seed=4)[0]
+    rows = {"time_s": data.time, "power_W": data.inputs[:, 0], "thermometer_degC": data.outputs[:, 0]}
+    pd.DataFrame(rows).to_csv(tmp_path / "plate.csv", index=False)
+    (tmp_path / "plate.py").write_text("from tests.runner.commands.test_innovations_form import plate as make_model\n")
+    result = call("estimate", "plate.csv", "--model", "plate.py:make_model", "--estimator", "pem", "--out", "r")
+    assert result.code == 0, result.err
+    assert "plate_degC_std" in (tmp_path / "r" / "smoothed.csv").read_text().splitlines()[0]
+    assert "With process noise" in (tmp_path / "r" / "report.html").read_text() and "With process noise" in result.out
+    assert json.loads((tmp_path / "r" / "summary.json").read_text())["innovations_form"]["errors"]

@@ -173,8 +173,15 @@ class Refitter:
                 return q, value
         return p, best
 
-    def _step(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> FloatArray:
-        """One step of Gauss and Newton; an unknown that would leave its range is held."""
+    def covariance(self, fit: Refit) -> FloatArray:
+        """Covariance of the free parameters at a fit (q, q): the inverse of the normal equations."""
+        A, _ = self._normal_equations(fit.p, fit.size, fit.p[self._where])
+        return np.asarray(np.linalg.pinv(A, hermitian=True) * np.outer(self._scale, self._scale), dtype=np.float64)
+
+    def _normal_equations(
+        self, p: FloatArray, size: tuple[float, float], first: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Normal equations (A, b) of a step, in scales of the free parameters."""
         noise = self.noise(size)
         L = self._functions.at(self.record, noise, p, self.start(noise, p))
         counts = np.repeat(self.counted[1:], len(self.columns))
@@ -186,7 +193,12 @@ class Refitter:
             told = np.zeros((len(self.known.names), len(x)))
             told[:, self._constants] = self._root * self._scale[self._constants]
             D = np.vstack([D, told])
-        A, b = (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
+        return (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
+
+    def _step(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> FloatArray:
+        """One step of Gauss and Newton; an unknown that would leave its range is held."""
+        A, b = self._normal_equations(p, size, first)
+        x = p[self._where]
         held = np.zeros(len(x), dtype=bool)
         if not (np.isfinite(A).all() and np.isfinite(b).all()):
             return held.astype(float)

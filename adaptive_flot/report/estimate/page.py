@@ -13,6 +13,7 @@ from adaptive_flot.files import write_text
 from adaptive_flot.greybox.model import Quantity
 from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.estimate import answer, series
+from adaptive_flot.report.estimate.innovations import innovations_section
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Bullets, Part, Picture, Section, Table, Text, present
@@ -70,6 +71,7 @@ def estimate_report(result: RecordEstimate, command: str = "", read: Sequence[Pa
                 [Bullets(answer.per_output(result)), _error_table(result)],
             ),
             Section("fit", "Parameters", "batch fit, and over time", fitted),
+            *innovations_section(result, album),
             Section("record", "One step ahead", "predictions, their errors, inputs", record),
             Section(
                 "residuals",

@@ -17,6 +17,11 @@ from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
+from adaptive_flot.runner.commands.innovations_form import (
+    InnovationsEstimate,
+    asks_for_process_noise,
+    estimate_in_innovations_form,
+)
 from adaptive_flot.runner.commands.record_blocks import Blocks
 from adaptive_flot.runner.commands.replay import Replay, replay
 from adaptive_flot.runner.scenario.keys import Plugin
@@ -33,6 +38,8 @@ class RecordEstimate(Described):
     setup: Setup
     batch: BatchFit
     replays: tuple[Replay, ...]
+    innovations: InnovationsEstimate | None = None
+    """The record in innovations form, where it was asked for."""
 
     def described(self) -> dict[str, object]:
         """Record, batch fit and estimators; see `Described`."""
@@ -49,6 +56,7 @@ def estimate_record(
     fit: Sequence[str] = (),
     outputs: Sequence[str] = (),
     folder: Path | None = None,
+    innovations: bool | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> RecordEstimate:
     """Fit the fit block, then replay both blocks through each estimator.
@@ -69,6 +77,8 @@ def estimate_record(
         Outputs that drive the estimation; default all that are measured.
     folder
         Folder of a user's own estimator file.
+    innovations
+        Whether to estimate in innovations form as well, with process noise; None where the record asks for it.
     progress
         Called after the batch fit and after each estimator.
 
@@ -106,7 +116,10 @@ def estimate_record(
     for name, plugin in plugins.items():
         replays.append(replay(name, plugin, setup, blocks, batch, folder))
         progress()
-    return RecordEstimate(blocks, setup, batch, tuple(replays))
+    if innovations is None:
+        innovations = asks_for_process_noise(model, blocks.fit, driving, batch)
+    form = estimate_in_innovations_form(setup, blocks, batch) if innovations and batch.evaluations else None
+    return RecordEstimate(blocks, setup, batch, tuple(replays), form)
 
 
 def shipped_plugin(name: str) -> Plugin:

@@ -10,6 +10,10 @@ from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.processes.flotation import save_cell
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.runner.commands.estimate import RecordEstimate
+from adaptive_flot.runner.commands.innovations_form import InnovationsEstimate
+
+SMOOTHED = "smoothed.csv"
+"""States and parameters given the whole record, where the innovations form was asked for."""
 
 
 def estimate_summary(data: Path, result: RecordEstimate) -> dict[str, Any]:
@@ -37,13 +41,26 @@ def estimate_summary(data: Path, result: RecordEstimate) -> dict[str, Any]:
             }
             for replay in result.replays
         ],
+        "innovations_form": None if result.innovations is None else _innovations_summary(result.innovations),
+    }
+
+
+def _innovations_summary(form: InnovationsEstimate) -> dict[str, Any]:
+    return {
+        "parameters": [asdict(e) for e in form.estimates],
+        "process_noise_per_sqrt_s": dict(form.noise.process),
+        "measurement_noise": dict(form.noise.measurement),
+        "walk_per_sqrt_s": dict(form.noise.walk),
+        "errors": [asdict(e) for e in form.errors],
     }
 
 
 def write_replays(result: RecordEstimate, folder: Path) -> None:
-    """Write the time series of each estimator as `<estimator>.csv`."""
+    """Write the time series of each estimator as `<estimator>.csv`, and what was smoothed."""
     for replay in result.replays:
         write_table(replay.table, folder / replay_file(replay.estimator))
+    if result.innovations is not None:
+        write_table(result.innovations.table, folder / SMOOTHED)
 
 
 def replay_file(estimator: str) -> str:

@@ -1,0 +1,121 @@
+"""The part of the estimation report on the innovations form: errors by horizon, smoothed states and parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
+from adaptive_flot.charts.units import amount, exponent, unit_text, with_std
+from adaptive_flot.report.estimate import series
+from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.parts import Bullets, Part, Section, Table
+from adaptive_flot.report.kit.wording import joined, number, spaced
+from adaptive_flot.runner.commands.estimate import RecordEstimate
+from adaptive_flot.runner.commands.innovations_form import InnovationsEstimate
+
+SHOWN_STATES = 12
+"""States that the picture shows at most; the file has all."""
+
+
+def innovations_sentences(result: RecordEstimate) -> list[str]:
+    """What process noise makes of the record, in words; nothing without the innovations form."""
+    form = result.innovations
+    if form is None:
+        return []
+    said = []
+    for output in dict.fromkeys(e.output for e in form.errors):
+        own = [e for e in form.errors if e.output == output]
+        ahead = joined([f"{amount(e.error, e.unit)} up to {e.rows} row{'s' if e.rows > 1 else ''} ahead" for e in own])
+        said.append(f"With process noise, {spaced(output)} is predicted on the test block to {ahead}.")
+    parameters = joined([f"{e.label} = {with_std(e.value, e.std, e.unit)}" for e in form.estimates])
+    said.append(f"With process noise: {parameters}.")
+    said.append(
+        "The parameters wander over the record: see their smoothed course."
+        if form.noise.walk
+        else "Nothing speaks for parameters that wander."
+    )
+    return said
+
+
+def innovations_section(result: RecordEstimate, album: Album) -> list[Section]:
+    """Section of the page; none without the innovations form."""
+    form = result.innovations
+    if form is None:
+        return []
+    parts: list[Part] = [Bullets(innovations_sentences(result)), _error_table(result, form)]
+    marks = series.block_marks(result)
+    chart = Chart(tuple(_output_panels(result, form)), marks=marks)
+    caption = f"{result.blocks.name}: measured, and predicted one row ahead with ±2σ."
+    parts.append(album.chart(chart, caption, "Measured outputs and predictions one row ahead"))
+    chart = Chart(tuple([*_parameter_panels(form), *_state_panels(result, form)]), marks=marks)
+    caption = f"{result.blocks.name}: parameters and states given all rows of the record, with ±2σ (smoothed)."
+    parts.append(album.chart(chart, caption, "Smoothed parameters and states"))
+    return [Section("innovations", "With process noise", "errors by horizon, smoothed states", parts)]
+
+
+def _error_table(result: RecordEstimate, form: InnovationsEstimate) -> Table:
+    horizons = sorted({e.rows for e in form.errors})
+    free = {
+        e.output: e.free_run for r in result.replays for e in r.errors if e.block == "test" and r.estimator == "pem"
+    }
+    rows = []
+    for output in dict.fromkeys(e.output for e in form.errors):
+        own = {e.rows: e for e in form.errors if e.output == output}
+        values = [own[h].error for h in horizons] + ([free[output]] if free else [])
+        power = exponent(np.array(values))
+        unit = unit_text(own[horizons[0]].unit, power)
+        rows.append((spaced(output), unit, *(number(v * 10.0**-power, ".4g") for v in values)))
+    header = [
+        "Output",
+        "Unit",
+        *(f"≤ {h} row{'s' if h > 1 else ''}" for h in horizons),
+        *(["Free run"] if free else []),
+    ]
+    caption = (
+        "Root mean square errors on the test block by horizon: rows since the last measurement that was used. "
+        "Free run: the batch fit, never corrected."
+    )
+    return Table(caption, tuple(header), tuple(rows), words=2)
+
+
+def _output_panels(result: RecordEstimate, form: InnovationsEstimate) -> list[Panel]:
+    panels = []
+    table = form.table if result.blocks.continues else form.table[form.table["block"] == "test"]
+    time = table["time_s"].to_numpy()
+    records = (result.blocks.fit, result.blocks.test)
+    for name in dict.fromkeys(e.output for e in form.errors):
+        c = result.setup.model.index("outputs", name)
+        q = result.setup.model.outputs[c]
+        parts = (
+            [records[0].outputs[:, c], records[1].outputs[1:, c]]
+            if result.blocks.continues
+            else [records[1].outputs[:, c]]
+        )
+        predicted, std = (table[f"{q.column}_{kind}"].to_numpy() for kind in ("predicted", "predicted_std"))
+        traces = (
+            Trace("measured", time, np.concatenate(parts), Role.TRUTH),
+            Trace("one row ahead", time, predicted, Role.ESTIMATE, std=std),
+        )
+        panels.append(Panel(spaced(name), q.unit, traces))
+    return panels
+
+
+def _parameter_panels(form: InnovationsEstimate) -> list[Panel]:
+    time = form.table["time_s"].to_numpy()
+    return [
+        Panel(e.label, e.unit, (_smoothed(form, f"{e.label}_smoothed", time),))
+        for e in form.estimates
+        if form.noise.walk
+    ]
+
+
+def _state_panels(result: RecordEstimate, form: InnovationsEstimate) -> list[Panel]:
+    time = form.table["time_s"].to_numpy()
+    states = result.setup.model.states[:SHOWN_STATES]
+    return [Panel(spaced(s.name), s.unit, (_smoothed(form, s.column, time),)) for s in states]
+
+
+def _smoothed(form: InnovationsEstimate, column: str, time: np.ndarray) -> Trace:
+    return Trace(
+        "smoothed", time, form.table[column].to_numpy(), Role.ESTIMATE, std=form.table[f"{column}_std"].to_numpy()
+    )

@@ -1,0 +1,254 @@
+"""A record in innovations form: process noise, errors k steps ahead, states and parameters smoothed with bands.
+
+The parameters come from the fit block by maximum likelihood with process noise on every state. They may walk, where
+the fit block is likelier so by more than it costs, and is predicted no worse. Kristensen, Madsen & Jorgensen,
+*Automatica* 40 (2004) 225.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from adaptive_flot.contracts import Setup
+from adaptive_flot.contracts.batch import BatchFit, ParameterEstimate
+from adaptive_flot.discovery.hypotheses.rows import noise_floor
+from adaptive_flot.discovery.innovations.noise_fit import search_noise
+from adaptive_flot.discovery.innovations.refit import HOPELESS, Refit, Refitter
+from adaptive_flot.discovery.innovations.search import is_short
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter, prediction_errors, smooth
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.commands.record_blocks import Blocks
+
+HORIZONS = (1, 10, 100)
+"""Rows ahead, at most, of the predictions whose errors are told."""
+NEAR = HORIZONS[:2]
+"""Those that choose between kinds of noise: further ahead, what has been followed up to now says little."""
+ASKED = 3.0
+"""A batch fit that leaves so many times the noise from row to row asks for process noise."""
+WALKS = (1e-3, 3e-3, 1e-2, 2e-2, 4e-2, 8e-2, 0.16)
+"""Sizes of a walk that are tried, in scales of a parameter per square root of a row."""
+NO_WORSE = 1.05
+"""Mean error of predictions, with parameters that walk, over that without, up to which likelier ones walk."""
+SHARES = (1.0, 0.1, 0.01)
+"""Shares of the process noise that are tried with each."""
+
+
+@dataclass(frozen=True)
+class HorizonError:
+    """Root mean square error of an output on the test block, predicted up to so many rows ahead."""
+
+    output: str
+    unit: str
+    rows: int
+    seconds: float
+    error: float
+
+
+@dataclass(frozen=True)
+class InnovationsEstimate:
+    """A model in innovations form.
+
+    Attributes
+    ----------
+    estimates
+        Parameters, from the fit block.
+    noise
+        Process noise, measurement noise, and walks of parameters where there are any.
+    errors
+        Errors on the test block by output and horizon.
+    table
+        A row an instant: `time_s`, `block`; smoothed states `<state>` and `<state>_std`; parameters `<label>_smoothed`
+        and `<label>_smoothed_std`; outputs predicted one row ahead `<column>_predicted` and `<column>_predicted_std`.
+    """
+
+    estimates: tuple[ParameterEstimate, ...]
+    noise: NoiseModel
+    errors: tuple[HorizonError, ...]
+    table: pd.DataFrame
+
+
+def asks_for_process_noise(model: Model, fit: Dataset, outputs: Sequence[str], batch: BatchFit) -> bool:
+    """Whether the batch fit leaves far more than noise from row to row, and the record is short enough to be quick."""
+    floor = noise_floor([fit], model.indices("outputs", outputs))
+    return bool((batch.noise_std > ASKED * floor).any()) and is_short(fit, model)
+
+
+def estimate_in_innovations_form(setup: Setup, blocks: Blocks, batch: BatchFit) -> InnovationsEstimate:
+    """Fit the fit block from where the batch fit ended, then filter and smooth both blocks.
+
+    Parameters
+    ----------
+    setup
+        Model, q parameters and m outputs.
+    blocks
+        The record in two blocks.
+    batch
+        Fit of the free run.
+
+    Returns
+    -------
+    InnovationsEstimate
+        Estimates, noise, errors by horizon, and the smoothed course of the record.
+    """
+    model, columns = setup.model, tuple(setup.model.indices("outputs", setup.outputs))
+    fit = replace(blocks.fit, initial_state=batch.initial_state)
+    floor = noise_floor([fit], columns)
+    refitter = Refitter(model, fit, columns, floor, setup.parameters)
+    with np.errstate(all="ignore"):
+        found = refitter.fit(batch.parameters)
+        covariance = refitter.covariance(found)
+        form = _Form(model, setup.dt, columns, setup.parameters, found, covariance)
+        noise = form.best_noise(fit, refitter)
+        if blocks.continues:  # the test block starts at the last row of the fit block
+            parts = [(_joined(fit, blocks.test), len(fit) - 1)]
+        else:
+            parts = [(fit, len(fit)), (replace(blocks.test, initial_state=batch.initial_state), 0)]
+        ran = [(record, first, form.run(record, noise)) for record, first in parts]
+        tables = [form.table(record, first, filtered) for record, first, filtered in ran]
+        record, first, filtered = ran[-1]
+        errors = tuple(e for rows in HORIZONS for e in form.errors(record, first, filtered, noise, rows))
+    return InnovationsEstimate(form.estimates(), noise, errors, pd.concat(tables, ignore_index=True))
+
+
+def _joined(fit: Dataset, test: Dataset) -> Dataset:
+    """Both blocks as one record, the row they share once."""
+    return replace(
+        fit,
+        time=np.concatenate([fit.time, test.time[1:]]),
+        inputs=np.concatenate([fit.inputs, test.inputs[1:]]),
+        outputs=np.concatenate([fit.outputs, test.outputs[1:]]),
+    )
+
+
+@dataclass(frozen=True)
+class _Form:
+    """A fitted model in innovations form, and what is made of it."""
+
+    model: Model
+    dt: float
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    found: Refit
+    covariance: FloatArray
+
+    def start(self, record: Dataset, noise: NoiseModel) -> tuple[FloatArray, FloatArray]:
+        """Means and covariance before the first row; walking parameters start about where the fit has them."""
+        refitter = Refitter(self.model, record, self.columns, np.ones(len(self.columns)), ())
+        z, P = refitter.start(replace(noise, walk={}), self.found.p)
+        if not noise.walk:
+            return z, P
+        where, n = list(self.model.indices("parameters", self.names)), len(z)
+        joint = np.zeros((n + len(where),) * 2)
+        duration = len(record) * self.dt  # the mean of a walk is off its start by a third of what it walks, in variance
+        joint[:n, :n] = P
+        joint[n:, n:] = self.covariance + np.diag([w**2 * duration / 3 for w in noise.walk.values()])
+        return np.concatenate([z, self.found.p[where]]), joint
+
+    def run(self, record: Dataset, noise: NoiseModel) -> Filtered:
+        """Filter a record."""
+        run = RecordFilter(self.model, self.dt, self.columns, tuple(noise.walk), noise.degrees_of_freedom)
+        return run.run(record, noise, *self.start(record, noise), self.found.p)
+
+    def best_noise(self, fit: Dataset, refitter: Refitter) -> NoiseModel:
+        """Noise with heavy tails, with none, or with parameters that walk: the one whose predictions are best.
+
+        Heavy tails take an outlier for what it is. A model that is wrong for a while loses its track by them.
+        """
+
+        def gaussian(theta: float, rho: float) -> NoiseModel:
+            return replace(refitter.noise((theta, rho)), degrees_of_freedom=float("inf"))
+
+        def cost(theta: float, rho: float) -> float:
+            value = -self._log_likelihood(fit, gaussian(theta, rho))
+            return value if np.isfinite(value) else HOPELESS
+
+        size = search_noise(cost, self.found.size)
+        still = [(self.found.size, self.found.noise), (size, gaussian(*size))]
+        size, noise = min(still, key=lambda each: self._mean_error(fit, each[1]))
+        walking = self._walking(fit, refitter, size, noise)
+        return walking if self._mean_error(fit, walking) <= NO_WORSE * self._mean_error(fit, noise) else noise
+
+    def _walking(
+        self, fit: Dataset, refitter: Refitter, size: tuple[float, float], still: NoiseModel
+    ) -> NoiseModel:  # fmt: skip
+        """The likeliest noise with parameters that walk; process noise is smaller beside."""
+        scale = {q.name: q.scale or abs(q.value) or 1.0 for q in self.model.parameters}
+        tried = [
+            replace(
+                refitter.noise((share * size[0], size[1])),
+                walk={name: walk * scale[name] / np.sqrt(self.dt) for name in self.names},
+                degrees_of_freedom=still.degrees_of_freedom,
+            )
+            for walk in WALKS
+            for share in SHARES
+        ]
+        likely = [self._log_likelihood(fit, noise) for noise in tried]
+        best = int(np.argmax(np.nan_to_num(likely, nan=-np.inf)))
+        worth = likely[best] > self._log_likelihood(fit, still) + np.log(len(fit)) / 2
+        return tried[best] if worth else still
+
+    def _log_likelihood(self, record: Dataset, noise: NoiseModel) -> float:
+        return float(self.run(record, noise).log_likelihood.sum())
+
+    def _mean_error(self, record: Dataset, noise: NoiseModel) -> float:
+        """Mean absolute error over near horizons and outputs, in mean changes of an output from row to row."""
+        measured, filtered = record.outputs[:, list(self.columns)], self.run(record, noise)
+        unit = np.maximum(np.nanmean(np.abs(np.diff(measured, axis=0)), axis=0), 1e-300)
+        left = [np.abs(self._left(record, filtered, noise, rows))[1:] for rows in NEAR]
+        mean = float(np.mean([np.nanmean(e / unit) for e in left]))
+        return mean if np.isfinite(mean) else float("inf")
+
+    def _left(self, record: Dataset, filtered: Filtered, noise: NoiseModel, rows: int) -> FloatArray:
+        """Measured less predicted, up to so many rows ahead (N, m)."""
+        if rows == 1:
+            return np.asarray(record.outputs[:, list(self.columns)] - filtered.predicted, dtype=np.float64)
+        stepper = Stepper(self.model, self.dt)
+        return prediction_errors(stepper, record, filtered, self.columns, tuple(noise.walk), self.found.p, rows)
+
+    def estimates(self) -> tuple[ParameterEstimate, ...]:
+        """Fitted parameters with their standard deviations."""
+        std = np.sqrt(np.diag(self.covariance))
+        chosen = [self.model.parameters[i] for i in self.model.indices("parameters", self.names)]
+        values = self.found.p[list(self.model.indices("parameters", self.names))]
+        return tuple(
+            ParameterEstimate(q.name, q.label, q.unit, float(v), float(s), bool(v <= q.lower or v >= q.upper))
+            for q, v, s in zip(chosen, values, std, strict=True)
+        )
+
+    def errors(
+        self, record: Dataset, first: int, filtered: Filtered, noise: NoiseModel, rows: int
+    ) -> tuple[HorizonError, ...]:
+        """Errors on the rows from `first` on, up to so many rows ahead."""
+        left = self._left(record, filtered, noise, rows)
+        outputs = [self.model.outputs[c] for c in self.columns]
+        rms = np.sqrt(np.nanmean(left[max(first, 1) :] ** 2, axis=0))
+        return tuple(
+            HorizonError(q.name, q.unit, rows, rows * self.dt, float(e)) for q, e in zip(outputs, rms, strict=True)
+        )
+
+    def table(self, record: Dataset, first: int, filtered: Filtered) -> pd.DataFrame:
+        """What a record becomes: smoothed states and parameters, and outputs predicted one row ahead."""
+        smoothed = smooth(filtered)
+        std, nx = smoothed.std(), len(self.model.states)
+        block = np.where(np.arange(len(record)) < first, "fit", "test")
+        found: dict[str, object] = {"time_s": record.time, "block": block}
+        for j, state in enumerate(self.model.states):
+            found |= {state.column: smoothed.z[:, j], f"{state.column}_std": std[:, j]}
+        walks = smoothed.z.shape[1] > nx
+        for j, e in enumerate(self.estimates()):
+            values = smoothed.z[:, nx + j] if walks else np.full(len(record), e.value)
+            spread = std[:, nx + j] if walks else np.full(len(record), e.std)
+            found |= {f"{e.label}_smoothed": values, f"{e.label}_smoothed_std": spread}
+        for j, c in enumerate(self.columns):
+            column = self.model.outputs[c].column
+            found |= {
+                f"{column}_predicted": filtered.predicted[:, j],
+                f"{column}_predicted_std": np.sqrt(filtered.variance[:, j]),
+            }
+        return pd.DataFrame(found)
