@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 
 from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.charts.units import amount, exponent, unit_text, with_std
@@ -47,7 +48,7 @@ def innovations_section(result: RecordEstimate, album: Album) -> list[Section]:
     chart = Chart(tuple(_output_panels(result, form)), marks=marks)
     caption = f"{result.blocks.name}: measured, and predicted one row ahead with ±2σ."
     parts.append(album.chart(chart, caption, "Measured outputs and predictions one row ahead"))
-    chart = Chart(tuple([*_parameter_panels(form), *_state_panels(result, form)]), marks=marks)
+    chart = Chart(tuple(_smoothed_panels(result, form)), marks=marks)
     caption = f"{result.blocks.name}: parameters and states given all rows of the record, with ±2σ (smoothed)."
     parts.append(album.chart(chart, caption, "Smoothed parameters and states"))
     return [Section("innovations", "With process noise", "errors by horizon, smoothed states", parts)]
@@ -78,44 +79,36 @@ def _error_table(result: RecordEstimate, form: InnovationsEstimate) -> Table:
     return Table(caption, tuple(header), tuple(rows), words=2)
 
 
+def _shown(result: RecordEstimate, form: InnovationsEstimate) -> pd.DataFrame:
+    """Both blocks where they follow each other in time, else the test block."""
+    return form.table if result.blocks.continues else form.table[form.table["block"] == "test"]
+
+
 def _output_panels(result: RecordEstimate, form: InnovationsEstimate) -> list[Panel]:
+    table, model, (fit, test) = _shown(result, form), result.setup.model, (result.blocks.fit, result.blocks.test)
     panels = []
-    table = form.table if result.blocks.continues else form.table[form.table["block"] == "test"]
-    time = table["time_s"].to_numpy()
-    records = (result.blocks.fit, result.blocks.test)
     for name in dict.fromkeys(e.output for e in form.errors):
-        c = result.setup.model.index("outputs", name)
-        q = result.setup.model.outputs[c]
-        parts = (
-            [records[0].outputs[:, c], records[1].outputs[1:, c]]
-            if result.blocks.continues
-            else [records[1].outputs[:, c]]
-        )
-        predicted, std = (table[f"{q.column}_{kind}"].to_numpy() for kind in ("predicted", "predicted_std"))
+        c = model.index("outputs", name)
+        q = model.outputs[c]
+        both = np.concatenate([fit.outputs[:, c], test.outputs[1:, c]])
+        measured = both if result.blocks.continues else test.outputs[:, c]
         traces = (
-            Trace("measured", time, np.concatenate(parts), Role.TRUTH),
-            Trace("one row ahead", time, predicted, Role.ESTIMATE, std=std),
+            Trace("measured", table["time_s"].to_numpy(), measured, Role.TRUTH),
+            _trace("one row ahead", table, f"{q.column}_predicted"),
         )
         panels.append(Panel(spaced(name), q.unit, traces))
     return panels
 
 
-def _parameter_panels(form: InnovationsEstimate) -> list[Panel]:
-    time = form.table["time_s"].to_numpy()
-    return [
-        Panel(e.label, e.unit, (_smoothed(form, f"{e.label}_smoothed", time),))
-        for e in form.estimates
-        if form.noise.walk
-    ]
-
-
-def _state_panels(result: RecordEstimate, form: InnovationsEstimate) -> list[Panel]:
-    time = form.table["time_s"].to_numpy()
+def _smoothed_panels(result: RecordEstimate, form: InnovationsEstimate) -> list[Panel]:
+    """Parameters where they walk, then states."""
+    table = _shown(result, form)
+    walking = form.estimates if form.noise.walk else ()
+    parameters = [Panel(e.label, e.unit, (_trace("smoothed", table, f"{e.label}_smoothed"),)) for e in walking]
     states = result.setup.model.states[:SHOWN_STATES]
-    return [Panel(spaced(s.name), s.unit, (_smoothed(form, s.column, time),)) for s in states]
+    return [*parameters, *(Panel(spaced(s.name), s.unit, (_trace("smoothed", table, s.column),)) for s in states)]
 
 
-def _smoothed(form: InnovationsEstimate, column: str, time: np.ndarray) -> Trace:
-    return Trace(
-        "smoothed", time, form.table[column].to_numpy(), Role.ESTIMATE, std=form.table[f"{column}_std"].to_numpy()
-    )
+def _trace(label: str, table: pd.DataFrame, column: str) -> Trace:
+    std = table[f"{column}_std"].to_numpy()
+    return Trace(label, table["time_s"].to_numpy(), table[column].to_numpy(), Role.ESTIMATE, std=std)

@@ -246,9 +246,10 @@ class _Form:
             spread = std[:, nx + j] if walks else np.full(len(record), e.std)
             found |= {f"{e.label}_smoothed": values, f"{e.label}_smoothed_std": spread}
         for j, c in enumerate(self.columns):
-            column = self.model.outputs[c].column
+            column, predicted, spread = self.model.outputs[c].column, filtered.predicted[:, j], filtered.variance[:, j]
+            later = np.arange(len(record)) > 0  # nothing was known before the first row
             found |= {
-                f"{column}_predicted": filtered.predicted[:, j],
-                f"{column}_predicted_std": np.sqrt(filtered.variance[:, j]),
+                f"{column}_predicted": np.where(later, predicted, np.nan),
+                f"{column}_predicted_std": np.where(later, np.sqrt(spread), np.nan),
             }
         return pd.DataFrame(found)
