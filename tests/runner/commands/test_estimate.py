@@ -186,7 +186,7 @@ def test_summary_is_strict_json_with_the_fit_and_every_error(result: RecordEstim
 
     text = json.dumps(plain(estimate_summary(Path("folder/plant.csv"), result)), allow_nan=False)
     summary = json.loads(text, parse_constant=reject)
-    assert list(summary) == ["data", "model", "fit", "estimators"]
+    assert list(summary) == ["data", "model", "fit", "estimators", "innovations_form"]
     assert summary["data"] == "plant.csv" and summary["model"] == "flotation"
     fit = summary["fit"]
     assert [p["label"] for p in fit["parameters"]] == ["n", "C"]
