@@ -48,9 +48,11 @@ class Snapshot:
     written: bool = True
     allowed: Mode = Mode.CLOSED
 
-    @property
-    def permitted(self) -> Mode | None:
-        """The lower one of the operator's switch and the page's; None where nobody says how far the link may go."""
+    def permitted(self, mode: Mode) -> Mode | None:
+        """The lower one of the operator's switch and the page's, in a mode.
+
+        Where the operator's can not be read, the page's only lowers the mode; None where it does not.
+        """
         if self.switch is None:
-            return None if self.allowed is Mode.CLOSED else self.allowed
+            return self.allowed if self.allowed < min(mode, Mode.CLOSED) else None
         return min(self.switch, self.allowed)

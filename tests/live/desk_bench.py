@@ -51,7 +51,7 @@ class DeskBench:
         results = self.direct.take(outcome)
         self.well = not any(w.problem for w in results.values())
         desk, state = self.desk, self.state
-        shown = desk.alarms, desk.card, desk.shadows(), answered
+        shown = desk.alarms, desk.card, desk.shadows(), answered, self.use.extended
         model = self.use.cycle.model
         return Progress(snapshot, outcome, 0.004, "", True, state.modes, state.histories, model, *shown)
 

@@ -61,8 +61,11 @@ def test_a_switch_of_the_page_holds_while_the_plants_can_not_be_read(plain: Desk
     plain.ask(Action.SWITCH, "monitor")
     told = plain.direct.snapshot()
     unread = type(told)(**{**vars(told), "switch": None})
-    assert unread.permitted is None, "nobody but the plant says how far the link may go"
-    assert type(told)(**{**vars(unread), "allowed": Mode.MONITOR}).permitted is Mode.MONITOR
+    for allowed in (Mode.OFF, Mode.MONITOR, Mode.ADVISORY, Mode.CLOSED):
+        page = type(told)(**{**vars(unread), "allowed": allowed})
+        for mode in Mode:
+            lowers = allowed < min(mode, Mode.CLOSED)
+            assert page.permitted(mode) is (allowed if lowers else None), "only the plant says how far up it may go"
     plain.ask(Action.SWITCH, "closed")
     assert plain.run(4)[-1].mode is Mode.CLOSED
 

@@ -72,7 +72,7 @@ def test_a_person_who_may_act_is_heard_by_name(actor: Visitor, inbox: Inbox) -> 
     "headers",
     [
         {"Cookie": None},
-        {"Cookie": "adaptive_flot_live=guessed"},
+        {"Cookie": "guessed"},
         {"X-CSRF-Token": None},
         {"X-CSRF-Token": "guessed"},
         {"X-CSRF-Token": ""},
@@ -86,6 +86,8 @@ def test_a_person_who_may_act_is_heard_by_name(actor: Visitor, inbox: Inbox) -> 
     ],
 )
 def test_forged_requests_change_nothing(actor: Visitor, inbox: Inbox, headers: dict[str, str | None]) -> None:
+    if headers.get("Cookie"):
+        headers = {"Cookie": f"{actor.cookie.split('=')[0]}=guessed"}
     assert actor.act(SWITCH, headers) in (401, 403, 421)
     assert inbox.take() == []
 
@@ -103,6 +105,9 @@ def test_forged_requests_change_nothing(actor: Visitor, inbox: Inbox, headers: d
         {"action": "switch", "about": 3},
         {"action": "switch", "about": "x" * 300},
         {"action": "switch", "about": "off", "person": "B"},
+        {"action": "acknowledge", "about": "all\0"},  # PostgreSQL refuses it, and the link would end
+        {"action": "acknowledge", "about": "all\n7: closed: the plant has granted control"},
+        {"action": "acknowledge", "about": "\x1b[2J"},
         {"action": ["switch"]},
         b'{"action": "switch", "about": "' + b"x" * 100_000 + b'"}',
         b'{"action":' * 1000,
@@ -253,7 +258,9 @@ def test_sessions_end_with_the_shift_and_are_bounded() -> None:
     assert access.session(first[0]) is not None
     now = LASTS_S
     assert access.session(first[0]) is None
+    acting = access.log_in(ACT, "A")
     keys = [made[0] for _ in range(MOST_SESSIONS + 1) if (made := access.log_in(VIEW, "")) is not None]
+    assert acting is not None and access.session(acting[0]) is not None, "no viewer ends the session of one who acts"
     assert access.session(keys[0]) is None and access.session(keys[1]) is not None
 
 
@@ -263,6 +270,7 @@ def test_sessions_end_with_the_shift_and_are_bounded() -> None:
         ({"page.host": "0.0.0.0"}, "give certificate and key"),
         ({"page.certificate": "x.pem"}, "give both"),
         ({"page.act_token_file": "none.token"}, "can not be read"),
+        ({"page.certificate": "none.pem", "page.key": "none.pem"}, "certificate and key can not be used"),
         ({"page.prot": 1}, "did you mean"),
     ],
 )

@@ -131,7 +131,7 @@ class Cycle:
                 state, estimate, problem = self._estimated(state, reading.sample)
         asked = self._asked(state, snapshot, reading, estimate)
         facts = CycleFacts(
-            switch=snapshot.permitted,
+            switch=snapshot.permitted(state.modes.mode),
             alive=time is not None,
             measured=(reading is not None and reading.good) or state.modes.mode is Mode.OFF,
             solved=asked.found or state.modes.mode not in (Mode.ADVISORY, Mode.CLOSED),

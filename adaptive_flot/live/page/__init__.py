@@ -7,6 +7,7 @@ picture.py      What the page shows of a cycle: plain numbers and words, nothing
 axes.py         The panels over time: which lines they have, and the numbers of a cycle for them.
 hub.py          The last hour, and the browsers that listen; one that is slow is dropped.
 application.py  What is served: the page, its stream, and the actions.
+connections.py  Bounds on connections: how many, and how long each may take to ask.
 server.py       The server in a thread of its own, which the loop of the link never waits for.
 assets/         The page itself; charts are those of `adaptive_flot/charts`.
 

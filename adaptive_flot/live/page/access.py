@@ -6,7 +6,6 @@ import hashlib
 import hmac
 import secrets
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -15,7 +14,7 @@ COOKIE = "adaptive_flot_live"
 LASTS_S = 12 * 3600.0
 """A session ends so long after its log-in: a shift, with room for the hand-over."""
 MOST_SESSIONS = 64
-"""Older ones end where there are more."""
+"""Of one role; older ones of it end where there are more, so that no viewer ends the session of one who acts."""
 LONGEST_NAME = 60
 LEAST_TOKEN = 20
 """Characters of a token; a shorter one could be guessed."""
@@ -63,7 +62,7 @@ class Access:
 
     def __init__(self, view: str, act: str, clock: Callable[[], float] = time.monotonic) -> None:
         self._tokens = {Role.ACT: _digest(act), Role.VIEW: _digest(view)}
-        self._sessions: OrderedDict[bytes, Session] = OrderedDict()
+        self._sessions: dict[bytes, Session] = {}
         self._clock = clock
 
     def log_in(self, token: str, name: str) -> tuple[str, Session] | None:
@@ -78,8 +77,9 @@ class Access:
         session = Session(name.strip(), right[0], secrets.token_urlsafe(32), self._clock() + LASTS_S)
         key = secrets.token_urlsafe(32)
         self._sessions[_digest(key)] = session
-        while len(self._sessions) > MOST_SESSIONS:
-            self._sessions.popitem(last=False)
+        alike = [other for other, known in self._sessions.items() if known.role is session.role]
+        for oldest in alike[:-MOST_SESSIONS]:
+            del self._sessions[oldest]
         return key, session
 
     def session(self, key: str | None) -> Session | None:

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 from urllib.parse import parse_qs
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.requests import Request as HttpRequest
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
@@ -38,13 +38,20 @@ HEADERS = {
 }
 
 
+def _printable(text: str) -> str:
+    """Nothing that a database refuses (NUL) or that a console obeys; ValueError for another text."""
+    if not text.isprintable():
+        raise ValueError("holds characters that can not be shown")
+    return text
+
+
 class Asked(BaseModel):
     """Body of a request for an action."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
     action: Literal["switch", "acknowledge", "shadow", "apply", "revert"]
-    about: Annotated[str, Field(max_length=200)] = ""
+    about: Annotated[str, Field(max_length=200), AfterValidator(_printable)] = ""
 
 
 class _TooLongError(Exception):
@@ -66,12 +73,17 @@ class PageApplication:
         Values of `Host` under which it is served.
     scheme
         `http` or `https`.
+    port
+        Where it is served. Cookies are the same for all ports of a host: pages of several links need names of their
+        own.
     """
 
-    def __init__(self, access: Access, hub: Hub, inbox: Inbox, hosts: frozenset[str], scheme: str) -> None:
+    def __init__(self, access: Access, hub: Hub, inbox: Inbox, hosts: frozenset[str], scheme: str, port: int) -> None:
         self._access, self._hub, self._inbox = access, hub, inbox
         self._origins = frozenset(f"{scheme}://{host}" for host in hosts)
         self._secure = scheme == "https"
+        # a browser takes a `__Host-` cookie from this very host only, over https
+        self._cookie = f"{'__Host-' if self._secure else ''}{COOKIE}_{port}"
         routes = [
             Route("/", self._page, methods=["GET"]),
             Route("/login", self._login, methods=["GET", "POST"]),
@@ -108,7 +120,13 @@ class PageApplication:
             return Response(login_page("Wrong token, or no name."), 403, media_type="text/html")
         answer = RedirectResponse("/", 303)
         answer.set_cookie(
-            COOKIE, given[0], max_age=int(LASTS_S), httponly=True, samesite="strict", secure=self._secure, path="/"
+            self._cookie,
+            given[0],
+            max_age=int(LASTS_S),
+            httponly=True,
+            samesite="strict",
+            secure=self._secure,
+            path="/",
         )
         return answer
 
@@ -116,9 +134,9 @@ class PageApplication:
         session = self._session(request)
         if session is None or foreign(request.headers, self._origins) or not _has_csrf(request, session):
             return PlainTextResponse("refused", 403)
-        self._access.log_out(request.cookies.get(COOKIE))
+        self._access.log_out(request.cookies.get(self._cookie))
         answer = PlainTextResponse("logged out")
-        answer.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict", secure=self._secure)
+        answer.delete_cookie(self._cookie, path="/", httponly=True, samesite="strict", secure=self._secure)
         return answer
 
     async def _action(self, request: HttpRequest) -> Response:
@@ -146,7 +164,7 @@ class PageApplication:
         return PlainTextResponse("taken: the next cycle carries it out", 202)
 
     async def _events(self, request: HttpRequest) -> Response:
-        key = request.cookies.get(COOKIE)
+        key = request.cookies.get(self._cookie)
         session = self._access.session(key)
         if session is None:
             return PlainTextResponse("refused: not logged in", 401)
@@ -157,7 +175,7 @@ class PageApplication:
         return _Stream(self._hub, listener, who, lambda: self._access.session(key) is not None)
 
     def _session(self, request: HttpRequest) -> Session | None:
-        return self._access.session(request.cookies.get(COOKIE))
+        return self._access.session(request.cookies.get(self._cookie))
 
 
 class _Stream(Response):

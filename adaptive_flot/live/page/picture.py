@@ -10,9 +10,9 @@ import numpy as np
 from adaptive_flot.contracts import Estimate, OperatingPoint, Plan, Sample, Status, full_parameters
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.link_file import TRIED, Link
 from adaptive_flot.live.page.axes import Axes, Shown, is_share, plain
-from adaptive_flot.live.running.progress import Card, Progress
+from adaptive_flot.live.running.progress import Progress, Stage
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.shadow.process import ShadowView
@@ -107,7 +107,8 @@ class Pictures:
                 }
                 for a in progress.alarms.values()
             ],
-            "card": None if progress.card is None else self._card(progress.card),
+            "reverts": progress.extended,
+            "card": self._card(progress),
             "discovery": self._said,
             "shadows": [self._shadow(v) for v in progress.shadows.values()],
             "plan": self._planned(progress),
@@ -204,8 +205,12 @@ class Pictures:
             found.append({"name": name.replace("_", " "), "state": state, "age": plain(age)})
         return found
 
-    def _card(self, card: Card) -> dict[str, Any]:
-        finding = card.finding
+    def _card(self, progress: Progress) -> dict[str, Any] | None:
+        if progress.card is None:
+            return None
+        card, finding = progress.card, progress.card.finding
+        tried = progress.shadows.get(TRIED)
+        stages = (Stage.FOUND, Stage.REVERTED, *(() if tried is not None and tried.runs else (Stage.SHADOW,)))
         return {
             "since": plain(self._clock(card.since), 14),
             "word": finding.word,
@@ -216,6 +221,7 @@ class Pictures:
             "stage": card.stage.value,
             "by": card.by,
             "can": bool(finding.effects),
+            "tries": bool(finding.effects) and card.stage in stages,
         }
 
     def _shadow(self, view: ShadowView) -> dict[str, Any]:

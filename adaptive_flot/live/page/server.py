@@ -17,6 +17,7 @@ from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.link_keys import LOOPBACK, PagePart
 from adaptive_flot.live.page.access import LEAST_TOKEN, Access
 from adaptive_flot.live.page.application import PageApplication
+from adaptive_flot.live.page.connections import MOST_ACCEPTED, Listening, PatientProtocol
 from adaptive_flot.live.page.hub import Hub
 from adaptive_flot.live.requests import Inbox
 from adaptive_flot.live.running.progress import Progress
@@ -45,7 +46,8 @@ class PageServer:
     Raises
     ------
     LinkError
-        A token can not be read or is too short, both are the same, or the port is in use.
+        A token can not be read or is too short, both are the same, the port is in use, or certificate and key can not
+        be used.
     """
 
     def __init__(self, link: Link, inbox: Inbox) -> None:
@@ -61,10 +63,10 @@ class PageServer:
         hosts = frozenset(n.lower() for name in names for n in _hosts(name, port))
         self.address = f"{scheme}://{_hosts(part.host, port)[0]}/"
         self.hub = Hub(link)
-        made = PageApplication(Access(view, act), self.hub, inbox, hosts, scheme)
+        made = PageApplication(Access(view, act), self.hub, inbox, hosts, scheme, port)
         config = uvicorn.Config(
             made.application,
-            http="h11",
+            http=PatientProtocol,
             ws="none",
             lifespan="off",
             loop="asyncio",
@@ -73,11 +75,19 @@ class PageServer:
             server_header=False,
             proxy_headers=False,
             limit_concurrency=MOST_CONNECTIONS,
+            backlog=MOST_ACCEPTED,
             h11_max_incomplete_event_size=16384,
             timeout_graceful_shutdown=1,
             ssl_certfile=None if part.certificate is None else str(link.beside(part.certificate)),
             ssl_keyfile=None if part.key is None else str(link.beside(part.key)),
         )
+        try:
+            config.load()
+        except OSError as error:  # also what is wrong with a certificate (ssl.SSLError)
+            self._socket.close()
+            raise LinkError(
+                f"{link.path}: page: certificate and key can not be used ({error.strerror or error})"
+            ) from error
         self._server = uvicorn.Server(config)
         self._cycles: deque[Progress] = deque(maxlen=MOST_CYCLES)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -102,10 +112,13 @@ class PageServer:
 
     def close(self) -> None:
         """Stop serving."""
-        if self._loop is not None:
-            self._loop.call_soon_threadsafe(self.hub.close)
+        loop = self._loop
+        if loop is not None:
+            with contextlib.suppress(RuntimeError):  # the thread has ended
+                loop.call_soon_threadsafe(self.hub.close)
         self._server.should_exit = True
-        self._thread.join(ENDS_WITHIN_S)
+        if self._started.is_set():
+            self._thread.join(ENDS_WITHIN_S)
         self._socket.close()
 
     def _run(self) -> None:
@@ -139,10 +152,10 @@ def _token(file: Path) -> str:
 
 
 def _hosts(name: str, port: int) -> list[str]:
-    """Values of `Host` for a name: with the port, unless it has one."""
-    if name == "::1":
-        return [f"[::1]:{port}"]
-    return [name] if ":" in name else [f"{name}:{port}", *([name] if port in (80, 443) else [])]
+    """Values of `Host` for a name: with the port, unless it has one; an address of IPv6 in brackets."""
+    if name.count(":") > 1 and not name.startswith("["):
+        name = f"[{name}]"
+    return [name] if ":" in name.rpartition("]")[2] else [f"{name}:{port}", *([name] if port in (80, 443) else [])]
 
 
 def _listening(path: Path, part: PagePart) -> socket.socket:
@@ -155,4 +168,4 @@ def _listening(path: Path, part: PagePart) -> socket.socket:
         ) from error
     if hasattr(socket, "TCP_USER_TIMEOUT"):  # a browser that is cut off must not keep its connection
         made.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 10_000)
-    return made
+    return Listening(made)

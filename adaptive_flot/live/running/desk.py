@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.alarms import Alarms, acknowledged, after_cycle, conditions, lasting
 from adaptive_flot.live.finding import Finding
@@ -69,7 +71,7 @@ class Desk:
         self._shadows: dict[str, Shadow] = {}
         self._lasting: dict[str, int] = {}
         self._said: dict[str, str] = {}
-        self._applies: str = ""
+        self._applies = self._reverts = ""
         model, limits = link.scenario.model, link.scenario.limits
         outputs = {} if limits is None else limits.outputs
         self._limits = {}
@@ -90,26 +92,47 @@ class Desk:
 
     def change_model(self, state: CycleState) -> tuple[CycleState, ModelChange | None]:
         """Take up or leave an extension, where one was asked for and is ready."""
-        card, ready = self.card, self.use.built()
-        if card is None or not self._applies or state.sample is None or state.estimation.estimate is None:
+        ready = self.use.built()
+        if state.sample is None or state.estimation.estimate is None:
             return state, None
-        person = self._applies
-        if card.stage is Stage.APPLIED:
-            self._applies = ""
-            self.card = replace(card, stage=Stage.REVERTED, by=person)
-            return self.use.revert(state, person)
-        if ready is None:
+        if self._reverts:
+            return self._reverted(state)
+        if self.card is None or not self._applies or ready is None:
             return state, None
-        self._applies = ""
+        person, self._applies = self._applies, ""
+        return self._taken_up(self.card, state, ready, person)
+
+    def _reverted(self, state: CycleState) -> tuple[CycleState, ModelChange]:
+        """The model before; what was found beside the one that is left no longer holds."""
+        person, self._reverts = self._reverts, ""
+        if TRIED in self._shadows:
+            self._shadows.pop(TRIED).close()
+        applied = self.card is not None and self.card.stage is Stage.APPLIED
+        self.card = replace(self.card, stage=Stage.REVERTED, by=person) if self.card is not None and applied else None
+        return self.use.revert(state, person)
+
+    def _taken_up(
+        self, card: Card, state: CycleState, problem: str, person: str
+    ) -> tuple[CycleState, ModelChange | None]:
+        """The extended model, where it could be built and its shadow stands at numbers; else the one in use stays."""
         tried = self._tried()
-        result = None if tried is None else tried.newest
-        if ready or tried is None or result is None or result.estimate is None:
-            self.card = replace(card, stage=Stage.FOUND)
-            self._said["model"] = f"not applied: {ready or 'it does not run in shadow any more'}"
-            return state, None
-        self.card = replace(card, stage=Stage.APPLIED, by=person, errors=tried.compared.errors)
-        self._shadows.pop(TRIED).close()
-        return self.use.apply(state, result.estimate, person)
+        known = None if tried is None or tried.newest is None else tried.newest.estimate
+        if tried is None or known is None:
+            problem = problem or "it does not run in shadow any more"
+        elif not all(np.isfinite(part).all() for part in (known.state, known.parameters, known.covariance)):
+            problem = problem or "its estimate in shadow is not finite"
+        elif not problem:
+            try:
+                changed = self.use.apply(state, known, person)
+            except Exception as error:  # whatever a plug-in raises, the cycles go on with the model in use
+                problem = f"{type(error).__name__}: {error}"
+            else:
+                self.card = replace(card, stage=Stage.APPLIED, by=person, errors=tried.compared.errors)
+                self._shadows.pop(TRIED).close()
+                return changed
+        self.card = replace(card, stage=Stage.FOUND)
+        self._said["model"] = f"not applied: {problem}"
+        return state, None
 
     def after(self, outcome: Outcome, noise_std: Sequence[float], finding: Finding | None) -> None:
         """Look at a cycle: feed the shadows, raise and clear alarms, take up what discovery found."""
@@ -121,7 +144,8 @@ class Desk:
             for shadow in self._shadows.values():
                 shadow.feed(task, outcome.estimate)
         time = float("nan") if outcome.sample is None else outcome.sample.time
-        if finding is not None and (self.card is None or finding is not self.card.finding):
+        building = self.card is not None and self.card.stage is Stage.BUILDING  # what is applied is what was asked for
+        if finding is not None and not building and (self.card is None or finding is not self.card.finding):
             self.card = Card(finding, time)
         wrong = conditions(outcome, self._limits)
         for role, shadow in self._shadows.items():
@@ -169,8 +193,9 @@ class Desk:
         return words
 
     def _try(self, request: Request) -> str:
-        card = self.card
-        if card is None or not card.finding.effects or card.stage not in (Stage.FOUND, Stage.REVERTED):
+        card, tried = self.card, self._tried()
+        stages = (Stage.FOUND, Stage.REVERTED, *(() if tried is not None and tried.runs else (Stage.SHADOW,)))
+        if card is None or not card.finding.effects or card.stage not in stages or self._reverts:
             return "there is nothing to try in shadow"
         if TRIED in self._shadows:
             self._shadows.pop(TRIED).close()
@@ -182,11 +207,12 @@ class Desk:
             history = (finding.initial_state, finding.begin, played)
         self._start(ShadowPlan(TRIED, file.estimator, file.controller, effects, finding.parameters, history))
         self.card = replace(card, stage=Stage.SHADOW, by=request.person)
-        return "the extended model runs in shadow"
+        begun = self._shadows[TRIED].view()
+        return "the extended model runs in shadow" if begun.runs else f"not tried: {begun.status}"
 
     def _apply(self, request: Request) -> str:
         card, tried = self.card, self._tried()
-        if card is None or card.stage is not Stage.SHADOW or tried is None or not tried.runs:
+        if card is None or card.stage is not Stage.SHADOW or tried is None or not tried.runs or self._reverts:
             return "not applied: no extended model runs in shadow; try it in shadow first"
         if tried.compared.rows < FEWEST_ROWS:
             return f"not applied: it has run {tried.compared.rows} rows in shadow, {FEWEST_ROWS} are needed"
@@ -195,9 +221,11 @@ class Desk:
         return "the extended model is being built; it is taken up when it is ready"
 
     def _revert(self, request: Request) -> str:
-        if self.card is None or self.card.stage is not Stage.APPLIED or not self.use.extended:
+        if self._applies:
+            return "not reverted: an extended model is being built; ask again when it is taken up"
+        if not self.use.extended:
             return "no extended model is in use"
-        self._applies = request.person
+        self._reverts = request.person
         return "the model before is in use again"
 
     def _own(self) -> list[Request]:

@@ -67,9 +67,12 @@ class ModelUse:
     def apply(self, state: CycleState, known: Estimate, person: str) -> tuple[CycleState, ModelChange]:
         """Go on with the cycle that was built, from an estimate with its model."""
         assert self._building is not None and state.sample is not None and state.estimation.estimate is not None
-        self._before.append(_Before(self.cycle, state.estimation.estimate.parameters))
-        self.cycle, self._building = self._building.result(), None
-        return self._go_on(state, known.state, known.parameters, known.covariance, person)
+        before = _Before(self.cycle, state.estimation.estimate.parameters)
+        made, self._building = self._building.result(), None
+        after = self._go_on(made, state, known.state, known.parameters, known.covariance, person)
+        self.cycle = made
+        self._before.append(before)
+        return after
 
     def revert(self, state: CycleState, person: str) -> tuple[CycleState, ModelChange]:
         """Go back to the cycle before, with the parameters that it had."""
@@ -78,11 +81,12 @@ class ModelUse:
         estimate = state.estimation.estimate
         assert estimate is not None
         own = estimate.state[: len(self.cycle.model.states)]
-        return self._go_on(state, own, before.parameters, estimate.covariance, person)
+        return self._go_on(self.cycle, state, own, before.parameters, estimate.covariance, person)
 
+    @staticmethod
     def _go_on(
-        self, state: CycleState, x: FloatArray, parameters: FloatArray, covariance: FloatArray, person: str
+        cycle: Cycle, state: CycleState, x: FloatArray, parameters: FloatArray, covariance: FloatArray, person: str
     ) -> tuple[CycleState, ModelChange]:
         assert state.sample is not None
         prior = Prior(state.sample.time, x, parameters, covariance, np.array(state.estimation.noise_std))
-        return self.cycle.go_on(state, prior), ModelChange(self.cycle.effects, prior, person)
+        return cycle.go_on(state, prior), ModelChange(cycle.effects, prior, person)

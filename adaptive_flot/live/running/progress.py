@@ -74,6 +74,8 @@ class Progress:
         The model in use.
     alarms, card, shadows, answered
         See `Desk`.
+    extended
+        The model in use is longer than the scenario's.
     """
 
     snapshot: Snapshot
@@ -88,3 +90,4 @@ class Progress:
     card: Card | None = None
     shadows: Mapping[str, ShadowView] = field(default_factory=dict)
     answered: tuple[Answered, ...] = ()
+    extended: bool = False

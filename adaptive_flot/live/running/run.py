@@ -128,7 +128,7 @@ class LinkRun:
         answered: tuple[Answered, ...],
     ) -> Progress:
         state, desk = self.state, self.desk
-        beside = desk.alarms, desk.card, desk.shadows(), answered
+        beside = desk.alarms, desk.card, desk.shadows(), answered, self.use.extended
         return Progress(
             snapshot, outcome, seconds, found, connected, state.modes, state.histories, self.use.cycle.model, *beside
         )

@@ -6,6 +6,7 @@ import math
 import multiprocessing
 from collections.abc import Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -69,23 +70,34 @@ class Shadow:
 
     def __init__(self, link_file: Path, plan: ShadowPlan, outputs: Sequence[str], make: Make = make_stepper) -> None:
         self.plan = plan
-        context = multiprocessing.get_context("spawn")  # the link has threads, which no fork may copy
-        self._connection, other = context.Pipe()
-        self._process: BaseProcess = context.Process(
-            target=work, args=(other, link_file, plan, make), name=f"shadow {plan.role}", daemon=True
-        )
-        self._process.start()
-        other.close()
         self._comparison = Comparison(outputs)
         self._built = False
         self._behind = 0
         self._left_out = 0
         self._status = "is being built"
         self._newest: ShadowResult | None = None
+        self._connection: Connection | None = None
+        self._process: BaseProcess | None = None
+        try:
+            self._start(link_file, make)
+        except OSError as error:  # no process or no handle is left: the link goes on without this one
+            self._status = f"{ENDED}: can not be started ({error.strerror or error})"
+
+    def _start(self, link_file: Path, make: Make) -> None:
+        context = multiprocessing.get_context("spawn")  # the link has threads, which no fork may copy
+        self._connection, other = context.Pipe()
+        process = context.Process(
+            target=work, args=(other, link_file, self.plan, make), name=f"shadow {self.plan.role}", daemon=True
+        )
+        try:
+            process.start()
+            self._process = process
+        finally:
+            other.close()
 
     def feed(self, task: Task, acting: Estimate) -> None:
         """Give a sample, unless it is not built yet or too many wait."""
-        if self._status.startswith(ENDED) or not self._built:
+        if self._connection is None or self._status.startswith(ENDED) or not self._built:
             return
         self._comparison.acting(task.cycle, acting)
         if self._behind >= MOST_BEHIND:
@@ -100,6 +112,8 @@ class Shadow:
     def collect(self) -> list[ShadowResult]:
         """Results that have come in since; never waits."""
         found: list[ShadowResult] = []
+        if self._connection is None or self._status.startswith(ENDED):
+            return found
         try:
             while self._connection.poll(0):
                 told = self._connection.recv()
@@ -128,12 +142,14 @@ class Shadow:
 
     def close(self) -> None:
         """End it."""
-        self._connection.close()
-        if self._process.is_alive():
+        if self._connection is not None:
+            self._connection.close()
+        if self._process is not None:
             self._process.kill()
-        self._process.join()
+            self._process.join()
 
     def _end(self, words: str) -> None:
+        assert self._process is not None
         self._process.join(0.05)
         code = self._process.exitcode
         self._status = f"{ENDED}: {words or f'its process ended with {code}'}"

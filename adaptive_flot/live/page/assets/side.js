@@ -46,9 +46,10 @@ const AdaptiveFlotSide = (() => {
     return [table];
   }
 
-  function card({ found, words }) {
+  function card({ found, words, reverts }) {
     const said = words && !(found && words.startsWith("search ended")) ? [element("p", "soft said", `Last: ${words}`)] : [];
-    if (!found) return [element("p", "soft", "Nothing was found that the model lacks."), ...said];
+    const revert = () => AdaptiveFlotLive.button("Revert", () => AdaptiveFlotLive.ask("revert"), { sure: true, off: !reverts });
+    if (!found) return [element("p", "soft", "Nothing was found that the model lacks."), ...(reverts ? [revert()] : []), ...said];
     const parts = [element("p", "stage", `${found.stage}${found.by ? ` by ${found.by}` : ""}`)];
     parts.push(element("p", "reason", `${found.since === null ? "" : `At ${clock(found.since)}: `}${found.reason}`));
     if (found.evidence.length) {
@@ -65,9 +66,9 @@ const AdaptiveFlotSide = (() => {
     const { button, ask } = AdaptiveFlotLive;
     const can = found.can;
     row.append(button("Acknowledge", () => ask("acknowledge", "discovery"), { off: !can }));
-    row.append(button("Try in shadow", () => ask("shadow"), { off: !can || !["found", "reverted"].includes(found.stage) }));
+    row.append(button("Try in shadow", () => ask("shadow"), { off: !found.tries }));
     row.append(button("Apply", () => ask("apply"), { sure: true, off: found.stage !== "in shadow" }));
-    row.append(button("Revert", () => ask("revert"), { sure: true, off: found.stage !== "applied" }));
+    row.append(revert());
     parts.push(row, ...said);
     return parts;
   }
@@ -108,7 +109,7 @@ const AdaptiveFlotSide = (() => {
 
   function show(now) {
     fill("alarms", now.alarms, alarms);
-    fill("found", { found: now.card, words: now.discovery }, card);
+    fill("found", { found: now.card, words: now.discovery, reverts: now.reverts }, card);
     fill("shadows", now.shadows, shadows);
     fill("strips", { tags: now.tags, solver: { state: now.solver.state } }, tags);
     fill("answers", now.answers, answers);
