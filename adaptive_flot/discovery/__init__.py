@@ -15,7 +15,8 @@ test_design/  Which input moves would tell the leading alternatives apart.
 verdict/      The word, its reasons, and how they are put.
 hypotheses/   Named hypotheses about several records: what has changed since a reference.
 innovations/  A second opinion with process noise: when something happened, and what it may be.
-discover.py   The stages, one after the other.
+discover.py   What is called for one record: the stages, one after the other.
+stages.py     The stages, from the data to the proposed test.
 changes.py    What has changed since a reference, events too.
 
 Where a statistic is computed

@@ -8,38 +8,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.detect import detect
-from adaptive_flot.discovery.assessment.explained import nothing_explained
-from adaptive_flot.discovery.assessment.verification import changes
-from adaptive_flot.discovery.candidates.responses import Responses
-from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
-from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
-from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.innovations.second_opinion import second_opinion
-from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT
-from adaptive_flot.discovery.record.robust import noise_by_differences
-from adaptive_flot.discovery.record.screening import Screening, screen
-from adaptive_flot.discovery.results import Discovery, Judgement, State, Verdict
-from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
-from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
-from adaptive_flot.discovery.search.search import search
-from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
-from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
-from adaptive_flot.discovery.test_design.signals import input_range
-from adaptive_flot.discovery.verdict.conclude import conclude, insufficient, report_errors
-from adaptive_flot.discovery.verdict.judge import held_up, judge, least_separation, undecided_rivals
-from adaptive_flot.discovery.verdict.outputs import certain_words
-from adaptive_flot.discovery.verdict.report_veto import (
-    contradiction,
-    contradiction_at_the_end,
-    last_report_rows,
-    noise_from_row_to_row,
-    unexplained,
+from adaptive_flot.discovery.record.screening import Screening
+from adaptive_flot.discovery.results import Discovery, State, Verdict
+from adaptive_flot.discovery.stages import (
+    check_explained,
+    check_sufficient,
+    compare_with_common_nuisance,
+    examine_residual,
+    fit_model_as_it_is,
+    fit_without_report,
+    heed_report,
+    judge_alternatives,
+    plan_test,
+    screen_record,
+    search_at_once,
+    search_one_by_one,
+    split_rows,
 )
+from adaptive_flot.discovery.test_design.signals import input_range
+from adaptive_flot.discovery.verdict.conclude import conclude
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
@@ -109,155 +99,6 @@ def discover(
             return state.ended(replace(outcome, seconds=time.perf_counter() - began))
         state = outcome
     raise AssertionError("the last stage gives a verdict")
-
-
-def screen_record(state: State) -> State:
-    """Leave out what in the record can not be used."""
-    state.progress("check the data")
-    return replace(state, screening=screen(state.screening.record, state.model))
-
-
-def check_sufficient(state: State) -> State | Verdict:
-    """Give up where what is left of the record says too little."""
-    return insufficient(state.screening) if state.screening.reasons else state
-
-
-def split_rows(state: State) -> State:
-    """Split the rows: to estimate, to confirm and, where no other record reports, to report."""
-    state.progress("fit the model as it is")
-    cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
-    problem, screening = split_record(state.screening, state.model, state.adapted, cycle)
-    return replace(state, problem=replace(problem, deadline=state.search_ends), screening=screening)
-
-
-def fit_model_as_it_is(state: State) -> State | Verdict:
-    """Fit the model without any effect: the base of every comparison."""
-    prepared = prepare(state.known_problem, state.model)
-    if prepared is None:
-        name = state.model.name
-        reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
-        return insufficient(replace(state.screening, reasons=(reason,)))
-    problem, base = prepared
-    responses = Responses(problem, base)
-    problem = replace(problem, site_sizes=responses.sizes)
-    noise = noise_by_differences(problem.measured)
-    start = base.initial_state, parameters_of(base)
-    said = wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
-    if not state.adapted:
-        said += ("no parameter has the role 'estimated': all keep the values of the model",)
-    screening = replace(state.screening, notes=state.screening.notes + said)
-    return replace(state, screening=screening, problem=problem, base=base, responses=responses)
-
-
-def check_explained(state: State) -> State | Verdict:
-    """Give up where the inputs explain nothing: no dependence could be told from a disturbance."""
-    reason = nothing_explained(*state.fitted)
-    return insufficient(replace(state.screening, reasons=(reason,))) if reason else state
-
-
-def examine_residual(state: State) -> State:
-    """Say whether the residual is more than noise. It is reported, and decides nothing."""
-    state.progress("test the residual")
-    return replace(state, detection=detect(*state.fitted))
-
-
-def search_one_by_one(state: State) -> State:
-    """Add one effect after the other, as long as each brings evidence and substance; confirm the best."""
-    problem, base = state.fitted
-    found = search(
-        problem, base, state.model, responses=state.responses, processes=state.processes, progress=state.progress
-    )
-    return replace(state, search=found, responses=None)
-
-
-def search_at_once(state: State) -> State:
-    """Search several effects at once where fits are cheap and the error still outweighs the noise by far."""
-    problem, result = state.searched
-    if not wants_joint(problem, result):
-        return state
-    problem, result = search_jointly(problem, result, processes=state.processes, progress=state.progress)
-    return replace(state, problem=problem, base=result.base, search=result)
-
-
-def compare_with_common_nuisance(state: State) -> State:
-    """Compare the leading alternatives anew, with what all of them lack added to each."""
-    problem, result = state.searched
-    rivals = undecided_rivals(result) if problem.whiten and not problem.time_is_up else ()
-    if not rivals:
-        return state
-    state.progress("compare with a common nuisance")
-    return replace(state, search=adjust_for_common_nuisance(problem, result, rivals, state.processes))
-
-
-def judge_alternatives(state: State) -> State:
-    """Turn the ranking into one of six words; what is named must itself stand on the confirm split."""
-    problem, result = state.searched
-    result, judgement = held_up(problem, result, judge(result))
-    said = state.screening.notes
-    if problem.time_is_up:
-        said = (*said, "the budget ended the search: further effects and freer forms were not all tried")
-    if not result.rounds[0].compared:
-        judgement = replace(judgement, word="abstain", members=())
-    screening = replace(state.screening, notes=said)
-    return replace(state, screening=screening, search=result, judgement=judgement)
-
-
-def fit_without_report(state: State) -> State:
-    """Fit the plain model and the best alternative to all rows but the report split, run at every row."""
-    state.progress("fit once more, without the report split")
-    problem, base = state.fitted
-    problem = replace(problem, deadline=state.ends)
-    splits = ("estimate", "confirm")
-    fitter, every = Fitter(problem, splits), Fitter(replace(problem, nodes=None), splits)
-
-    def final(fit: Fit) -> Fit:
-        again = fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit
-        return every.with_intervals(at_every_row(fitter, again, {}))
-
-    best, before = state.judged.best, final(base)
-    return replace(state, before=before, after=before if best is None else final(best.fit))
-
-
-def heed_report(state: State) -> State:
-    """Take a name back where the held-out rows contradict it."""
-    problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
-    error = report_errors(problem, before, after, state.report_record)
-    record = problem.record if state.report_record is None else state.report_record
-    noise = noise_from_row_to_row(record.outputs, before.model, error)
-    against = contradiction(judgement, error, noise)
-    if not against and state.report_record is None:
-        at_the_end = changes(last_report_rows(problem), before, after, "report")
-        against = contradiction_at_the_end(
-            judgement, at_the_end, noise_from_row_to_row(record.outputs, before.model, at_the_end)
-        )
-    if against:
-        judgement = replace(judgement, word="abstain", members=())
-    certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
-    if judgement.word == "none" and (left := unexplained(error, noise)):
-        judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
-    return replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
-
-
-def plan_test(state: State) -> State:
-    """Choose the input moves that would tell the leading alternatives apart, where there are several."""
-    judgement, (problem, result) = state.judged, state.searched
-    if judgement.best is None or judgement.word == "none" or time.monotonic() > state.ends:
-        return state
-    state.progress("plan a test")
-    compared = [
-        replace(a, fit=Fitter(problem).with_intervals(a.fit))
-        for a in leading(judgement.best, result.alternatives, judgement.margin)
-    ]
-    if len(compared) < 2:
-        return state
-    held = held_inputs(state.model, problem.record, tuple(state.limits or ()))
-    needed = least_separation(result, problem, TEST_ROWS)
-    experiment = plan_experiment(problem, compared, needed, state.limits, state.processes, held)
-    if experiment is None:
-        said = "no test of the inputs is proposed: none may be moved, or none moves in this record"
-        said += f"; left alone: {held_words(held)}" if held else ""
-        state = replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
-    return replace(state, experiment=experiment)
 
 
 STAGES: tuple[Callable[[State], State | Verdict], ...] = (

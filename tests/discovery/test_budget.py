@@ -9,7 +9,9 @@ import numpy as np
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.results import Discovery
+from adaptive_flot.discovery.record.screening import Screening
+from adaptive_flot.discovery.results import Discovery, State
+from adaptive_flot.discovery.stages import plan_test
 from tests.discovery.heated import heated_tank, tank_record
 
 
@@ -33,3 +35,15 @@ def test_a_fit_whose_time_is_up_stays_where_it_began(draught: Discovery) -> None
     late = Fitter(replace(draught.problem, deadline=time.monotonic() - 1.0))
     fit = late.fit(heated_tank(), like=draught.before, start={"loss": 100.0})
     assert fit is not None and fit.values[1] == 100.0 and np.isfinite(fit.loss)
+
+
+def test_a_test_is_proposed_only_where_time_is_left_for_it(draught: Discovery) -> None:
+    """It takes about half of what the first fit took: a budget that ends before is not overrun by it."""
+    said: list[str] = []
+    screening = Screening(tank_record(), (), ())
+    state = State(heated_tank(), (), None, None, 1, said.append, screening, problem=draught.problem)
+    state = replace(state, search=draught.search, judgement=draught.judgement, ends=time.monotonic() + 1000.0)
+    plan_test(replace(state, base_seconds=1e6))
+    assert said == []
+    plan_test(replace(state, base_seconds=1.0))
+    assert said == ["plan a test"]

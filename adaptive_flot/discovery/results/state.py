@@ -39,6 +39,8 @@ class State:
         The record, and from the first stage on what in it can not be used.
     ends, search_ends
         When everything, and when the search, is to end, by `time.monotonic` [s].
+    base_seconds
+        What the fit of the model as it is took [s].
     problem, base
         The record in splits, and the fit of the model as it is to the estimation split.
     responses
@@ -70,6 +72,7 @@ class State:
     screening: Screening
     ends: float = float("inf")
     search_ends: float = float("inf")
+    base_seconds: float = 0.0
     problem: Problem | None = None
     base: Fit | None = None
     responses: Responses | None = None
