@@ -12,7 +12,7 @@ from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Bullets, Part, Section, Table
 from adaptive_flot.report.kit.wording import joined, number, spaced
 from adaptive_flot.runner.commands.estimate import RecordEstimate
-from adaptive_flot.runner.commands.innovations_form import InnovationsEstimate
+from adaptive_flot.runner.commands.innovations.estimate import InnovationsEstimate
 
 SHOWN_STATES = 12
 """States that the picture shows at most; the file has all."""

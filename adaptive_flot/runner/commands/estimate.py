@@ -17,7 +17,7 @@ from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
-from adaptive_flot.runner.commands.innovations_form import (
+from adaptive_flot.runner.commands.innovations.estimate import (
     InnovationsEstimate,
     asks_for_process_noise,
     estimate_in_innovations_form,

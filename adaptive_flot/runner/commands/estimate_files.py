@@ -10,7 +10,7 @@ from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.processes.flotation import save_cell
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.runner.commands.estimate import RecordEstimate
-from adaptive_flot.runner.commands.innovations_form import InnovationsEstimate
+from adaptive_flot.runner.commands.innovations.estimate import InnovationsEstimate
 
 SMOOTHED = "smoothed.csv"
 """States and parameters given the whole record, where the innovations form was asked for."""
