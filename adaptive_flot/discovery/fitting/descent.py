@@ -21,6 +21,7 @@ from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.nodes import Nodes, Substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e4
@@ -44,9 +45,13 @@ START_FRACTIONS = (1.0, 0.3, 0.1)
 """Fractions of a first-order estimate that are tried as the start."""
 
 
-def is_smooth(model: Model) -> bool:
-    """Whether a model's effects do nothing abrupt between the nodes of a record; else every row is simulated."""
-    return not any(e.family.abrupt for e in model.effects)
+def nodes_for(problem: Problem, model: Model) -> Nodes | None:
+    """Where a model is simulated; None for every row by the model's own steps.
+
+    An effect that is abrupt would be lost between nodes that leave rows out, but not between steps within a row.
+    """
+    abrupt = any(e.family.abrupt for e in model.effects)
+    return None if abrupt and not isinstance(problem.nodes, Substeps) else problem.nodes
 
 
 class Descent:
@@ -54,7 +59,7 @@ class Descent:
 
     def __init__(self, problem: Problem, rows: BoolArray, model: Model, unknowns: Unknowns) -> None:
         self.problem, self.rows, self.model, self.unknowns = problem, rows, model, unknowns
-        self.simulator = RecordSimulator(model, problem.record.dt, problem.nodes if is_smooth(model) else None)
+        self.simulator = RecordSimulator(model, problem.record.dt, nodes_for(problem, model))
 
     def _predict(self, z: FloatArray) -> FloatArray:
         p, x0 = self.unknowns.unpack(z)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.descent import is_smooth
+from adaptive_flot.discovery.fitting.descent import nodes_for
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
@@ -38,7 +38,7 @@ def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, flo
     The nodes were placed for the model as it is: an effect may have made it faster.
     """
     problem = fitter.problem
-    if problem.nodes is None or not is_smooth(fit.model):
+    if nodes_for(problem, fit.model) is None:
         return fit
     every = replace(problem, nodes=None)
     run = RecordSimulator(fit.model, problem.record.dt)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.candidates.responses import Responses
-from adaptive_flot.discovery.fitting.descent import is_smooth
+from adaptive_flot.discovery.fitting.descent import nodes_for
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import NOTICED, UNNOTICED, at_every_row, with_nodes
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.stepping.nodes import place_nodes
+from adaptive_flot.greybox.stepping.nodes import place_nodes, substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.heated import Truth, heated_tank, tank_record
 
@@ -86,7 +86,9 @@ def test_what_is_sudden_is_simulated_at_every_row(still: tuple[Problem, Fit], fo
     driver = "constant" if form == "shift" else "time"
     found = with_nodes(problem, fit)
     model = fit.model.with_effects([Effect("heat_loss", driver, form)])
-    assert found.nodes is not None and is_smooth(model) is coarse
+    assert found.nodes is not None and (nodes_for(found, model) is found.nodes) is coarse
+    within = replace(problem, nodes=substeps(problem.record, 2))  # every row is there, and two steps in each
+    assert nodes_for(within, model) is within.nodes
 
 
 def test_a_coarsely_sampled_record_takes_longer_steps_that_make_no_difference() -> None:
