@@ -85,11 +85,16 @@ def lockstep_figures(found: Found) -> dict[str, object]:
         "rows lost, doubled": f"{found.rows.lost}, {found.rows.doubled} of {found.rows.cycles} cycles",
         "largest bump at a change of mode [rate limits]": round(audit.bump, 6),
         "sheddings for bad cycles; cycles each, most": f"{len(audit.shed_cycles)}; {max(audit.shed_cycles, default=0)}",
-        "cycle with storage, median and 99 % [ms]": " and ".join(
-            f"{q:.1f}" for q in np.percentile(milliseconds, [50, 99])
-        ),
+        "cycle with storage, median and 99 % [ms]": quantiles(milliseconds[:, 0]),
+        "the same, time of the processor [ms]": quantiles(milliseconds[:, 1]),
+        "load of the machine, least and most": "{:.1f} and {:.1f}".format(*found.load),
         "memory growth after the first 1000 cycles [MB]": round(found.grown_mb, 1),
     }
+
+
+def quantiles(milliseconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
+    """Median and 99 %."""
+    return " and ".join(f"{q:.1f}" for q in np.percentile(milliseconds, [50, 99]))
 
 
 app()

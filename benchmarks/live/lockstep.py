@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,15 +29,24 @@ PAUSE, DOWN = 6, 2
 
 @dataclass(frozen=True)
 class Found:
-    """What a run found."""
+    """What a run found.
+
+    Attributes
+    ----------
+    seconds
+        Of each cycle, by the clock and of the processor (cycles, 2).
+    load
+        Average number of processes that wanted a core in a minute, least and most during the run.
+    """
 
     audit: Audit
     rows: Rows
-    seconds: np.ndarray[tuple[int], np.dtype[np.float64]]
+    seconds: np.ndarray[tuple[int, int], np.dtype[np.float64]]
     grown_mb: float
     counted: dict[str, int]
     sessions: int
     refused: int
+    load: tuple[float, float]
 
 
 class Lockstep:
@@ -73,9 +83,12 @@ class Lockstep:
 
     def run(self, cycles: int) -> Found:
         """Run so many cycles."""
-        seconds, begin = np.zeros(cycles), 0.0
+        seconds, begin = np.zeros((cycles, 2)), 0.0
+        loads: list[float] = []
         for k in range(cycles):
             begin = resident_mb() if k == WARM else begin
+            if k % WARM == 0:
+                loads.append(os.getloadavg()[0])
             self._next_event()
             self.direct.interval()
             self.audit.interval(self.direct.state.panel)
@@ -86,7 +99,8 @@ class Lockstep:
         rows = count_rows(engine, self.stepped, self.estimates)
         counted = {**self.counted, **self.faults.counted}
         refused = self.direct.state.panel.refused
-        return Found(self.audit, rows, seconds, grown, counted, len(self.stepped), refused)
+        load = min(loads), max(loads)
+        return Found(self.audit, rows, seconds, grown, counted, len(self.stepped), refused, load)
 
     def _next_event(self) -> None:
         kind, left = self._event or (None, 0)
@@ -107,15 +121,15 @@ class Lockstep:
             panel = replace(self.direct.state.panel, active=False, asked=False, remote={})
             self.direct.state = replace(self.direct.state, panel=panel)
 
-    def _one(self) -> float:
-        """One cycle; how long it took [s]."""
+    def _one(self) -> tuple[float, float]:
+        """One cycle; how long it took by the clock, and of the processor [s]."""
         kind = None if self._event is None else self._event[0]
         cut_off = kind in ("hung server", "server killed")
         snapshot = self.direct.snapshot(alive=not cut_off, in_time=self._in_time, written=self._well)
-        begin = time.perf_counter()
+        begin, used = time.perf_counter(), time.thread_time()
         self.state, outcome = self.cycle.step(self.state, snapshot)
         self.memory.store(snapshot, outcome, self.state.estimation.noise_std, {})
-        seconds = time.perf_counter() - begin
+        seconds = time.perf_counter() - begin, time.thread_time() - used
         self.stepped[self.memory.session] = outcome.number
         self.estimates += outcome.estimate is not None
         before, late, refusing = self.direct.state.panel, kind == "overrun", kind == "write refused"
