@@ -11,6 +11,7 @@ from adaptive_flot.live.page.server import PageServer
 from adaptive_flot.live.requests import Inbox
 from adaptive_flot.live.running.progress import Progress, Stage
 from adaptive_flot.live.running.run import LinkRun
+from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store.memory import Memory, open_database
 
 
@@ -36,7 +37,8 @@ def live(link: Link, say: Callable[[str], None] = print, cycles: int | None = No
     page = None if link.file.page is None else PageServer(link, inbox)
     memory = Memory(open_database(link.file.database, link.path.parent), link)
     try:
-        say(_started(link, memory))
+        for words in (_started(link, memory), *kept(link, memory)):
+            say(words)
         shows: tuple[Callable[[Progress], None], ...] = (speaker,)
         if page is not None:
             page.start()
@@ -68,6 +70,18 @@ def _started(link: Link, memory: Memory) -> str:
         return begin + "in monitor, with no stored estimate"
     where = f"session {memory.resumed.session}, cycle {memory.resumed.cycle}"
     return begin + f"in monitor, from the estimate of {where}; turn the switch to monitor and up again to go further"
+
+
+def kept(link: Link, memory: Memory) -> list[str]:
+    """What persons did at the page before the start and still holds."""
+    found = []
+    if memory.resumed is not None and memory.resumed.effects:
+        labels, person = [e.label for e in memory.resumed.effects], memory.resumed.extensions[-1].person
+        found.append(f"The model in use is still extended by {', '.join(labels)} (applied by {person})")
+    if memory.allowed < Mode.CLOSED:
+        held = "raise it there to go further" if link.file.page is not None else "without a page it does not count"
+        found.append(f"The page's switch was left at {memory.allowed.name.lower()}; {held}")
+    return found
 
 
 class Speaker:

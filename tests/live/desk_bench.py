@@ -28,10 +28,11 @@ class DeskBench:
 
     def __init__(self, link: Link, make: Make = make_stepper, memory: Memory | None = None) -> None:
         self.link, self.memory = link, memory
-        self.use = ModelUse(link)
-        self.desk = Desk(link, self.use, make)
+        resumed = None if memory is None else memory.resumed
+        self.use = ModelUse(link, () if resumed is None else resumed.extensions)
+        self.desk = Desk(link, self.use, make, allowed=Mode.CLOSED if memory is None else memory.allowed)
         self.direct = DirectPlant(TestPlant(Realisation(link.scenario, 1)))
-        self.state = self.use.cycle.start()
+        self.state = self.use.cycle.start(None if resumed is None else resumed.prior)
         self.finding: Finding | None = None
         self.well = True
 

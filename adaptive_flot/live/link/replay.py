@@ -9,7 +9,6 @@ from typing import Any
 
 from sqlalchemy import Connection, Engine, RowMapping, Table, select
 
-from adaptive_flot.contracts import Prior
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.link.cycle import Cycle
 from adaptive_flot.live.link_file import Link, LinkFile
@@ -19,8 +18,9 @@ from adaptive_flot.live.safety.tag_value import Quality, TagValue
 from adaptive_flot.live.snapshot import Snapshot
 from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.beside import stored_change
-from adaptive_flot.live.store.memory import ACTING
-from adaptive_flot.live.store.numbers import as_array, as_text, from_column
+from adaptive_flot.live.store.numbers import as_text, from_column
+from adaptive_flot.live.store.resume import Resumed, stored_resumed
+from adaptive_flot.live.store.rows import ACTING, ESTIMATED
 
 MOST_SHOWN = 20
 """Differences that are kept in words."""
@@ -61,8 +61,10 @@ def replay(engine: Engine, link: Link, session: int | None = None) -> Replay:
     with engine.connect() as connection:
         row = _session(connection, link, session)
         file = LinkFile.model_validate_json(row["link_file"])
-        cycle = Cycle(Link(path=link.path, file=file, scenario=link.scenario))
-        state = cycle.start(_resumed(connection, row))
+        resumed = _resumed(connection, row)
+        effects = () if resumed is None else resumed.effects
+        cycle = Cycle(Link(path=link.path, file=file, scenario=link.scenario), effects)
+        state = cycle.start(None if resumed is None else resumed.prior)
         stored = _Stored(connection, row["session"])
         cycles, different = 0, 0
         words: list[str] = []
@@ -92,13 +94,10 @@ def _session(connection: Connection, link: Link, session: int | None) -> RowMapp
     return row
 
 
-def _resumed(connection: Connection, row: RowMapping) -> Prior | None:
+def _resumed(connection: Connection, row: RowMapping) -> Resumed | None:
     if row["resumed_session"] is None:
         return None
-    e = schema.estimates.c
-    query = select(schema.estimates).where(e.session == row["resumed_session"], e.cycle == row["resumed_cycle"])
-    known = connection.execute(query).mappings().one()
-    return Prior(0.0, *(as_array(known[name]) for name in ("state", "parameters", "covariance", "noise_std")))
+    return stored_resumed(connection, row["resumed_session"], row["resumed_cycle"])
 
 
 class _Stored:
@@ -143,8 +142,7 @@ class _Stored:
         if (outcome.estimate is None) != (known is None):
             wrong.append("estimate")
         elif outcome.estimate is not None and known is not None:
-            names = ("parameters", "covariance", "state", "prediction", "innovation")
-            wrong += [name for name in names if as_text(getattr(outcome.estimate, name)) != known[name]]
+            wrong += [name for name in ESTIMATED if as_text(getattr(outcome.estimate, name)) != known[name]]
         decided = self.decisions.get(number)
         if (outcome.decision is None) != (decided is None) or (
             outcome.decision is not None

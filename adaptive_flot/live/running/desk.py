@@ -45,6 +45,8 @@ class Desk:
         Makes what runs in shadow, in its process.
     inputs_since
         See `LiveDiscovery.inputs_since`.
+    allowed
+        Where the page's switch stands at the start.
 
     Attributes
     ----------
@@ -62,8 +64,9 @@ class Desk:
         use: ModelUse,
         make: Make = make_stepper,
         inputs_since: Callable[[float], FloatArray | None] = lambda time: None,
+        allowed: Mode = Mode.CLOSED,
     ) -> None:
-        self.allowed = Mode.CLOSED
+        self.allowed = allowed
         self.alarms: Alarms = {}
         self.card: Card | None = None
         self.use = use

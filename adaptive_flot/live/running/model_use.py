@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.contracts import Estimate, Prior
+from adaptive_flot.errors import AdaptiveFlotError, LinkError
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.link.cycle import Cycle, CycleState
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.store.beside import ModelChange
+from adaptive_flot.live.store.resume import Extension
 
 
 @dataclass(frozen=True)
@@ -32,16 +34,32 @@ class ModelUse:
     ----------
     link
         The link file and its scenario.
+    extensions
+        How the model that was in use before a restart came about; empty for the scenario's model.
 
     Attributes
     ----------
     cycle
         The cycle in use.
+
+    Raises
+    ------
+    LinkError
+        The plug-ins do not take the extended model any more.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Link, extensions: tuple[Extension, ...] = ()) -> None:
         self.cycle = Cycle(link)
         self._before: list[_Before] = []
+        for extension in extensions:
+            self._before.append(_Before(self.cycle, extension.before))
+            try:
+                self.cycle = Cycle(link, extension.effects)
+            except AdaptiveFlotError as error:
+                raise LinkError(
+                    f"{link.path}: the extended model that was in use can not be built ({error}); correct it, or give "
+                    "another database to start with the scenario's model"
+                ) from error
         self._building: asyncio.Task[Cycle] | None = None
 
     @property

@@ -65,8 +65,10 @@ class LinkRun:
         inbox: Inbox | None = None,
     ) -> None:
         self.link, self.memory, self.inbox = link, memory, inbox or Inbox()
-        self.use, self.discovery = ModelUse(link), LiveDiscovery(link)
-        self.desk = Desk(link, self.use, inputs_since=lambda time: self.discovery.inputs_since(time))
+        self.use = ModelUse(link, () if memory.resumed is None else memory.resumed.extensions)
+        self.discovery = LiveDiscovery(link, effects=self.use.cycle.effects)
+        allowed = Mode.CLOSED if link.file.page is None else memory.allowed  # nobody could raise it without a page
+        self.desk = Desk(link, self.use, inputs_since=lambda t: self.discovery.inputs_since(t), allowed=allowed)
         self.state: CycleState = self.use.cycle.start(None if memory.resumed is None else memory.resumed.prior)
         self._show = show
         self._interval = link.scenario.dt / link.file.cycle.speed  # of this machine

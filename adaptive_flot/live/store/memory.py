@@ -1,10 +1,9 @@
-"""Open a database, store cycles, find where to go on."""
+"""Open a database and store cycles."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -13,29 +12,17 @@ import numpy as np
 from sqlalchemy import Connection, Engine, Table, create_engine, event, func, insert, make_url, select
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
-from adaptive_flot.contracts import DelayedValue, Prior
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome, Written
-from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.snapshot import Snapshot
 from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.beside import NOTHING_BESIDE, Beside, action_row, change_row, shadow_row
-from adaptive_flot.live.store.numbers import as_array, as_column, as_text
+from adaptive_flot.live.store.numbers import as_column
+from adaptive_flot.live.store.resume import last_allowed, last_estimate
+from adaptive_flot.live.store.rows import cycle_row, decision_row, estimate_row, result_row, sample_row, tag_rows
 
 Rows = dict[Table, list[dict[str, Any]]]
-ACTING = "acting "
-ESTIMATED = ("parameters", "covariance", "state", "prediction", "innovation")
-"""Arrays of an estimate that are stored."""
-
-
-@dataclass(frozen=True)
-class Resumed:
-    """Where a link goes on: the last stored estimate."""
-
-    session: int
-    cycle: int
-    prior: Prior
 
 
 def open_database(url: str, folder: Path) -> Engine:
@@ -95,7 +82,10 @@ class Memory:
     session
         Number of the session, from 1.
     resumed
-        The last stored estimate of an earlier session with the same scenario and estimator; None where there is none.
+        The last stored estimate of an earlier session with the same scenario and estimator, with its model; None where
+        there is none.
+    allowed
+        How far a person at the page let the link go in the last stored cycle.
     """
 
     def __init__(self, engine: Engine, link: Link) -> None:
@@ -103,7 +93,8 @@ class Memory:
         self._switch: int | None = None
         self._limits: dict[str, tuple[float, float]] = {}
         with self._transaction() as connection:
-            self.resumed = _last_estimate(connection, link)
+            self.resumed = last_estimate(connection, link)
+            self.allowed = last_allowed(connection)
             last = connection.execute(select(func.max(schema.sessions.c.session))).scalar()
             self.session = (last or 0) + 1
             connection.execute(
@@ -149,8 +140,8 @@ class Memory:
         LinkError
             The database can not be written.
         """
-        rows: Rows = {schema.cycles: [_cycle(snapshot, outcome)]}
-        rows[schema.tags] = _tags(snapshot, outcome)
+        rows: Rows = {schema.cycles: [cycle_row(snapshot, outcome)]}
+        rows[schema.tags] = tag_rows(snapshot, outcome)
         rows[schema.events] = self._events(snapshot, outcome)
         if found:
             rows[schema.events].append({"kind": "discovery", "text": found})
@@ -159,11 +150,11 @@ class Memory:
         rows[schema.models] = [] if beside.change is None else [change_row(beside.change)]
         rows[schema.limits] = self._changed_limits(snapshot)
         if outcome.sample is not None:
-            rows[schema.samples] = [_sample(outcome)]
+            rows[schema.samples] = [sample_row(outcome)]
         if outcome.estimate is not None:
-            rows[schema.estimates] = [_estimate(outcome, noise_std)]
+            rows[schema.estimates] = [estimate_row(outcome, noise_std)]
         if outcome.decision is not None:
-            rows[schema.decisions] = [_decision(outcome)]
+            rows[schema.decisions] = [decision_row(outcome)]
         rows[schema.writes] = [{"input": name, "value": value} for name, value in outcome.writes.items()]
         key = {"session": self.session, "cycle": outcome.number}
         with self._transaction() as connection:
@@ -172,7 +163,7 @@ class Memory:
                     connection.execute(insert(table), [{**key, **row} for row in of_table])
             if before:
                 earlier = {"session": self.session, "cycle": outcome.number - 1}
-                connection.execute(insert(schema.results), [{**earlier, **_result(n, w)} for n, w in before.items()])
+                connection.execute(insert(schema.results), [{**earlier, **result_row(n, w)} for n, w in before.items()])
             if beside.shadows:
                 shown = [{"session": self.session, **shadow_row(result)} for result in beside.shadows]
                 connection.execute(insert(schema.shadows), shown)
@@ -208,88 +199,3 @@ class Memory:
         except SQLAlchemyError as error:
             words = str(getattr(error, "orig", None) or error).splitlines()[0]
             raise LinkError(f"database: can not be written ({words})") from error
-
-
-def _cycle(snapshot: Snapshot, outcome: Outcome) -> dict[str, Any]:
-    return {
-        "plant_time": as_column(snapshot.time),
-        "record_time": None if outcome.sample is None else outcome.sample.time,
-        "alive": snapshot.alive,
-        "switch": None if snapshot.switch is None else int(snapshot.switch),
-        "allowed": int(snapshot.allowed),
-        "granted": snapshot.granted,
-        "in_time": snapshot.in_time,
-        "written": snapshot.written,
-        "mode": outcome.mode.name.lower(),
-        "asks_control": outcome.asks_control,
-        "faults": "; ".join(outcome.faults),
-    }
-
-
-def _tags(snapshot: Snapshot, outcome: Outcome) -> list[dict[str, Any]]:
-    acting = {f"{ACTING}{name}": tag for name, tag in snapshot.acting.items()}
-    return [
-        {
-            "tag": name,
-            "value": as_column(tag.value),
-            "quality": tag.quality.value,
-            "source_time": as_column(tag.source_time),
-            "result": outcome.checks.get(name, Check.ABSENT).name.lower() if name in snapshot.tags else "",
-        }
-        for name, tag in {**snapshot.tags, **acting}.items()
-    ]
-
-
-def _sample(outcome: Outcome) -> dict[str, Any]:
-    assert outcome.sample is not None
-    late: list[DelayedValue] = list(outcome.sample.delayed)
-    return {
-        "inputs": as_text(outcome.sample.inputs),
-        "outputs": as_text(outcome.sample.outputs),
-        "delayed": "; ".join(f"{v.output} {v.time!r} {v.value!r}" for v in late),
-    }
-
-
-def _estimate(outcome: Outcome, noise_std: Sequence[float]) -> dict[str, Any]:
-    estimate = outcome.estimate
-    assert estimate is not None
-    arrays = {name: as_text(getattr(estimate, name)) for name in ESTIMATED}
-    return {**arrays, "status": estimate.status.name, "noise_std": as_text(np.array(noise_std))}
-
-
-def _decision(outcome: Outcome) -> dict[str, Any]:
-    decision = outcome.decision
-    assert decision is not None
-    return {
-        "inputs": as_text(decision.inputs),
-        "status": decision.status.name,
-        "decided_by": decision.decided_by,
-        "message": decision.message,
-    }
-
-
-def _result(name: str, written: Written) -> dict[str, Any]:
-    back = as_column(written.read_back)
-    return {"input": name, "value": written.value, "read_back": back, "problem": written.problem}
-
-
-def _last_estimate(connection: Connection, link: Link) -> Resumed | None:
-    """The last estimate stored for the same scenario and estimator."""
-    e, s = schema.estimates.c, schema.sessions.c
-    rows = connection.execute(
-        select(schema.estimates, s.link_file)
-        .join(schema.sessions, s.session == e.session)
-        .where(s.scenario == link.scenario.name)
-        .order_by(e.session.desc(), e.cycle.desc())
-        .limit(1)
-    ).mappings()
-    row = rows.first()
-    if row is None or f'"estimator":"{link.file.estimator}"' not in row["link_file"]:
-        return None
-    parameters, state = as_array(row["parameters"]), as_array(row["state"])
-    setup = link.scenario.setup
-    own = len(setup.model.states)  # the states of effects that were in use come after them
-    if parameters.shape != (len(setup.parameters),) or len(state) < own:
-        return None
-    prior = Prior(0.0, state[:own], parameters, as_array(row["covariance"]), as_array(row["noise_std"]))
-    return Resumed(row["session"], row["cycle"], prior)
