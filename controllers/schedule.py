@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from adaptive_flot.contracts import ControllerSetup, Decision, Estimate, Sample, Status
+import numpy as np
+
+from adaptive_flot.contracts import ControllerSetup, Decision, DecisionTable, Estimate, Sample, Status
 
 
 @dataclass(frozen=True)
@@ -41,3 +43,8 @@ class Schedule:
         last = len(self.setup.schedule) - 1
         inputs = self.setup.schedule[min(state.row, last)].copy()
         return ScheduleState(state.row + 1), Decision(inputs, Status.OK, "schedule")
+
+    def decide_all(self, intervals: int) -> DecisionTable:
+        """Inputs of the first intervals, at once."""
+        last = len(self.setup.schedule) - 1
+        return DecisionTable(self.setup.schedule[np.minimum(np.arange(intervals), last)], Status.OK, "schedule")

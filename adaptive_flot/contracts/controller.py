@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 from adaptive_flot.contracts.economics import Economics
 from adaptive_flot.contracts.estimator import Estimate
@@ -121,7 +121,8 @@ class Controller(Protocol[State]):
     """Chooses the inputs of the next interval. Made by `Name(setup, **options)`.
 
     One that uses neither sample nor estimate may say `open_loop = True` in its class; it is not inherited. Runs of many
-    seeds may then go side by side, and both are None at every decision.
+    seeds may then go side by side, and both are None at every decision. One that also has `decide_all` is not called
+    for each of them (see `DecidesAll`).
     """
 
     def init(self, time: float) -> State:
@@ -131,6 +132,39 @@ class Controller(Protocol[State]):
     def decide(self, state: State, sample: Sample | None, estimate: Estimate | None) -> tuple[State, Decision]:
         """Inputs for the next interval, from the newest sample and estimate (None before the first)."""
         ...
+
+
+@dataclass(frozen=True)
+class DecisionTable:
+    """Decisions of N intervals that nothing solved and nobody changed.
+
+    Attributes
+    ----------
+    inputs
+        Inputs (N, nu).
+    status, decided_by
+        Of every one; see `Decision`.
+    """
+
+    inputs: FloatArray
+    status: Status
+    decided_by: str
+
+
+class DecidesAll(Protocol):
+    """An open loop that gives all its decisions at once."""
+
+    def decide_all(self, intervals: int) -> DecisionTable:
+        """What `init` at 0 s and then `decide` give for so many intervals."""
+        ...
+
+
+def decides_all(controller: object) -> TypeGuard[DecidesAll]:
+    """Whether `decide_all` is what `decide` gives: not where a derived class has its own `decide`."""
+    first = {
+        name: next((c for c in type(controller).__mro__ if name in vars(c)), None) for name in ("decide", "decide_all")
+    }
+    return first["decide_all"] is not None and first["decide"] is first["decide_all"]
 
 
 @runtime_checkable

@@ -26,7 +26,7 @@ from adaptive_flot.live.outcome import Outcome
 from adaptive_flot.runner.adaptation.supervisor import measured_record
 from adaptive_flot.runner.adaptation.whiteness_watch import watch
 from adaptive_flot.runner.loop.loop import Step
-from adaptive_flot.runner.results.timeseries import innovations
+from adaptive_flot.runner.results.run_arrays import innovations
 
 Search = Callable[[Path, Dataset, tuple[Effect, ...]], Finding]
 

@@ -106,7 +106,8 @@ class Estimation:
         fitted = self._prepared.batch.fit(record_of(scenario, scenario.setup, steps)).prior(samples[-1].time)
         if self._start == "initial_estimate":
             return fitted
-        return nominal_start(scenario, self.estimator.setup, steps, fitted)
+        record = record_of(scenario, self.estimator.setup, steps)
+        return nominal_start(scenario, self.estimator.setup, record, fitted)
 
     def _restarted(self, state: EstimationState, sample: Sample) -> EstimationState:
         if state.estimate is None:

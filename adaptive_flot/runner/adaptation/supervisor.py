@@ -18,7 +18,7 @@ from adaptive_flot.runner.adaptation.extension import Finding, search_record
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.adaptation.whiteness_watch import Alarm, watch
 from adaptive_flot.runner.loop.loop import Running, Step
-from adaptive_flot.runner.results.timeseries import innovations
+from adaptive_flot.runner.results.run_arrays import innovations
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 
 WORSE = 0.02

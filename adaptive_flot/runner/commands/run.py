@@ -18,6 +18,7 @@ from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.starts import prior_of, record_of
 from adaptive_flot.runner.plants.fault_injection import with_controller_faults, with_plant_faults
 from adaptive_flot.runner.plants.scenario_plant import make_plant
+from adaptive_flot.runner.results.run_arrays import RunArrays
 from adaptive_flot.runner.scenario.checks import check_realisation
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
@@ -107,13 +108,14 @@ def run_one(
     def make_prior(steps: list[Step]) -> Prior:
         if "fit" not in initial:
             initial["fit"] = prepared.batch.fit(record_of(scenario, scenario.setup, steps))
-        return prior_of(prepared, estimator_name, setup, steps, initial["fit"])
+        return prior_of(prepared, estimator_name, setup, record_of(scenario, setup, steps), initial["fit"])
 
     estimator = prepared.estimator(estimator_name, realisation)
     controller = prepared.controller(controller_name, realisation, setup)
     with supervision(prepared, estimator_name, controller_name, realisation) as supervise:
         steps = _steps(realisation, setup.model, controller, estimator, make_prior, supervise)
-    run = Run.of(estimator_name, controller_name, realisation, steps, setup, initial["fit"], supervise.inquiries)
+    arrays = RunArrays.of(steps, setup)
+    run = Run.of(estimator_name, controller_name, realisation, arrays, setup, initial["fit"], supervise.inquiries)
     return replace(run, seconds=round(time.perf_counter() - begin, 4))
 
 

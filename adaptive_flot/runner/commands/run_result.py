@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import pandas as pd
 
-from adaptive_flot.contracts import Setup, Status
+from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
 from adaptive_flot.processes.flotation.account import account
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
-from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.results.accounts import control_account
 from adaptive_flot.runner.results.plans import plan_table
-from adaptive_flot.runner.results.timeseries import fits, time_series
+from adaptive_flot.runner.results.run_arrays import RunArrays
+from adaptive_flot.runner.results.timeseries import fits, status_names, time_series
 from adaptive_flot.runner.scenario.realisation import Realisation
 
 
@@ -29,8 +31,8 @@ class Run(Described):
     ----------
     estimator, controller, seed
         What ran.
-    table
-        Time series, one row an interval; see `time_series`.
+    columns
+        Time series, one entry an interval, by the name of the column; see `time_series`.
     fit
         Fit in percent of each adapted parameter (by label) and driving output, over t > `fits_after_s`.
     status_counts
@@ -54,7 +56,7 @@ class Run(Described):
     estimator: str
     controller: str
     seed: int
-    table: pd.DataFrame
+    columns: Mapping[str, Any]
     fit: dict[str, float]
     status_counts: dict[str, int]
     initial: BatchFit
@@ -65,11 +67,16 @@ class Run(Described):
     plans: pd.DataFrame = field(default_factory=pd.DataFrame)
     inquiries: Sequence[Inquiry] | None = None
 
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Time series as a table; made when first asked for, since a study of many runs needs none."""
+        return pd.DataFrame(self.columns)
+
     def described(self) -> dict[str, object]:
         """What ran and how well it fits; see `Described`."""
         quality = {f"fit of {name}": f"{value:.2f} %" for name, value in self.fit.items()}
         who = {"estimator": self.estimator, "controller": self.controller, "seed": self.seed}
-        return {**who, "intervals": len(self.table), **quality}
+        return {**who, "intervals": len(self.columns["time_s"]), **quality}
 
     @classmethod
     def of(
@@ -77,34 +84,34 @@ class Run(Described):
         estimator: str,
         controller: str,
         realisation: Realisation,
-        steps: Sequence[Step],
+        arrays: RunArrays,
         setup: Setup,
         initial: BatchFit,
         inquiries: Sequence[Inquiry] | None = None,
     ) -> Run:
-        """The run that these steps were, of an estimator that was built for `setup`; its time is yet to be told."""
+        """The run that left these arrays, of an estimator that was built for `setup`; its time is yet to be told."""
         scenario = realisation.scenario
-        table = time_series(scenario, steps, setup)
+        columns = time_series(scenario, arrays, setup)
         earned: dict[str, float] = {}
         control: dict[str, Any] = {}
         if scenario.prices is not None and scenario.limits is not None:
+            table = pd.DataFrame(columns)
             accounted = table[table["time_s"] > scenario.fits_after + 1e-9]
             least = scenario.limits.outputs["concentrate_grade"][0]
             earned = account(accounted, scenario.plant_model, scenario.dt, scenario.prices, least)
             control = control_account(accounted)
-        statuses = (s.estimate.status if s.estimate else Status.INITIALISING for s in steps)
         return cls(
             estimator,
             controller,
             realisation.seed,
-            table,
-            fits(scenario, table),
-            dict(Counter(status.name.lower() for status in statuses)),
+            columns,
+            fits(scenario, columns),
+            dict(Counter(status_names(arrays.statuses))),
             initial,
             account=earned,
             control=control,
-            fault_counts=dict(Counter(fault for s in steps for fault in (*s.plant.faults, *s.decision.faults))),
-            plans=plan_table(scenario.model, steps),
+            fault_counts=dict(Counter(chain.from_iterable(arrays.faults))),
+            plans=plan_table(scenario.model, arrays.time, arrays.plans),
             inquiries=inquiries,
         )
 

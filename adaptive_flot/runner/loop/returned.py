@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from adaptive_flot.contracts import AnyController, AnyEstimator, Decision, Estimate
+from adaptive_flot.contracts import AnyController, AnyEstimator, DecidesAll, Decision, DecisionTable, Estimate
 from adaptive_flot.errors import PluginError
 from adaptive_flot.plugins import method_place
 
@@ -56,6 +56,25 @@ def checked_decision(controller: AnyController, returned: Any, inputs: int) -> t
         place = method_place(controller, "decide")
         raise PluginError(f"{place}: Decision.inputs = {decision.inputs} is not finite; return finite inputs")
     return returned[0], decision
+
+
+def checked_decisions(controller: DecidesAll, intervals: int, inputs: int) -> DecisionTable:
+    """Decisions of all intervals of an open loop, whose plant has so many inputs.
+
+    Raises
+    ------
+    PluginError
+        They are no `DecisionTable`, or the inputs are not one finite number each.
+    """
+    table = controller.decide_all(intervals)
+    if not isinstance(table, DecisionTable):
+        place = method_place(controller, "decide_all")
+        raise PluginError(f"{place}: returned {_kind(table)}; return a DecisionTable")
+    _check_shape(controller, "decide_all", "DecisionTable.inputs", table.inputs, (intervals, inputs))
+    if not np.isfinite(table.inputs).all():
+        place = method_place(controller, "decide_all")
+        raise PluginError(f"{place}: DecisionTable.inputs is not finite; return finite inputs")
+    return table
 
 
 def _check_shape(plugin: object, method: str, what: str, value: Any, shape: tuple[int, ...]) -> None:

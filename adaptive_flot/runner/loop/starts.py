@@ -25,31 +25,40 @@ def record_of(scenario: Scenario, setup: Setup, steps: Sequence[Step]) -> Datase
     model of the setup.
     """
     samples = in_time([s.plant.sample for s in steps], setup)
-    dt = samples[1].time - samples[0].time
+    arrays = (np.array([getattr(s, name) for s in samples]) for name in ("time", "inputs", "outputs"))
+    return record_of_rows(scenario, setup, *arrays)
+
+
+def record_of_rows(
+    scenario: Scenario, setup: Setup, time: FloatArray, inputs: FloatArray, outputs: FloatArray
+) -> Dataset:
+    """The same of rows of arrays: times (N,), known inputs (N, nu) and measured outputs (N, ny)."""
+    dt = float(time[1] - time[0])
     return Dataset(
         name="initial record",
-        time=np.array([samples[0].time - dt, *(s.time for s in samples)]),
+        time=np.concatenate([[time[0] - dt], time]),
         dt=dt,
-        inputs=np.vstack([samples[0].inputs, *(s.inputs for s in samples)]),
-        outputs=np.vstack([np.full(samples[0].outputs.size, np.nan), *(s.outputs for s in samples)]),
-        initial_state=_start(scenario, setup, samples[0].inputs) if scenario.file.initial_state else None,
+        inputs=np.vstack([inputs[0], inputs]),
+        outputs=np.vstack([np.full(outputs.shape[1], np.nan), outputs]),
+        initial_state=_start(scenario, setup, inputs[0]) if scenario.file.initial_state else None,
     )
 
 
-def prior_of(prepared: Prepared, estimator: str, setup: Setup, steps: Sequence[Step], fit: BatchFit) -> Prior:
-    """Where an estimator that is built for `setup` starts after these steps: at the batch fit, or as it asks for."""
-    prior = fit.prior(steps[-1].plant.sample.time)
+def prior_of(prepared: Prepared, estimator: str, setup: Setup, record: Dataset, fit: BatchFit) -> Prior:
+    """Where an estimator that is built for `setup` starts after this record: at the batch fit, or as it asks for."""
+    prior = fit.prior(float(record.time[-1]))
     if prepared.estimators[estimator].start == "initial_estimate" and setup.model is prepared.scenario.model:
         return prior
-    return nominal_start(prepared.scenario, setup, steps, prior)
+    return nominal_start(prepared.scenario, setup, record, prior)
 
 
-def nominal_start(scenario: Scenario, setup: Setup, steps: Sequence[Step], fitted: Prior) -> Prior:
+def nominal_start(scenario: Scenario, setup: Setup, record: Dataset, fitted: Prior) -> Prior:
     """Nominal parameters and their own free run from the start, for an estimator that is built for `setup`.
 
-    `fitted` is the start that the batch fit of the scenario's own setup gives, for its time, covariance and noise.
+    `record` is that of `record_of` for the same setup. `fitted` is the start that the batch fit of the scenario's own
+    setup gives, for its time, covariance and noise.
     """
-    model, record = setup.model, record_of(scenario, setup, steps)
+    model = setup.model
     x0 = _start(scenario, setup, record.inputs[0])
     state = RecordSimulator(model, setup.dt).last_state(record, x0, model.parameter_values)
     values = model.parameter_values[model.indices("parameters", setup.parameters)]

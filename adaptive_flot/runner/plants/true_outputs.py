@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.sensors import without_sensor_effects
 from adaptive_flot.greybox.stepping.fastcall import FastCall
@@ -31,3 +33,12 @@ class TrueOutputs:
         if self._ode is None:
             return shown
         return self._ode(time, state[self._states], inputs, parameters[self._parameters])[1]
+
+    def of_rows(
+        self, shown: FloatArray, time: FloatArray, states: FloatArray, inputs: FloatArray, parameters: FloatArray
+    ) -> FloatArray:
+        """The same of N rows (N, ny), each argument with an axis of rows before its own."""
+        if self._ode is None:
+            return shown
+        rows = zip(shown, time.tolist(), states, inputs, parameters, strict=True)
+        return np.array([self(*row) for row in rows])

@@ -2,6 +2,7 @@
 
 Map
 ---
+run_arrays.py        What a run leaves behind, as arrays.
 timeseries.py        One row an interval, and the fits that are taken from it.
 accounts.py          How the inputs of a run were decided.
 plans.py             What the controller expected.

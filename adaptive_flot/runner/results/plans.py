@@ -6,12 +6,19 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from adaptive_flot.greybox.model import Model
-from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.contracts import Plan
+from adaptive_flot.greybox.model import FloatArray, Model
 
 
-def plan_table(model: Model, steps: Sequence[Step]) -> pd.DataFrame:
+def plan_table(model: Model, time: FloatArray, plans: Sequence[Plan | None]) -> pd.DataFrame:
     """Table of every plan of a run, one row a planned move; empty where the controller makes none.
+
+    Parameters
+    ----------
+    model
+        Names of the columns.
+    time, plans
+        End of each interval [s] (N,), and the plan that its decision came with.
 
     Returns
     -------
@@ -22,12 +29,12 @@ def plan_table(model: Model, steps: Sequence[Step]) -> pd.DataFrame:
     columns = {q.name: q.column for q in model.inputs}
     shown = {q.name: q.column for q in model.outputs}
     parts = []
-    for before, step in zip([None, *steps], steps, strict=False):
-        plan = step.decision.plan
-        if plan is None or before is None:  # a plan starts from a sample, and the first decision has none
+    # a plan starts from the sample before it, and the first decision has none
+    for before, plan in zip(time, plans[1:], strict=False):
+        if plan is None:
             continue
         moves = {columns[name]: values for name, values in plan.inputs.items()}
-        head = {"planned_at_s": before.plant.sample.time, "time_s": plan.time}
+        head = {"planned_at_s": float(before), "time_s": plan.time}
         expected = {shown[name]: values for name, values in plan.outputs.items()}
         parts.append(pd.DataFrame({**head, **moves, **expected}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from adaptive_flot import metrics
-from adaptive_flot.contracts import Sample, Setup, Status
-from adaptive_flot.contracts.delayed_measurements import in_time
+from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.runner.loop.loop import Step
+from adaptive_flot.runner.results.run_arrays import RunArrays
 from adaptive_flot.runner.scenario.scenario import Scenario
 
+_NAMES = {id(status): status.name.lower() for status in Status}
+"""Names in the tables by the identity of each status: its own hash and name cost a call for every row."""
 
-def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.DataFrame:
-    """Table of a run whose estimator was built for `setup`: `time_s`, inputs, and columns with suffixes.
+
+def time_series(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, Any]:
+    """Columns of the table of a run whose estimator was built for `setup`: `time_s`, inputs, and more with suffixes.
 
     Suffixes, by kind of quantity:
 
@@ -33,81 +34,60 @@ def time_series(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> pd.D
     any. `control_message` says which constraints were in the way where an optimisation failed, and `solve_seconds` how
     long it took.
     """
-    columns: dict[str, object] = {"time_s": [s.plant.sample.time for s in steps]}
-    columns |= _inputs(scenario, steps) | _outputs(scenario, steps) | _adapted(scenario, steps, setup)
-    columns |= _others(scenario, steps, setup)
-    columns["status"] = [(s.estimate.status if s.estimate else Status.INITIALISING).name.lower() for s in steps]
-    columns["control_status"] = [s.decision.status.name.lower() for s in steps]
-    columns["decided_by"] = [s.decision.decided_by for s in steps]
+    columns: dict[str, Any] = {"time_s": run.time}
+    columns |= _inputs(scenario, run) | _outputs(scenario, run) | _adapted(scenario, run, setup)
+    columns |= _others(scenario, run, setup)
+    columns["status"] = status_names(run.statuses)
+    columns["control_status"] = status_names(run.control_statuses)
+    columns["decided_by"] = list(run.decided_by)
     if scenario.file.faults:
-        columns["faults"] = ["; ".join((*s.plant.faults, *s.decision.faults)) for s in steps]
-    if any(s.decision.message for s in steps):
-        columns["control_message"] = [s.decision.message for s in steps]
-    solve = np.array([s.decision.solve_seconds for s in steps])
-    if np.isfinite(solve).any():
-        columns["solve_seconds"] = solve
-    return pd.DataFrame(columns)
+        columns["faults"] = ["; ".join(names) for names in run.faults]
+    if any(run.messages):
+        columns["control_message"] = list(run.messages)
+    if np.isfinite(run.solve_seconds).any():
+        columns["solve_seconds"] = run.solve_seconds
+    return columns
 
 
-def _inputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
-    known = np.array([s.plant.sample.inputs for s in steps])
-    acted = np.array([s.plant.inputs for s in steps])
-    columns: dict[str, object] = {}
+def status_names(statuses: Sequence[Status]) -> list[str]:
+    """Names of statuses as tables have them."""
+    return [_NAMES[id(status)] for status in statuses]
+
+
+def _inputs(scenario: Scenario, run: RunArrays) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
     for j, q in enumerate(scenario.model.inputs):
-        columns[q.column] = known[:, j]
-        if not np.array_equal(known[:, j], acted[:, j]):
-            columns[f"{q.column}_true"] = acted[:, j]
+        columns[q.column] = run.inputs[:, j]
+        if not np.array_equal(run.inputs[:, j], run.acted[:, j]):
+            columns[f"{q.column}_true"] = run.acted[:, j]
     return columns
 
 
-def _outputs(scenario: Scenario, steps: Sequence[Step]) -> dict[str, object]:
-    model, setup = scenario.model, scenario.setup
-    estimates = [s.estimate for s in steps]
-    columns: dict[str, object] = {}
-    true = np.array([s.plant.outputs for s in steps])
-    measured = np.array([s.outputs for s in in_time([s.plant.sample for s in steps], setup)])
-    unknown = np.full(len(model.outputs), np.nan)
-    predicted = np.array([e.prediction if e else unknown for e in estimates])
-    innovation = np.array([s.outputs for s in in_time(innovations(steps), setup)])
-    expected = np.array([e.innovation_std if e else np.full(len(setup.outputs), np.nan) for e in estimates])
-    for j, q in enumerate(model.outputs):
-        columns[f"{q.column}_true"] = true[:, j]
-        columns[f"{q.column}_predicted"] = predicted[:, j]
-        if np.isfinite(measured[:, j]).any():
-            columns[f"{q.column}_measured"] = measured[:, j]
-            columns[f"{q.column}_innovation"] = innovation[:, j]
-        if q.name in setup.outputs:
-            columns[f"{q.column}_innovation_std"] = expected[:, setup.outputs.index(q.name)]
+def _outputs(scenario: Scenario, run: RunArrays) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
+    for j, q in enumerate(scenario.model.outputs):
+        columns[f"{q.column}_true"] = run.true[:, j]
+        columns[f"{q.column}_predicted"] = run.prediction[:, j]
+        if np.isfinite(run.measured[:, j]).any():
+            columns[f"{q.column}_measured"] = run.measured[:, j]
+            columns[f"{q.column}_innovation"] = run.innovation[:, j]
+        if q.name in scenario.setup.outputs:
+            columns[f"{q.column}_innovation_std"] = run.innovation_std[:, scenario.setup.outputs.index(q.name)]
     return columns
 
 
-def innovations(steps: Sequence[Step]) -> list[Sample]:
-    """Innovations in place of the measurements, those of delayed values with the sample that they arrived with."""
-    unknown = np.full(len(steps[0].plant.outputs), np.nan)
-    return [
-        replace(s.plant.sample, outputs=s.estimate.innovation, delayed=s.estimate.delayed)
-        if s.estimate
-        else replace(s.plant.sample, outputs=unknown, delayed=())
-        for s in steps
-    ]
-
-
-def _adapted(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str, object]:
+def _adapted(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, Any]:
     model, plant = scenario.model, scenario.plant_model.names("parameters")
-    estimates = [s.estimate for s in steps]
-    columns: dict[str, object] = {}
-    blank = np.full(len(setup.parameters), np.nan)
-    true = np.array([s.plant.parameters for s in steps])
-    theta = np.array([e.parameters if e else blank for e in estimates])
+    columns: dict[str, Any] = {}
     with np.errstate(invalid="ignore"):  # a variance that rounding has made negative says nothing: NaN
-        std = np.array([np.sqrt(np.diag(e.covariance)) if e else blank for e in estimates])
+        std = np.sqrt(np.diagonal(run.covariance, axis1=1, axis2=2))
     for name in scenario.setup.parameters:
         label = model.parameters[model.index("parameters", name)].label
-        columns[f"{label}_true"] = _column(true, plant, name)
-        columns[f"{label}_estimate"] = _column(theta, setup.parameters, name)
+        columns[f"{label}_true"] = _column(run.parameters, plant, name)
+        columns[f"{label}_estimate"] = _column(run.estimates, setup.parameters, name)
         columns[f"{label}_std"] = _column(std, setup.parameters, name)
     for a, b in combinations(scenario.setup.parameters, 2):
-        columns[correlation_column(model, a, b)] = _correlation(steps, setup.parameters, a, b)
+        columns[correlation_column(model, a, b)] = _correlation(run.covariance, setup.parameters, a, b)
     return columns
 
 
@@ -117,12 +97,10 @@ def correlation_column(model: Model, first: str, second: str) -> str:
     return f"{labels[0]}_{labels[1]}_correlation"
 
 
-def _correlation(steps: Sequence[Step], names: Sequence[str], first: str, second: str) -> FloatArray:
+def _correlation(P: FloatArray, names: Sequence[str], first: str, second: str) -> FloatArray:
     if first not in names or second not in names:
-        return np.full(len(steps), np.nan)
+        return np.full(len(P), np.nan)
     i, j = names.index(first), names.index(second)
-    unknown = np.full((len(names), len(names)), np.nan)
-    P = np.array([s.estimate.covariance if s.estimate else unknown for s in steps])
     spread = np.sqrt(P[:, i, i] * P[:, j, j])
     correlation: FloatArray = np.divide(P[:, i, j], spread, out=np.full(len(P), np.nan), where=spread > 0)
     return correlation
@@ -132,32 +110,30 @@ def _column(table: FloatArray, names: Sequence[str], name: str) -> FloatArray:
     return table[:, names.index(name)] if name in names else np.full(len(table), np.nan)
 
 
-def _others(scenario: Scenario, steps: Sequence[Step], setup: Setup) -> dict[str, object]:
+def _others(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, Any]:
     """Parameters that are not adapted but move in the plant, or are measured."""
     plant, model = scenario.plant_model, setup.model
     measured = [scenario.model.parameters[i] for i in scenario.measured_parameters]
     moved = [plant.parameters[plant.index("parameters", name)] for name, _ in scenario.moving_parameters]
-    true = np.array([s.plant.parameters for s in steps])
-    blank = np.full(len(model.parameters), np.nan)
-    known = np.array([blank if s.plant.sample.parameters is None else s.plant.sample.parameters for s in steps])
-    columns: dict[str, object] = {}
+    known = np.full((len(run.time), len(model.parameters)), np.nan) if run.known is None else run.known
+    columns: dict[str, Any] = {}
     for p in dict.fromkeys((*moved, *measured)):
         if p.name not in scenario.setup.parameters:
-            columns[f"{p.label}_true"] = _column(true, plant.names("parameters"), p.name)
+            columns[f"{p.label}_true"] = _column(run.parameters, plant.names("parameters"), p.name)
         if p in measured:
             columns[f"{p.label}_known"] = _column(known, model.names("parameters"), p.name)
     return columns
 
 
-def fits(scenario: Scenario, table: pd.DataFrame) -> dict[str, float]:
+def fits(scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, float]:
     """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
-    accounted = table[table["time_s"] > scenario.fits_after + 1e-9]
+    accounted = np.asarray(columns["time_s"]) > scenario.fits_after + 1e-9
     model, setup = scenario.model, scenario.setup
     labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
-    quality = {x: metrics.fit(accounted[f"{x}_true"].to_numpy(), accounted[f"{x}_estimate"].to_numpy()) for x in labels}
+    pairs = {label: (f"{label}_true", f"{label}_estimate") for label in labels}
     for i in model.indices("outputs", setup.outputs):
         q = model.outputs[i]
-        quality[q.name] = metrics.fit(
-            accounted[f"{q.column}_true"].to_numpy(), accounted[f"{q.column}_predicted"].to_numpy()
-        )
-    return quality
+        pairs[q.name] = (f"{q.column}_true", f"{q.column}_predicted")
+    return {
+        name: metrics.fit(columns[true][accounted], columns[found][accounted]) for name, (true, found) in pairs.items()
+    }

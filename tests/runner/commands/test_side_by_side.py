@@ -153,3 +153,28 @@ def test_what_can_not_go_side_by_side(
 def test_without_machine_code_everything_is_as_before(write_scenario: WriteScenario, tmp_path: Path) -> None:
     scenario = load_scenario(write_scenario())
     assert not can_go_side_by_side(Prepared.of(scenario, ["rpem"]), "rpem", "schedule", Realisation(scenario, 1))
+
+
+class OneByOne(Schedule):
+    """An open loop that is asked for each decision."""
+
+    open_loop = True
+
+    def decide(
+        self, state: ScheduleState, sample: Sample | None, estimate: Estimate | None
+    ) -> tuple[ScheduleState, Decision]:
+        return super().decide(state, sample, estimate)
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_decisions_taken_at_once_are_those_taken_one_by_one(write_scenario: WriteScenario) -> None:
+    scenario = load_scenario(write_scenario()).compiled()
+    runs = []
+    for use in ("schedule", f"{__file__}:OneByOne"):
+        prepared = Prepared.of(scenario, ["rpem"], [use])
+        assert can_go_side_by_side(prepared, "rpem", use, Realisation(scenario, 1))
+        (run,) = run_side_by_side(prepared, "rpem", use, [Realisation(scenario, 1)], [{}])
+        assert isinstance(run, Run)
+        runs.append(run.table)
+    assert_frame_equal(runs[0], runs[1], check_exact=True)
