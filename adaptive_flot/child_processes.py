@@ -72,7 +72,7 @@ def forking() -> Iterator[None]:
 
 
 def end_with_parent(parent: int) -> None:
-    """End this process, forked in `forking`, when its parent is gone, also one that was killed.
+    """End this process, forked in `forking` or spawned, when its parent is gone, also one that was killed.
 
     Signals that ask for the end work at once here. Ctrl-C, which a terminal sends to all processes, is left to the
     parent.

@@ -13,6 +13,7 @@ from adaptive_flot.contracts import Sample, Status
 from adaptive_flot.live.outcome import Outcome
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.safety.modes import Mode
+from adaptive_flot.runner.scenario.scenario import Scenario
 
 FINE = (Check.OK, Check.OLD, Check.ABSENT)
 WRONG_ESTIMATES = (Status.MODEL_ERROR, Status.NOT_FINITE, Status.NOT_CONVERGED)
@@ -49,18 +50,20 @@ class Alarm:
 
 
 Alarms = Mapping[str, Alarm]
+Limits = Mapping[str, tuple[int, float, float, bool]]
 
 
-def conditions(outcome: Outcome, limits: Mapping[str, tuple[int, float, float, bool]]) -> dict[str, str]:
-    """What is wrong in a cycle, in words, by key.
+def watched_limits(scenario: Scenario) -> Limits:
+    """Column and range of each limited output, by name, and whether it is a share, which is told in per cent."""
+    model, found = scenario.model, {}
+    for name, (low, high) in ({} if scenario.limits is None else scenario.limits.outputs).items():
+        j = model.index("outputs", name)
+        found[name] = (j, low, high, model.outputs[j].unit == "-" and model.outputs[j].upper <= 1.0)
+    return found
 
-    Parameters
-    ----------
-    outcome
-        The cycle.
-    limits
-        Column and range of each limited output, by name, and whether it is a share, which is told in per cent.
-    """
+
+def conditions(outcome: Outcome, limits: Limits) -> dict[str, str]:
+    """What is wrong in a cycle, in words, by key; for `limits` see `watched_limits`."""
     found: dict[str, str] = {}
     if outcome.mode is Mode.SHED:
         found["shed"] = "control was given back to the plant: turn the switch to monitor, then up again"
@@ -84,7 +87,7 @@ def lasting(counts: Mapping[str, int], wrong: Mapping[str, str]) -> tuple[dict[s
     return now, {key: words for key, words in wrong.items() if now.get(key, LASTS) >= LASTS}
 
 
-def _outside(sample: Sample, limits: Mapping[str, tuple[int, float, float, bool]]) -> dict[str, str]:
+def _outside(sample: Sample, limits: Limits) -> dict[str, str]:
     found = {}
     for name, (j, low, high, share) in limits.items():
         value = float(sample.outputs[j])

@@ -147,6 +147,8 @@ class CyclePart(Part):
     """A longer gap in the samples starts the estimator again from its last estimate."""
     deadline: float = Field(default=0.8, gt=0, lt=1)
     """Share of the sampling interval after which nothing is written any more in a cycle."""
+    ends_after_s: float = Field(default=60.0, gt=0)
+    """A cycle that lasts longer [s of this machine] ends the program; the first fit has 15 times as long."""
     speed: float = Field(default=1.0, gt=0, le=1000)
 
 

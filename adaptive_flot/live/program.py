@@ -11,6 +11,7 @@ from adaptive_flot.live.page.server import PageServer
 from adaptive_flot.live.requests import Inbox
 from adaptive_flot.live.running.progress import Progress, Stage
 from adaptive_flot.live.running.run import LinkRun
+from adaptive_flot.live.running.watchdog import HungCycleError, end_now, unwatched_after, watch
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store.memory import Memory, open_database
 
@@ -44,9 +45,12 @@ def live(link: Link, say: Callable[[str], None] = print, cycles: int | None = No
             page.start()
             shows = (speaker, page.show)
             say(f"Page: {page.address}")
-        run = LinkRun(link, memory, lambda progress: _show(shows, progress), inbox)
+        run = LinkRun(
+            link, memory, lambda progress: _show(shows, progress), inbox, lambda: page_conditions(page), watch
+        )
         settle()
-        asyncio.run(_run(run, cycles))
+        with unwatched_after():
+            asyncio.run(_run(run, cycles))
         say(f"Session {memory.session}: ended after {run.state.number} cycles; control is with the plant")
     finally:
         if page is not None:
@@ -61,7 +65,15 @@ def _show(shows: tuple[Callable[[Progress], None], ...], progress: Progress) -> 
 
 async def _run(run: LinkRun, cycles: int | None) -> None:
     async with until_stopped() as stop:
-        await run.run(stop, cycles)
+        try:
+            await run.run(stop, cycles)
+        except HungCycleError as error:
+            end_now(error)
+
+
+def page_conditions(page: PageServer | None) -> dict[str, str]:
+    """What is wrong with the page, by key."""
+    return {PAGE: page.problem} if page is not None and page.problem else {}
 
 
 def _started(link: Link, memory: Memory) -> str:
@@ -73,7 +85,7 @@ def _started(link: Link, memory: Memory) -> str:
 
 
 def kept(link: Link, memory: Memory) -> list[str]:
-    """What persons did at the page before the start and still holds."""
+    """What persons did at the page before the start and what still holds, one line each."""
     found = []
     if memory.resumed is not None and memory.resumed.effects:
         labels, person = [e.label for e in memory.resumed.effects], memory.resumed.extensions[-1].person
@@ -84,6 +96,10 @@ def kept(link: Link, memory: Memory) -> list[str]:
     return found
 
 
+PAGE = "page"
+"""Key of the alarm about the page."""
+
+
 class Speaker:
     """Says what changes from cycle to cycle, one line each."""
 
@@ -92,6 +108,7 @@ class Speaker:
         self._faults: tuple[str, ...] = ()
         self._estimating = False
         self._stage: Stage | None = None
+        self._page = ""
 
     def __call__(self, progress: Progress) -> None:
         """Look at a cycle."""
@@ -110,6 +127,11 @@ class Speaker:
             self._say(f"{outcome.number}: extension of the model: {self._stage.value}{by}")
         if progress.found:
             self._say(f"{outcome.number}: discovery: {progress.found}")
+        alarm = progress.alarms.get(PAGE)
+        page = alarm.words if alarm is not None and alarm.active else ""
+        if page != self._page:
+            self._page = page
+            self._say(f"{outcome.number}: {page or 'the page runs again'}")
         if outcome.faults != self._faults:
             self._faults = outcome.faults
             self._say(f"{outcome.number}: {'; '.join(outcome.faults) or 'all is well again'}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from adaptive_flot.contracts import Estimate
 from adaptive_flot.live.finding import Finding
@@ -35,6 +35,7 @@ class DeskBench:
         self.state = self.use.cycle.start(None if resumed is None else resumed.prior)
         self.finding: Finding | None = None
         self.well = True
+        self.conditions: Callable[[], dict[str, str]] = dict
 
     def interval(self, requests: Sequence[Request] = (), changed: Snapshot | None = None) -> Progress:
         """One interval, with what persons ask for before it."""
@@ -45,7 +46,7 @@ class DeskBench:
         snapshot = Snapshot(**{**vars(told), "allowed": self.desk.allowed})
         self.state, outcome = self.use.cycle.step(self.state, snapshot)
         noise = self.state.estimation.noise_std
-        self.desk.after(outcome, noise, self.finding)
+        self.desk.after(outcome, noise, self.finding, self.conditions())
         beside = Beside(answered, self.desk.said(), self.desk.results(), change)
         if self.memory is not None:
             self.memory.store(snapshot, outcome, noise, {}, beside=beside)

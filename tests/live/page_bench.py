@@ -40,9 +40,10 @@ def served(link: Link) -> Iterator[tuple[PageServer, Inbox]]:
 
 
 class Visitor:
-    """A browser without a screen."""
+    """A browser without a screen, maybe at another address of the loopback network."""
 
-    def __init__(self, server: PageServer) -> None:
+    def __init__(self, server: PageServer, source: str = "127.0.0.1") -> None:
+        self.source = source
         where = urlparse(server.address)
         assert where.hostname is not None and where.port is not None
         self.host, self.port = where.hostname, where.port
@@ -54,7 +55,7 @@ class Visitor:
         self, method: str, path: str, headers: Mapping[str, str | None] | None = None, body: bytes | None = None
     ) -> tuple[int, dict[str, str], str]:
         """Status, headers and text of an answer; None leaves a header out."""
-        connection = http.client.HTTPConnection(self.host, self.port, timeout=20)
+        connection = http.client.HTTPConnection(self.host, self.port, 20, (self.source, 0))
         sent = {"Cookie": self.cookie or None, "Origin": self.origin if method == "POST" else None, **(headers or {})}
         try:
             connection.request(method, path, body, {k: v for k, v in sent.items() if v is not None})

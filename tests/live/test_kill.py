@@ -141,7 +141,7 @@ def test_a_wrong_link_file_is_one_line_and_nothing_is_written(
     with pytest.raises(SystemExit) as ended:
         main()
     said = capsys.readouterr().err
-    assert ended.value.code == 2
+    assert ended.value.code == 2, said
     assert len(said.splitlines()) == 1 and words in said
     if "password_file" not in str(changes):
         assert list(tmp_path.iterdir()) == [bad]

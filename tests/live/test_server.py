@@ -244,10 +244,12 @@ async def together(link: Link, certificates: Path) -> AsyncIterator[Together]:
         yield both
     finally:
         stop.set()
-        await tasks[1]
-        tasks[0].cancel()
-        await server.stop()
-        memory.close()
+        try:
+            await tasks[1]
+        finally:
+            tasks[0].cancel()
+            await server.stop()
+            memory.close()
 
 
 def patient(write_link: Callable[..., Link], scenario: Scenario) -> Link:

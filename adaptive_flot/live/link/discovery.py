@@ -6,6 +6,7 @@ What is found is stored as an event, and shown. Whether the model in use is exte
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from adaptive_flot.child_processes import end_with_parent
 from adaptive_flot.contracts import Decision, Estimate, PlantRecord, Sample, Setup, Status
 from adaptive_flot.contracts.delayed_measurements import in_time
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -162,7 +164,8 @@ class LiveDiscovery:
     def _executor(self) -> ProcessPoolExecutor:
         """A process that shares nothing with this one: the link has threads, which no fork may copy."""
         if self._pool is None:
-            self._pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(1, context, initializer=end_with_parent, initargs=(os.getpid(),))
         return self._pool
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 from urllib.parse import parse_qs
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -17,13 +17,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from adaptive_flot.live.page.access import COOKIE, LASTS_S, Access, Role, Session, foreign, is_same
 from adaptive_flot.live.page.assets import ASSETS, login_page, page
-from adaptive_flot.live.page.hub import Hub, Listener
+from adaptive_flot.live.page.attempts import Attempts
+from adaptive_flot.live.page.hub import Hub
+from adaptive_flot.live.page.stream import Stream
 from adaptive_flot.live.requests import Action, Inbox, Request
 
 LONGEST_BODY = 4096
-PING_S = 10.0
-SLOWEST_S = 5.0
-"""A browser that does not take a message within this time is dropped."""
 HEADERS = {
     "content-security-policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
@@ -81,6 +80,7 @@ class PageApplication:
     def __init__(self, access: Access, hub: Hub, inbox: Inbox, hosts: frozenset[str], scheme: str, port: int) -> None:
         self._access, self._hub, self._inbox = access, hub, inbox
         self._origins = frozenset(f"{scheme}://{host}" for host in hosts)
+        self._attempts = Attempts()
         self._secure = scheme == "https"
         # a browser takes a `__Host-` cookie from this very host only, over https
         self._cookie = f"{'__Host-' if self._secure else ''}{COOKIE}_{port}"
@@ -115,8 +115,14 @@ class PageApplication:
             return PlainTextResponse("refused: too long", 413)
         except (UnicodeError, ValueError):
             return PlainTextResponse("refused: no form", 400)
+        address = "" if request.client is None else request.client.host
+        wait = math.ceil(self._attempts.wait_s(address))
+        if wait:
+            words = f"Too many wrong tokens from this address: try again in {wait} s."
+            return Response(login_page(words), 429, {"retry-after": str(wait)}, media_type="text/html")
         given = self._access.log_in(form.get("token", [""])[0].strip(), form.get("name", [""])[0])
         if given is None:
+            self._attempts.failed(address)
             return Response(login_page("Wrong token, or no name."), 403, media_type="text/html")
         answer = RedirectResponse("/", 303)
         answer.set_cookie(
@@ -172,45 +178,10 @@ class PageApplication:
         if listener is None:
             return PlainTextResponse("refused: too many browsers listen", 503)
         who = {"name": session.name, "may": session.role.value, "csrf": session.csrf}
-        return _Stream(self._hub, listener, who, lambda: self._access.session(key) is not None)
+        return Stream(self._hub, listener, who, lambda: self._access.session(key) is not None)
 
     def _session(self, request: HttpRequest) -> Session | None:
         return self._access.session(request.cookies.get(self._cookie))
-
-
-class _Stream(Response):
-    """Server-sent events to one browser, which ends with its session, or where the browser does not keep up."""
-
-    def __init__(self, hub: Hub, listener: Listener, who: dict[str, Any], valid: Callable[[], bool]) -> None:
-        super().__init__(media_type="text/event-stream")
-        self._hub, self._listener, self._who, self._valid = hub, listener, who, valid
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        gone = asyncio.ensure_future(_disconnected(receive))
-        telling = asyncio.ensure_future(self._tell(send))
-        try:
-            await asyncio.wait({gone, telling}, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            self._hub.leave(self._listener)
-            for task in (gone, telling):
-                task.cancel()
-            await asyncio.gather(gone, telling, return_exceptions=True)
-
-    async def _tell(self, send: Send) -> None:
-        headers = [(b"content-type", b"text/event-stream; charset=utf-8")]
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        message: str | None = "retry: 1000\n\n" + self._hub.begin(self._who)
-        while not self._listener.dropped and self._valid():
-            body = (message or ": nothing new\n\n").encode()
-            part = {"type": "http.response.body", "body": body, "more_body": True}
-            await asyncio.wait_for(send(part), SLOWEST_S)
-            message = await self._listener.next(PING_S)
-        await asyncio.wait_for(send({"type": "http.response.body", "body": b"", "more_body": False}), SLOWEST_S)
-
-
-async def _disconnected(receive: Receive) -> None:
-    while (await receive())["type"] != "http.disconnect":
-        pass
 
 
 def _has_csrf(request: HttpRequest, session: Session) -> bool:

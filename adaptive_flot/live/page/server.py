@@ -42,6 +42,8 @@ class PageServer:
     ----------
     address
         Where browsers find it.
+    problem
+        What keeps the page from showing the cycles, in words; empty for nothing.
 
     Raises
     ------
@@ -93,6 +95,7 @@ class PageServer:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._fresh: asyncio.Event | None = None
         self._started = threading.Event()
+        self._ended = self._unshown = ""
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
 
     def start(self) -> None:
@@ -110,6 +113,15 @@ class PageServer:
             except RuntimeError:  # the thread has ended
                 self._loop = None
 
+    @property
+    def problem(self) -> str:
+        """See the class."""
+        if self._started.is_set() and not self._thread.is_alive():
+            return f"the page has ended{self._ended}; the link goes on; start the link again to have the page back"
+        if len(self._cycles) == MOST_CYCLES:
+            return "the page does not keep up: browsers see old cycles, or none"
+        return self._unshown and f"the page can not show the cycles ({self._unshown})"
+
     def close(self) -> None:
         """Stop serving."""
         loop = self._loop
@@ -122,7 +134,12 @@ class PageServer:
         self._socket.close()
 
     def _run(self) -> None:
-        asyncio.run(self._serve())
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:  # the link goes on, and raises an alarm
+            self._ended = f" ({type(error).__name__}: {error})"
+        finally:
+            self._started.set()
 
     async def _serve(self) -> None:
         self._loop, self._fresh = asyncio.get_running_loop(), asyncio.Event()
@@ -139,8 +156,11 @@ class PageServer:
             await fresh.wait()
             fresh.clear()
             while self._cycles:
-                with contextlib.suppress(Exception):  # browsers then see that no cycle comes; the link goes on
+                try:
                     self.hub.publish(self._cycles.popleft())
+                    self._unshown = ""
+                except Exception as error:  # browsers see that no cycle comes; the link goes on, and raises an alarm
+                    self._unshown = f"{type(error).__name__}: {error}"
                 await asyncio.sleep(0)
 
 

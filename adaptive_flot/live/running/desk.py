@@ -6,13 +6,14 @@ which model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.live.alarms import Alarms, acknowledged, after_cycle, conditions, lasting
+from adaptive_flot.live.alarms import Alarms, acknowledged, after_cycle, conditions, lasting, watched_limits
 from adaptive_flot.live.finding import Finding
 from adaptive_flot.live.link.cycle import CycleState
 from adaptive_flot.live.link_file import TRIED, Link
@@ -75,12 +76,7 @@ class Desk:
         self._lasting: dict[str, int] = {}
         self._said: dict[str, str] = {}
         self._applies = self._reverts = ""
-        model, limits = link.scenario.model, link.scenario.limits
-        outputs = {} if limits is None else limits.outputs
-        self._limits = {}
-        for name, (low, high) in outputs.items():
-            j = model.index("outputs", name)
-            self._limits[name] = (j, low, high, model.outputs[j].unit == "-" and model.outputs[j].upper <= 1.0)
+        self._limits = watched_limits(link.scenario)
 
     def answer(self, requests: Sequence[Request]) -> tuple[Answered, ...]:
         """Carry out what persons ask for; what came of each."""
@@ -137,8 +133,14 @@ class Desk:
         self._said["model"] = f"not applied: {problem}"
         return state, None
 
-    def after(self, outcome: Outcome, noise_std: Sequence[float], finding: Finding | None) -> None:
-        """Look at a cycle: feed the shadows, raise and clear alarms, take up what discovery found."""
+    def after(
+        self,
+        outcome: Outcome,
+        noise_std: Sequence[float],
+        finding: Finding | None,
+        further: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        """Look at a cycle, and at what else is wrong: feed the shadows, set alarms, take up what discovery found."""
         if outcome.estimate is not None and outcome.sample is not None:
             for name, part in self._link.file.shadows.items():
                 if name not in self._shadows:
@@ -150,7 +152,7 @@ class Desk:
         building = self.card is not None and self.card.stage is Stage.BUILDING  # what is applied is what was asked for
         if finding is not None and not building and (self.card is None or finding is not self.card.finding):
             self.card = Card(finding, time)
-        wrong = conditions(outcome, self._limits)
+        wrong = conditions(outcome, self._limits) | dict(further)
         for role, shadow in self._shadows.items():
             if not shadow.view().runs:
                 wrong[f"shadow {role}"] = f"shadow {role} {shadow.view().status}"

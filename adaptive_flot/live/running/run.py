@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import replace
+from typing import Any, TypeVar
 
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.link.client import LOST, PlantClient
@@ -17,11 +18,13 @@ from adaptive_flot.live.requests import Answered, Inbox
 from adaptive_flot.live.running.desk import Desk
 from adaptive_flot.live.running.model_use import ModelUse
 from adaptive_flot.live.running.progress import Progress
+from adaptive_flot.live.running.watchdog import ORDERLY_S, HungCycleError, longest_cycle_s
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.snapshot import Snapshot
 from adaptive_flot.live.store.beside import Beside
 from adaptive_flot.live.store.memory import Memory
 
+T = TypeVar("T")
 PATIENCE = 1.5
 """Intervals without a new sample after which a cycle counts as one without."""
 LEAST_PATIENCE_S = 0.2
@@ -46,6 +49,10 @@ class LinkRun:
         Called after each cycle; it must not wait for anything.
     inbox
         What persons ask for at the page.
+    conditions
+        What is wrong beside the cycles, in words by key: it raises alarms.
+    watch
+        Called in each cycle with the time until the next call [s]; see `watchdog.py`.
 
     Attributes
     ----------
@@ -63,6 +70,8 @@ class LinkRun:
         memory: Memory,
         show: Callable[[Progress], None] = lambda progress: None,
         inbox: Inbox | None = None,
+        conditions: Callable[[], Mapping[str, str]] = dict,
+        watch: Callable[[float], None] = lambda seconds: None,
     ) -> None:
         self.link, self.memory, self.inbox = link, memory, inbox or Inbox()
         self.use = ModelUse(link, () if memory.resumed is None else memory.resumed.extensions)
@@ -70,7 +79,8 @@ class LinkRun:
         allowed = Mode.CLOSED if link.file.page is None else memory.allowed  # nobody could raise it without a page
         self.desk = Desk(link, self.use, inputs_since=lambda t: self.discovery.inputs_since(t), allowed=allowed)
         self.state: CycleState = self.use.cycle.start(None if memory.resumed is None else memory.resumed.prior)
-        self._show = show
+        self._show, self._conditions, self._watch = show, conditions, watch
+        self._stopping: asyncio.Future[Any] | None = None
         self._interval = link.scenario.dt / link.file.cycle.speed  # of this machine
         self._client: PlantClient | None = None
         self._connecting: asyncio.Task[PlantClient] | None = None
@@ -83,13 +93,17 @@ class LinkRun:
         ------
         LinkError
             The database fails, or the first connection shows that a file or a tag is wrong.
+        HungCycleError
+            A cycle does not end: its thread goes on, and the process must end.
         """
+        stopping = self._stopping = asyncio.ensure_future(stop.wait())
         in_time = True
         written: dict[str, Written] = {}
         try:
             while not stop.is_set() and (cycles is None or self.state.number < cycles):
                 in_time, written = await self._one(in_time, written)
         finally:
+            stopping.cancel()
             self.discovery.close()
             self.desk.close()
             await self._leave()
@@ -98,6 +112,8 @@ class LinkRun:
         """One cycle; whether it was in time, and what came of its writes."""
         client = await self._connected()
         alive = await self._wait(client)
+        longest = longest_cycle_s(self.link, self.state.estimation.inner is not None)
+        self._watch(longest + PATIENCE * self._interval + ORDERLY_S)
         loop = asyncio.get_running_loop()
         begin = loop.time()
         well = all(not result.problem for result in before.values())
@@ -108,12 +124,13 @@ class LinkRun:
             self.discovery = LiveDiscovery(self.link, effects=change.effects)
         snapshot = NOTHING if client is None else client.snapshot(alive, in_time, well)
         snapshot = replace(snapshot, allowed=self.desk.allowed)
-        self.state, outcome = await self._stepped(client, snapshot)
+        self.state, outcome = await self._ended(client, asyncio.to_thread(self.use.cycle.step, self.state, snapshot))
         found = self.discovery.look(outcome)
         noise = self.state.estimation.noise_std
-        self.desk.after(outcome, noise, self.discovery.finding)
+        self.desk.after(outcome, noise, self.discovery.finding, self._conditions())
         beside = Beside(answered, self.desk.said(), self.desk.results(), change)
-        await asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found, beside)
+        stored = asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found, beside)
+        await self._ended(client, stored)
         seconds = loop.time() - begin
         in_time = seconds <= self.link.file.cycle.deadline * self._interval
         written = await self._tell(client, outcome, in_time)
@@ -135,15 +152,25 @@ class LinkRun:
             snapshot, outcome, seconds, found, connected, state.modes, state.histories, self.use.cycle.model, *beside
         )
 
-    async def _stepped(self, client: PlantClient | None, snapshot: Snapshot) -> tuple[CycleState, Outcome]:
-        """One step; one that does not end (a solver may hang) gives control back before it is waited for."""
-        working = asyncio.create_task(asyncio.to_thread(self.use.cycle.step, self.state, snapshot))
-        longest = max(self.link.file.cycle.shed_after * self._interval, LEAST_PATIENCE_S)
-        done, _ = await asyncio.wait({working}, timeout=longest)
-        if not done and client is not None and self.state.modes.mode is Mode.CLOSED:
+    async def _ended(self, client: PlantClient | None, part: Coroutine[Any, Any, T]) -> T:
+        """A part of the cycle; one that does not end (a solver, a database) gives control back, then ends the link."""
+        working = asyncio.create_task(part)
+        patience = max(self.link.file.cycle.shed_after * self._interval, LEAST_PATIENCE_S)
+        await asyncio.wait({working}, timeout=patience)
+        if working.done():
+            return working.result()
+        if client is not None and self.state.modes.mode is Mode.CLOSED:
             with contextlib.suppress(*LOST):
                 await client.tell(self.state.number + 1, False, f"{Mode.SHED.name.lower()}: a cycle does not end")
-        return await working
+        longest = longest_cycle_s(self.link, self.state.estimation.inner is not None)
+        waits: set[asyncio.Future[Any]] = {working} if self._stopping is None else {working, self._stopping}
+        await asyncio.wait(waits, timeout=longest - patience, return_when=asyncio.FIRST_COMPLETED)
+        if not working.done():
+            raise HungCycleError(
+                f"cycle {self.state.number + 1} does not end: what it calls (solver, plug-in, database) hangs; control "
+                "is with the plant; start the link again: it goes on from the last stored estimate, in monitor"
+            )
+        return working.result()
 
     async def _tell(self, client: PlantClient | None, outcome: Outcome, in_time: bool) -> dict[str, Written]:
         """Heartbeat, request and mode; then the set-points, unless the cycle took too long."""

@@ -5,8 +5,8 @@ It has no client and no address of a plant. What it decides goes back to the lin
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from adaptive_flot.child_processes import end_with_parent
 from adaptive_flot.contracts import Decision, Estimate, Prior, Sample, TracksInputs
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -174,7 +175,9 @@ def make_stepper(link_file: Path, plan: ShadowPlan) -> ShadowStepper:
 
 def work(connection: Connection, link_file: Path, plan: ShadowPlan, make: Make) -> None:
     """Main function of the process: it ends with the link, or with the first error, which it tells."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    link = multiprocessing.parent_process()
+    if link is not None and link.pid is not None:
+        end_with_parent(link.pid)
     os.nice(NICE)
     try:
         stepper = make(link_file, plan)
