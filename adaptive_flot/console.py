@@ -20,6 +20,7 @@ from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.absorbed import absorbed
 from adaptive_flot.report.run.inquiries import told_at_the_top
 from adaptive_flot.report.run.series import cases
+from adaptive_flot.report.run.softened import softened_table
 from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
 from adaptive_flot.runner.commands.estimate import RecordEstimate
@@ -156,6 +157,7 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
     comparison = compare_runs(scenario, runs)
     makers = (compare_tables.outcome_table, compare_tables.status_table, compare_tables.time_table)
     found = [*(make(comparison) for make in makers), unsolved_table(runs)]
+    found.append(softened_table(scenario.model, runs))
     told = told_at_the_top(cases([(scenario, runs)]))
     print_comparison([table for table in found if table is not None], [*told, *findings(comparison)])
 

@@ -50,11 +50,14 @@ class Decision:
     solve_seconds
         Wall-clock time of the optimisation; NaN where none ran.
     message
-        What was wrong, in words: the most violated constraints of a failed solve.
+        What was wrong, in words: the most violated constraints of a failed solve, or the limits that were given up.
     plan
         What the optimisation that this decision comes from expects; None where none ran or none was valid.
     faults
         Names of the faults that were injected into this decision.
+    softened
+        How far beyond a limit the plan goes at most, by name of the output, state or input, in its unit: what was given
+        up where no plan keeps every limit.
     """
 
     inputs: FloatArray
@@ -64,13 +67,15 @@ class Decision:
     message: str = ""
     plan: Plan | None = None
     faults: tuple[str, ...] = ()
+    softened: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Limits:
     """Where a process may be run.
 
-    The ranges of outputs and states can be left when a disturbance is too large; those of inputs and moves can not.
+    The ranges of outputs and states can be left when a disturbance is too large, those of inputs can not. A move is
+    larger than the largest one only where it brings an input back into its range.
 
     Attributes
     ----------

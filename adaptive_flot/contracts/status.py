@@ -18,6 +18,7 @@ class Status(Enum):
     NOT_FINITE = "prediction not finite: sample skipped, last estimate kept"
     NOT_CONVERGED = "search stopped before it converged: best values so far"
     RETRIED = "solved at the second try, from a cold start"
+    SOFTENED = "no plan keeps every limit: some were given up in the stated order"
     SHIFTED_PLAN = "no valid solution: the plan of the step before goes on"
     HELD = "no valid solution and no plan: the inputs are held"
     SAFE_INPUT = "nothing else was valid: the safe inputs"

@@ -3,6 +3,8 @@
 Map
 ---
 controller.py           `EconomicMpc`: state in, decision out.
+planner.py              From an estimate to a plan.
+softening.py            The order in which limits are given up.
 state.py                `MpcState`: what the next decision needs.
 layout.py               `StageLayout`: where each unknown stands in the vector of the optimisation.
 stage.py                One stage: dynamics, what is earned, constraints.

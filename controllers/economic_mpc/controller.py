@@ -5,20 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from adaptive_flot.contracts import (
-    AnyController,
-    ControllerSetup,
-    Decision,
-    Estimate,
-    Plan,
-    Sample,
-    Status,
-    full_parameters,
-)
+from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Estimate, Plan, Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
@@ -27,12 +18,21 @@ from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Bounds, with_further_states
 from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
 from controllers.economic_mpc.output_bias import OutputBias
+from controllers.economic_mpc.planner import Found, Planner
 from controllers.economic_mpc.probing import ProbeState, Probing, price
-from controllers.economic_mpc.stage import Arguments
+from controllers.economic_mpc.softening import Softening, by_name, in_words
 from controllers.economic_mpc.state import MpcState
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
 OWN = "economic_mpc"
+
+
+class Told(NamedTuple):
+    """What a decision tells of its plan: the plan, words on it, and how far beyond each limit it goes."""
+
+    plan: Plan
+    words: str
+    softened: Mapping[str, float]
 
 
 class EconomicMpc:
@@ -67,6 +67,9 @@ class EconomicMpc:
     limit_probability
         Probability with which the limits of outputs are to hold, given the covariance of the estimate: they are backed
         off further by what that asks (`chance_constraint.py`). Default no further back-off.
+    priority
+        Names of the limited outputs and states, the one to give up last first. Where no plan keeps every limit, they
+        are given up from the back (`softening.py`). Default: outputs, then states.
     bias_time_s
         Time constant of the filters of output biases [s].
     budget_s
@@ -91,6 +94,7 @@ class EconomicMpc:
         limit_penalty: float | None = None,
         backoff: float | None = None,
         limit_probability: float | None = None,
+        priority: Sequence[str] | None = None,
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
         probing: Mapping[str, Any] | None = None,
@@ -112,20 +116,27 @@ class EconomicMpc:
         self.layout = self.problem.layout
         self.solver: Solver = make_solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
-        self._limits = self.layout.limit_values(backoff)
-        self._chance: ChanceConstraint | None = None
+        chance: ChanceConstraint | None = None
         if limit_probability is not None:
-            self._chance = ChanceConstraint(setup, [e.index for e in self.layout.output_limits], limit_probability)
+            chance = ChanceConstraint(setup, [e.index for e in self.layout.output_limits], limit_probability)
         own = [economics.typical_rate if cost is None else cost for cost in (move_cost, limit_penalty)]
+        own = [own[0], *[own[1]] * self.layout.slacks_size]
         self._value_scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
-        self._prices = self._value_scale * np.array([*economics.prices(), *own])
         self._bounds = Bounds.of(limits, self.layout)
-        self._solver_bounds = self.layout.bounds(self._bounds)
+        self.planner = Planner(
+            setup,
+            self.layout,
+            self._bounds,
+            limits=self.layout.limit_values(backoff),
+            prices=self._value_scale * np.array([*economics.prices(), *own]),
+            chance=chance,
+            softening=Softening(self.problem, self._bounds, priority, budget_s),
+            budget_s=budget_s,
+        )
         self._biases = [
             OutputBias(name, setup.model.index("outputs", name), setup.dt, bias_time_s) for name in self.layout.outputs
         ]
         self.probing = None if probing is None else Probing(self.layout, limits, **probing)
-        self._ode = FastCall(setup.model.ode)
         self._outputs = FastCall(self.problem.outputs, matrices=("outputs",))
 
     def init(self, time: float) -> MpcState:
@@ -182,27 +193,15 @@ class EconomicMpc:
     def _optimise(
         self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
     ) -> tuple[MpcState, Decision]:
-        model, moved = self.setup.model, self.layout.moved
-        theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
-        others = np.delete(held, moved)
-        now = Arguments(
-            estimate.state,
-            held[moved],
-            theta,
-            others,
-            self._limits_for(estimate, held, theta),
-            np.array(state.bias),
-            self._prices,
-            estimate.time,
-        ).vector()
-        solution, status = self._solve(state, now, held, estimate, theta)
-        if solution.validity is Validity.VALID and self.probing is not None:
-            state, solution = self._probe(self.probing, state, now, held, estimate, solution)
+        moved = self.layout.moved
+        found = self.planner.find(self.solver, state, held, sample, estimate)
+        if found.solution.validity is Validity.VALID and self.probing is not None and not found.given_up:
+            state, found = self._probe(self.probing, state, held, estimate, found)
+        solution = found.solution
         if solution.validity is Validity.VALID:
             plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
-            expected = self._plan(estimate.time, solution, now)
             first = self.layout.inputs_of(solution.variables)[0]
-            return self._apply(plan, held, first, status, solution, expected)
+            return self._apply(plan, held, first, found.status, solution, self._told(estimate.time, found))
         if state.plan is not None and state.age + 1 < self.layout.horizon:
             older = replace(state, age=state.age + 1)
             planned = self.layout.inputs_of(state.plan)[older.age]
@@ -211,56 +210,31 @@ class EconomicMpc:
             return self._apply(state, held, held[moved], Status.HELD, solution)
         return self._apply(state, self.setup.schedule[0], self.setup.schedule[0][moved], Status.SAFE_INPUT, solution)
 
-    def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
-        """Values of the output limits, moved inwards by what the estimate leaves open."""
-        if self._chance is None:
-            return self._limits
-        kept = self._chance.backoff(estimate.time, estimate.state, held, theta, estimate.covariance)
-        inwards = np.array([-1.0 if e.is_upper else 1.0 for e in self.layout.output_limits])
-        return self._limits + inwards * kept
-
-    def _solve(
-        self, state: MpcState, now: FloatArray, held: FloatArray, estimate: Estimate, theta: FloatArray
-    ) -> tuple[NlpSolution, Status]:
-        """Warm from the last plan, then once cold."""
-        z = self._ode(estimate.time, estimate.state, held, theta)[3]
-        cold = self.layout.start(estimate.state, held[self.layout.moved], z)
-        if state.plan is None or state.age > 0:  # what is left of a plan from before a failure is no start
-            return self.solver(now, self._solver_bounds, cold), Status.OK
-        shifted = self.layout.shifted(state.plan)
-        multipliers = self.layout.shifted_multipliers(state.multipliers) if state.multipliers else None
-        solution = self.solver(now, self._solver_bounds, shifted, multipliers)
-        if solution.validity is Validity.VALID or solution.seconds > self.budget_s:
-            return solution, Status.OK
-        return self.solver(now, self._solver_bounds, cold), Status.RETRIED
-
     def _probe(
-        self,
-        probing: Probing,
-        state: MpcState,
-        now: FloatArray,
-        held: FloatArray,
-        estimate: Estimate,
-        free: NlpSolution,
-    ) -> tuple[MpcState, NlpSolution]:
+        self, probing: Probing, state: MpcState, held: FloatArray, estimate: Estimate, found: Found
+    ) -> tuple[MpcState, Found]:
         """Put a dip in front of a valid plan where one is due, has a valid plan itself, and can be paid."""
         probe, value = state.probe, float(held[self.layout.moved[probing.position]])
         if probe is None or not probing.is_due(probe, estimate, value):
-            return state, free
-        bounds = probing.bounds(value, self._solver_bounds)
-        asked = self.solver(now, bounds, free.variables, free.multipliers)
+            return state, found
+        free, now = found.solution, found.arguments
+        asked = self.solver(now, probing.bounds(value, found.bounds), free.variables, free.multipliers)
         if asked.validity is not Validity.VALID:
-            return state, free
+            return state, found
         cost = price(self.problem, free.variables, asked.variables, now) / self._value_scale
         probe, paid = probing.pay(probe, cost, estimate.time)
-        return replace(state, probe=probe), replace(asked, seconds=free.seconds + asked.seconds) if paid else free
+        dip = replace(found, solution=replace(asked, seconds=free.seconds + asked.seconds))
+        return replace(state, probe=probe), dip if paid else found
 
-    def _plan(self, time: float, solution: NlpSolution, now: FloatArray) -> Plan:
+    def _told(self, time: float, found: Found) -> Told:
+        solution = found.solution
         inputs = self.layout.inputs_of(solution.variables)
         ends = time + self.layout.move_s * np.arange(1.0, self.layout.horizon + 1)
-        (outputs,) = self._outputs(solution.variables, now)
+        (outputs,) = self._outputs(solution.variables, found.arguments)
         moves = dict(zip(self.layout.moved_names, inputs.T, strict=True))
-        return Plan(ends, moves, dict(zip(self.layout.outputs, outputs.T, strict=True)))
+        plan = Plan(ends, moves, dict(zip(self.layout.outputs, outputs.T, strict=True)))
+        words = "; ".join(part for part in (in_words(found.given_up), found.note) if part)
+        return Told(plan, words, by_name(found.given_up))
 
     def _apply(
         self,
@@ -269,14 +243,16 @@ class EconomicMpc:
         to: FloatArray,
         status: Status,
         by: NlpSolution,
-        plan: Plan | None = None,
+        told: Told | None = None,
     ) -> tuple[MpcState, Decision]:
         inputs = held.copy()
         low, high = self._bounds.inputs.T
         inputs[self.layout.moved] = np.clip(to, low, high)  # a valid solution may miss a bound by its tolerance
-        own = OWN if plan is None else self._own(state, plan.time[0] - self.layout.move_s)
-        who = own if status in (Status.OK, Status.RETRIED) else status.name.lower()
-        decision = Decision(inputs.copy(), status, who, by.seconds, by.message, plan)
+        if told is None:
+            decision = Decision(inputs.copy(), status, status.name.lower(), by.seconds, by.message)
+        else:
+            who = self._own(state, told.plan.time[0] - self.layout.move_s)
+            decision = Decision(inputs.copy(), status, who, by.seconds, told.words, told.plan, softened=told.softened)
         return replace(state, inputs=inputs), decision
 
     @staticmethod

@@ -19,8 +19,10 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.sensors import without_sensor_effects
 from controllers.economic_mpc.layout import DEGREE, StageLayout
 
-CONTROL_PRICES = 2
-"""Prices of the controller itself, behind those of the economics: of moves and of slacks."""
+
+def control_prices(layout: StageLayout) -> int:
+    """Number of prices of the controller itself, behind those of the economics: of moves, and of each slack."""
+    return 1 + layout.slacks_size
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,8 @@ class Arguments:
         Added to every prediction of a limited output: what the model is off by now, in the order of
         `StageLayout.outputs`.
     prices
-        Those of the economics; then the cost of a squared scaled move and the penalty on a second of a slack of an
-        output (of a state: of its square).
+        Those of the economics; then the cost of a squared scaled move, the penalty on a second of the slack of each
+        output limit, and that on a second of the squared slack of each limited state.
     time
         Time now [s], for a model that depends on it.
     """
@@ -140,7 +142,7 @@ def write_stage(layout: StageLayout, economics: Economics) -> Stage:
         The rates of the economics are not those of its terms.
     """
     model, begin = layout.model, ca.SX.sym("begin")
-    p = ArgumentSymbols.of(layout, len(economics.prices()) + CONTROL_PRICES)
+    p = ArgumentSymbols.of(layout, len(economics.prices()) + control_prices(layout))
     w = _Written(dict.fromkeys(economics.terms, ca.SX(0.0)))
     nx, nz, nu = len(model.states), len(model.algebraic), layout.inputs_size
     variables, after = ca.SX.sym("w", layout.block), ca.SX.sym("after", layout.state_size)
@@ -161,10 +163,10 @@ def write_stage(layout: StageLayout, economics: Economics) -> Stage:
             index = model.index("states", name)
             scaled = xj[index] * layout.x_scale[index] / layout.state_slack_scale[i]
             w.constrain(scaled + off_ranges[i], [f"range of {name}, point {j + 1}"])
-    move_cost, penalty = p.prices[-2], p.prices[-1]
+    move_cost, *penalties = ca.vertsplit(p.prices[-control_prices(layout) :])
     terms = [*w.earned.values(), -move_cost * ca.sumsqr(u - before)]
-    terms += [-penalty * layout.move_s * slack for slack in ca.vertsplit(beyond_limits)]
-    terms += [-penalty * layout.move_s * slack**2 for slack in ca.vertsplit(off_ranges)]
+    costs = [*ca.vertsplit(beyond_limits), *(slack**2 for slack in ca.vertsplit(off_ranges))]
+    terms += [-penalty * layout.move_s * cost for penalty, cost in zip(penalties, costs, strict=True)]
     constraints = ca.vertcat(*w.constraints)
     return Stage(
         variables, after, begin, p, constraints, w.names, ca.vertcat(*terms), len(economics.terms), outputs[-1]

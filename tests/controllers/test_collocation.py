@@ -15,7 +15,7 @@ from controllers.economic_mpc.stage import Arguments
 from controllers.economic_mpc.verification import Validity, Verifier
 
 MOVE_S, HORIZON = 30.0, 8
-PRICES = 1000 * np.array([*Prices().prices(), 1e-3, 1e-3])
+PRICES = 1000 * np.array([*Prices().prices(), 1e-3, 1e-3, 1e-3])
 BOUNDS = Bounds(np.array([[9.05e-4, 2.17e-3], [0.33, 0.42]]), np.array([2e-4, 0.01]), np.array([[0.33, 0.42]]))
 LIMITS = Limits(
     outputs={"concentrate_grade": (0.20, np.inf)},
@@ -92,7 +92,7 @@ def test_nothing_is_rebuilt_when_an_argument_changes(problem: OptimalControlProb
         {"limits": np.array([0.21])},
         {"biases": np.array([-0.01])},
         {"disturbances": np.array([1.8e-4])},
-        {"prices": PRICES * np.array([1, 1, 3e4, 1, 1, 1])},
+        {"prices": PRICES * np.array([1, 1, 3e4, 1, 1, 1, 1])},
         {"previous": np.array([1.2e-3, 0.38])},
     ):
         now = arguments(model, **changes)

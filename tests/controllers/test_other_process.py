@@ -50,7 +50,7 @@ def closed_loop(controller: AnyController, plant: Model) -> tuple[FloatArray, Fl
         sample = Sample(DT * (k + 1), u, y)
         belief, estimate = estimator.update(belief, sample)
         state, decision = controller.decide(state, sample, estimate)
-        assert decision.status is Status.OK
+        assert decision.status in (Status.OK, Status.SOFTENED)  # the start may lie beyond a limit
         rates = economics.rates(OperatingPoint(plant, x, u, y, plant.parameter_values), economics.prices())
         levels.append(y[0])
         voltages.append(u[0])

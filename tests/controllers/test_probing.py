@@ -167,8 +167,8 @@ def test_without_room_or_without_a_valid_plan_there_is_no_dip(monkeypatch: pytes
         return solution if calls == 1 else replace(solution, validity=Validity.VIOLATED)
 
     monkeypatch.setattr(controller, "solver", second_fails)
-    state = replace(controller.init(0.0), inputs=START.copy())
-    _, decision = controller.decide(state, replace(case.samples[0], time=100.0, inputs=START), estimate)
+    state = replace(controller.init(0.0), inputs=case.samples[0].inputs.copy())
+    _, decision = controller.decide(state, replace(case.samples[0], time=100.0), estimate)
     assert calls == 2 and decision.status is Status.OK and decision.decided_by == "economic_mpc"
 
 

@@ -17,7 +17,7 @@ from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.shadow.process import ShadowView
 
-SOLVED = (Status.OK, Status.RETRIED)
+SOLVED = (Status.OK, Status.RETRIED, Status.SOFTENED)
 NO_DECISION, NO_VALUE = "no decision", "not read"
 USUAL = {"ok", "no new value"}
 LOOKS = {

@@ -16,4 +16,5 @@ closed_loop_figures.py  Charts of the closed loop.
 inquiries.py            Effects that were searched for while the loop ran.
 fault_table.py          Faults that were injected.
 unsolved.py             Optimisations without a valid solution.
+softened.py             Limits that no plan kept.
 """

@@ -14,6 +14,7 @@ from adaptive_flot.report.run.cramer_rao_limit import limit_part
 from adaptive_flot.report.run.fault_table import fault_table
 from adaptive_flot.report.run.inquiries import watch_section
 from adaptive_flot.report.run.series import CaseRuns
+from adaptive_flot.report.run.softened import softened_table
 from adaptive_flot.report.run.unsolved import unsolved_table
 
 
@@ -60,7 +61,8 @@ def topics(case: CaseRuns, album: Album) -> list[Topic]:
             Topic("What can be known", "Cramér–Rao bound", [limit.picture, limit.table, Bullets(limit.sentences)])
         )
     found.append(Topic("Residuals", "whiteness", [*pictures.residuals_of(case, album), tables.innovation_table(case)]))
-    statuses = present(tables.status_table(case), fault_table(case), unsolved_table(case.runs))
+    softened = softened_table(case.scenario.model, case.runs)
+    statuses = present(tables.status_table(case), fault_table(case), unsolved_table(case.runs), softened)
     found.append(Topic("Statuses", "and times, faults, failed optimisations", statuses))
     return found
 

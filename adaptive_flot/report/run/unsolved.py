@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from adaptive_flot.contracts import Status
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.kit.wording import number
 from adaptive_flot.runner.commands.run_result import Run
@@ -31,7 +32,8 @@ def unsolved_table(runs: Sequence[Run]) -> Table | None:
 def _rows(run: Run) -> list[tuple[str, ...]]:
     if "control_message" not in run.table:
         return []
-    failed = run.table[run.table["control_message"].fillna("") != ""]
+    told = run.table["control_message"].fillna("") != ""
+    failed = run.table[told & (run.table["control_status"] != Status.SOFTENED.name.lower())]
     groups: pd.DataFrame = failed.groupby(["decided_by", "control_message"], sort=False)["time_s"].agg(["min", "size"])
     return [
         (run.controller, run.estimator, str(run.seed), str(who), number(first, "g"), str(count), str(words))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +34,7 @@ class RunArrays:
         (N, m), (N, q) and (N, q, q).
     statuses
         Of the estimator, N of them.
-    control_statuses, decided_by, messages, solve_seconds, plans
+    control_statuses, decided_by, messages, softened, solve_seconds, plans
         Of each decision; see `Decision`.
     faults
         Names of the injected faults that changed something in each interval.
@@ -56,6 +56,7 @@ class RunArrays:
     control_statuses: Sequence[Status]
     decided_by: Sequence[str]
     messages: Sequence[str]
+    softened: Sequence[Mapping[str, float]]
     solve_seconds: FloatArray
     plans: Sequence[Plan | None]
     faults: Sequence[tuple[str, ...]]
@@ -86,6 +87,7 @@ class RunArrays:
             control_statuses=[s.decision.status for s in steps],
             decided_by=[s.decision.decided_by for s in steps],
             messages=[s.decision.message for s in steps],
+            softened=[s.decision.softened for s in steps],
             solve_seconds=np.array([s.decision.solve_seconds for s in steps]),
             plans=[s.decision.plan for s in steps],
             faults=[(*s.plant.faults, *s.decision.faults) for s in steps],

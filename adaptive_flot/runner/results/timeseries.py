@@ -14,6 +14,8 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.results.run_arrays import RunArrays
 from adaptive_flot.runner.scenario.scenario import Scenario
 
+SOFTENED = "softened_"
+"""Begin of the columns that say how far a plan goes beyond a limit; the name of the quantity follows."""
 _NAMES = {id(status): status.name.lower() for status in Status}
 """Names in the tables by the identity of each status: its own hash and name cost a call for every row."""
 
@@ -31,8 +33,9 @@ def time_series(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, A
       no such parameter.
 
     Then follow `status` of the estimator, `control_status` and `decided_by`. `faults` are there where a scenario has
-    any. `control_message` says which constraints were in the way where an optimisation failed, and `solve_seconds` how
-    long it took.
+    any. `control_message` says which constraints were in the way where an optimisation failed, and which limits were
+    given up where no plan keeps all. `softened_<name>` is how far the plan goes beyond that limit, in the unit of the
+    output, state or input; NaN where it is kept. `solve_seconds` is how long the optimisation took.
     """
     columns: dict[str, Any] = {"time_s": run.time}
     columns |= _inputs(scenario, run) | _outputs(scenario, run) | _adapted(scenario, run, setup)
@@ -44,6 +47,8 @@ def time_series(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, A
         columns["faults"] = ["; ".join(names) for names in run.faults]
     if any(run.messages):
         columns["control_message"] = list(run.messages)
+    for name in dict.fromkeys(name for softened in run.softened for name in softened):
+        columns[f"{SOFTENED}{name}"] = [softened.get(name, np.nan) for softened in run.softened]
     if np.isfinite(run.solve_seconds).any():
         columns["solve_seconds"] = run.solve_seconds
     return columns

@@ -1,0 +1,152 @@
+"""From an estimate to a plan: what the problem is given, the tries to solve it, and what can not be kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status, full_parameters
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.fastcall import FastCall
+from controllers.economic_mpc.chance_constraint import ChanceConstraint
+from controllers.economic_mpc.layout import Bounds, StageLayout
+from controllers.economic_mpc.softening import GivenUp, Softening
+from controllers.economic_mpc.stage import Arguments
+from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the optimisation of one decision came to.
+
+    Attributes
+    ----------
+    solution
+        The last solution, valid or not.
+    status
+        `OK`, `RETRIED` or `SOFTENED`, if the solution is valid.
+    arguments, bounds
+        What it was solved with.
+    given_up
+        Limits that the plan does not keep.
+    note
+        What went wrong on the way to a valid solution; empty for nothing.
+    """
+
+    solution: NlpSolution
+    status: Status
+    arguments: FloatArray
+    bounds: dict[str, FloatArray]
+    given_up: tuple[GivenUp, ...] = ()
+    note: str = ""
+
+
+class Planner:
+    """Solves the problem of one decision.
+
+    Parameters
+    ----------
+    setup
+        Of the controller.
+    layout, bounds
+        Of the problem.
+    limits, prices
+        Values of the output limits, and prices as the problem has them.
+    chance
+        Back-off from the covariance; None for none.
+    softening
+        Order in which limits are given up.
+    budget_s
+        Wall-clock time of a solve [s]; there is no further one when it took longer.
+    """
+
+    def __init__(
+        self,
+        setup: ControllerSetup,
+        layout: StageLayout,
+        bounds: Bounds,
+        *,
+        limits: FloatArray,
+        prices: FloatArray,
+        chance: ChanceConstraint | None,
+        softening: Softening,
+        budget_s: float,
+    ) -> None:
+        self.setup, self.layout, self.softening, self.budget_s = setup, layout, softening, budget_s
+        self._bounds = layout.bounds(bounds)
+        self._limits, self._prices, self._chance = limits, prices, chance
+        self._ode = FastCall(setup.model.ode)
+
+    def find(self, solver: Solver, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate) -> Found:
+        """Solve; a failure is a value.
+
+        Parameters
+        ----------
+        solver
+            Finds plans.
+        state
+            Of the controller.
+        held
+            Inputs now (nu,), the newest of the disturbances among them.
+        sample, estimate
+            The newest.
+        """
+        model, moved = self.setup.model, self.layout.moved
+        theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
+        now = Arguments(
+            estimate.state,
+            held[moved],
+            theta,
+            np.delete(held, moved),
+            self._limits_for(estimate, held, theta),
+            np.array(state.bias),
+            self._prices,
+            estimate.time,
+        )
+        bounds, back = self.softening.way_back(self._bounds, held[moved])
+        arguments = now.vector()
+        solution, status = self._solve(solver, state, arguments, bounds, held, estimate, theta)
+        if solution.validity is not Validity.VALID:
+            return Found(solution, status, arguments, bounds)
+        given_up, note = self.softening.given_up(solution.variables, now.limits), ""
+        if not self.softening.is_in_order(given_up) and solution.seconds <= self.budget_s:
+            tried = self.softening.in_order(now, bounds, solution)
+            if tried.validity is Validity.VALID:
+                solution, given_up = tried, self.softening.given_up(tried.variables, now.limits)
+            else:
+                solution = replace(solution, seconds=tried.seconds)
+                note = "not in the stated order, since a further solve failed"
+        given_up = (*back, *given_up)
+        return Found(solution, Status.SOFTENED if given_up else status, arguments, bounds, given_up, note)
+
+    def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
+        """Values of the output limits, moved inwards by what the estimate leaves open."""
+        if self._chance is None:
+            return self._limits
+        kept = self._chance.backoff(estimate.time, estimate.state, held, theta, estimate.covariance)
+        inwards = np.array([-1.0 if e.is_upper else 1.0 for e in self.layout.output_limits])
+        return self._limits + inwards * kept
+
+    def _solve(
+        self,
+        solver: Solver,
+        state: MpcState,
+        now: FloatArray,
+        bounds: dict[str, FloatArray],
+        held: FloatArray,
+        estimate: Estimate,
+        theta: FloatArray,
+    ) -> tuple[NlpSolution, Status]:
+        """Warm from the last plan, then once cold."""
+        z = self._ode(estimate.time, estimate.state, held, theta)[3]
+        cold = self.layout.start(estimate.state, held[self.layout.moved], z)
+        if state.plan is None or state.age > 0:  # what is left of a plan from before a failure is no start
+            return solver(now, bounds, cold), Status.OK
+        shifted = self.layout.shifted(state.plan)
+        multipliers = self.layout.shifted_multipliers(state.multipliers) if state.multipliers else None
+        solution = solver(now, bounds, shifted, multipliers)
+        if solution.validity is Validity.VALID or solution.seconds > self.budget_s:
+            return solution, Status.OK
+        return solver(now, bounds, cold), Status.RETRIED
