@@ -47,7 +47,8 @@ def main(
 
             figures |= network_figures(folder, scenario, network)
         if page or soak:
-            from benchmarks.live.page import latency_figures, soak_figures
+            from benchmarks.live.page import latency_figures
+            from benchmarks.live.soak import soak_figures
 
             for speed in (1.0, 5.0) if page else ():
                 figures |= latency_figures(folder, scenario, speed, page)

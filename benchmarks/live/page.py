@@ -1,4 +1,4 @@
-"""The page in a real Chromium: from a change at the OPC UA source to the drawn value, and a simulated day."""
+"""The page in a real Chromium: from a change at the OPC UA source to the drawn value."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import socket
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -25,23 +25,18 @@ from adaptive_flot.live.certificates import token_file
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.loop import quiet_libraries, settle
 from adaptive_flot.live.page.server import PageServer
-from adaptive_flot.live.plant.direct import DirectPlant
 from adaptive_flot.live.plant.link_text import link_text
 from adaptive_flot.live.plant.operator import Operator
 from adaptive_flot.live.plant.process import TestPlant
 from adaptive_flot.live.plant.server import PlantServer, ServerPlace
 from adaptive_flot.live.plant.tags import Tag
 from adaptive_flot.live.requests import Inbox
-from adaptive_flot.live.running.desk import Desk
-from adaptive_flot.live.running.model_use import ModelUse
 from adaptive_flot.live.running.progress import Progress
 from adaptive_flot.live.running.run import LinkRun
 from adaptive_flot.live.safety.modes import Mode
-from adaptive_flot.live.store.beside import Beside
 from adaptive_flot.live.store.memory import Memory, open_database
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
-from benchmarks.live.lockstep import resident_mb
 from tests.browser.chromium import Browser, Tab, found
 
 WATCHED = "concentrate_grade"
@@ -53,8 +48,6 @@ WATCH = """
     new MutationObserver(() => painted('value', clock.dataset.time)).observe(clock, { attributes: true });
     new MutationObserver(() => painted('chart', chart.dataset.newest)).observe(chart, { attributes: true });
 """
-WARM = 4000
-"""Simulated cycles before memory is taken as the start: the page's last hour is full then."""
 
 
 def play(connection: Connection, certificates: Path, port: int, scenario: str, hours: float, speed: float) -> None:
@@ -168,71 +161,14 @@ def latency_figures(folder: Path, scenario: str, speed: float, seconds: float) -
     name = f"page at {speed:g} times real time"
     took = 1000 * np.array([s for _, s in cycles])
     figures: dict[str, object] = {
-        f"{name}: cycle with storage and page open, median and 99 % [ms]": _quantiles(took, (50, 99)),
+        f"{name}: cycle with storage and page open, median and 99 % [ms]": quantiles(took, (50, 99)),
         f"{name}: cycles; not in closed": f"{len(cycles)}; {sum(mode is not Mode.CLOSED for mode, _ in cycles)}",
         "page: scripts [kB]": round(size / 1000, 1),
     }
     for what, words in (("value", "tag to pixel"), ("chart", "tag to the chart's pixel")):
         ms = np.array([at - 1000 * published[round(t, 3)] for t, at in drawn[what] if round(t, 3) in published])
-        figures[f"{name}: {words}, median, 99 % and most [ms]"] = f"{_quantiles(ms, (50, 99, 100))} of {len(ms)}"
+        figures[f"{name}: {words}, median, 99 % and most [ms]"] = f"{quantiles(ms, (50, 99, 100))} of {len(ms)}"
     return figures
-
-
-def soak_figures(
-    folder: Path, scenario: str, hours: float, say: Callable[[str], None] = lambda words: None
-) -> dict[str, object]:
-    """Simulated hours as fast as they go, without the network, page and browser open: memory and times of cycles."""
-    link = page_link(folder, scenario, 4840, 1.0, hours + 0.1)
-    inbox = Inbox()
-    page = PageServer(link, inbox)
-    page.start()
-    memory = Memory(open_database(link.file.database, folder), link)
-    use = ModelUse(link)
-    desk = Desk(link, use)
-    direct = DirectPlant(TestPlant(Realisation(link.scenario, 1)))
-    direct.operate("switch", Mode.MONITOR)
-    state = use.cycle.start()
-    cycles = round(3600 * hours / link.scenario.dt)
-    took = np.zeros(cycles)
-    grown = {"process": 0.0, "browser": 0.0}
-    modes: dict[str, int] = {}
-    with opened(page, folder) as tab:
-        for k in range(cycles):
-            if k == WARM or k == cycles - 1:
-                sign = 1.0 if k > WARM else -1.0
-                grown["process"] += sign * resident_mb()
-                grown["browser"] += sign * _heap_mb(tab)
-            if k % WARM == 0:
-                say(f"{k} of {cycles} cycles: {resident_mb():.1f} MB, browser {_heap_mb(tab):.1f} MB")
-            direct.interval()
-            snapshot = direct.snapshot()
-            begin = time.perf_counter()
-            answered = desk.answer(inbox.take())
-            state, outcome = use.cycle.step(state, replace(snapshot, allowed=desk.allowed))
-            desk.after(outcome, state.estimation.noise_std, None)
-            beside = Beside(answered, desk.said(), desk.results())
-            memory.store(snapshot, outcome, state.estimation.noise_std, {}, beside=beside)
-            took[k] = time.perf_counter() - begin
-            direct.take(outcome)
-            if state.estimation.estimate is not None:
-                direct.operate("switch", Mode.CLOSED)
-            shown = desk.alarms, desk.card, desk.shadows(), answered
-            page.show(
-                Progress(snapshot, outcome, took[k], "", True, state.modes, state.histories, use.cycle.model, *shown)
-            )
-            mode = outcome.mode.name.lower()
-            modes[mode] = modes.get(mode, 0) + 1
-        newest = tab.run("document.querySelector('#clock').textContent")
-    page.close()
-    memory.close()
-    name = f"{hours:g} simulated hours with the page open"
-    return {
-        f"{name}: cycles by mode": modes,
-        f"{name}: memory growth of the link after the first {WARM} cycles [MB]": round(grown["process"], 1),
-        f"{name}: growth of the page's scripts in the browser [MB]": round(grown["browser"], 1),
-        f"{name}: cycle with storage, median and 99 % [ms]": _quantiles(1000 * took[WARM:], (50, 99)),
-        f"{name}: last shown": newest,
-    }
 
 
 def _note(connection: Connection, published: dict[float, float]) -> None:
@@ -245,14 +181,9 @@ def _note(connection: Connection, published: dict[float, float]) -> None:
         published[round(source, 3)] = at
 
 
-def _quantiles(values: Any, percent: tuple[int, ...]) -> str:
+def quantiles(values: Any, percent: tuple[int, ...]) -> str:
+    """Percentiles in words."""
     if not len(values):
         return "none"
     *others, last = (f"{q:.1f}" for q in np.percentile(values, percent))
     return f"{', '.join(others)} and {last}"
-
-
-def _heap_mb(tab: Tab) -> float:
-    """Memory of the scripts in the browser, after what is not used was let go [MB]."""
-    tab.call("HeapProfiler.collectGarbage")
-    return float(tab.call("Runtime.getHeapUsage")["usedSize"]) / 1e6

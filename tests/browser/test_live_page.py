@@ -317,6 +317,38 @@ def test_who_may_only_look_has_no_button_that_acts(browser: Browser, shown: Show
     tab.close()
 
 
+def test_an_extended_model_in_use_is_told_and_can_be_reverted_where_its_card_is_gone(tab: Tab, shown: Shown) -> None:
+    extended = shown.last.model.with_effects((EFFECT,))
+    estimate = shown.last.outcome.estimate
+    assert estimate is not None
+    rest = np.zeros(len(extended.states) - len(estimate.state))
+    shown.show(model=extended, extended=True, estimate=replace(estimate, state=np.concatenate([estimate.state, rest])))
+    has(tab, "#found .in-use", "The model in use is extended: bubble size by air flow.")
+    seen(tab, "[...document.querySelectorAll('#found button')].some((b) => b.textContent === 'Revert' && !b.disabled)")
+    shown.show()
+    seen(tab, "!document.querySelector('#found .in-use')")
+
+
+WIDE = "[...document.querySelectorAll('.tile .value')].filter((v) => v.scrollWidth > v.clientWidth + 1)"
+"""Values at the top that run into the next one: their boxes hide nothing."""
+
+
+@pytest.mark.parametrize("width", [*WIDTHS, 1920, 1121, 641])
+def test_every_value_at_the_top_fits_its_place_and_can_be_read_from_two_metres(
+    tab: Tab, shown: Shown, width: int
+) -> None:
+    tab.look(width, 900, dark=False)
+    for mode in Mode:
+        shown.show(mode=mode, connected=mode is not Mode.OFF)
+        seen(tab, f"document.body.dataset.mode === '{mode.name.lower()}'")
+        for money in (8.25, 123.4, 54321.0):
+            tab.run(f"AdaptiveFlotHead.money({money})")
+            assert tab.run(f"{WIDE}.map((v) => v.textContent)") == [], (mode, money)
+    size = tab.run("parseFloat(getComputedStyle(document.querySelector('#tile-grade .value')).fontSize)")
+    assert width < 900 or size >= 48, "capitals 16 minutes of arc high at two metres (ISO 9241-303), at 96 dpi"
+    tab.look(1400, 900, dark=False)
+
+
 def test_it_is_whole_at_every_width_and_needs_nothing_from_elsewhere(
     browser: Browser, shown: Shown, tmp_path: Path
 ) -> None:

@@ -102,7 +102,8 @@ def test_a_later_finding_takes_neither_the_card_while_building_nor_the_way_back(
     assert bench.use.extended
     progress = bench.interval()
     assert progress.card is not None and progress.card.finding is LATER
-    assert Pictures(bench.link).of(progress)[1]["reverts"] is True
+    shown = Pictures(bench.link).of(progress)[1]
+    assert (shown["reverts"], shown["effects"]) == (True, ["bubble size by air flow"])
     assert "in use again" in bench.ask(Action.REVERT)
     assert bench.use.cycle is base and not bench.use.extended
     assert bench.run(2)[-1].mode is Mode.CLOSED

@@ -7,5 +7,6 @@ cycle.py      One cycle: check, estimate, decide, mode, limits. A function of sn
 estimation.py The estimator over gaps and restarts.
 discovery.py  Watches the innovations, searches for a cause, applies nothing.
 client.py     The OPC UA client: reads by subscription, writes and reads back, never waits without end.
+told.py       The newest value of each subscribed tag, as a snapshot.
 replay.py     A stored session once more, compared to the bit.
 """

@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Awaitable, Mapping
-from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from asyncua import Client, ua
@@ -17,11 +16,10 @@ from asyncua.crypto import security_policies
 
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.certificates import LINK, Identity, read_password
+from adaptive_flot.live.link.told import Point, Told
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.link_keys import Scale
 from adaptive_flot.live.outcome import Written
-from adaptive_flot.live.safety.modes import Mode
-from adaptive_flot.live.safety.tag_value import Quality, TagValue
 from adaptive_flot.live.snapshot import Snapshot
 
 T = TypeVar("T")
@@ -29,15 +27,6 @@ LOST = (OSError, asyncio.TimeoutError, ua.UaError, ConnectionError)
 """What a broken or hung connection raises."""
 SAME = 1e-9
 """Relative difference up to which a value that is read back is the one that was written."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """A subscribed tag: its node, and how its numbers become the model's."""
-
-    node: ua.NodeId
-    scale: Scale = field(default_factory=Scale)
-    delay_s: float = 0.0
 
 
 class PlantClient:
@@ -54,11 +43,8 @@ class PlantClient:
     def __init__(self, link: Link, within_s: float) -> None:
         self._link, self._within = link, within_s
         self._client: Client | None = None
-        self._points: dict[str, Point] = {}
+        self._told = Told(link, {})
         self._names: dict[ua.NodeId, str] = {}
-        self._told: dict[str, ua.DataValue] = {}
-        self._fresh = asyncio.Event()
-        self._beat: object = None
 
     async def connect(self) -> None:
         """Connect, log in and subscribe; one of `LOST` where it fails, LinkError where a file or a tag is missing."""
@@ -94,30 +80,15 @@ class PlantClient:
     async def new_sample(self, within_s: float) -> bool:
         """Wait for the plant's next heartbeat, so long at most [s of this machine]."""
         try:
-            await asyncio.wait_for(self._fresh.wait(), within_s)
+            await asyncio.wait_for(self._told.fresh.wait(), within_s)
         except TimeoutError:
             return False
-        self._fresh.clear()
+        self._told.fresh.clear()
         return True
 
     def snapshot(self, alive: bool, in_time: bool, written: bool) -> Snapshot:
         """What the plant has told by now."""
-        heartbeat = self._told.get("plant_heartbeat")
-        time = _time(heartbeat)
-        operator = {
-            name: (self._number(f"low {name}"), self._number(f"high {name}")) for name in self._link.file.writes
-        }
-        return Snapshot(
-            time,
-            alive and math.isfinite(time),
-            {name: tag for name in self._link.file.tags if (tag := self._tag(name)) is not None},
-            {name: tag for name in self._link.file.writes if (tag := self._tag(f"acting {name}")) is not None},
-            operator,
-            self._switch(),
-            self._good("active") is True,
-            in_time,
-            written,
-        )
+        return self._told.snapshot(alive, in_time, written)
 
     async def tell(self, heartbeat: int, asks: bool, mode: str) -> None:
         """The link's heartbeat, whether it asks for control, and its mode in words; one of `LOST` where it fails."""
@@ -154,17 +125,7 @@ class PlantClient:
     def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
         """A value has changed; called by asyncua."""
         del value
-        self._take(self._names.get(node.nodeid), data.monitored_item.Value)
-
-    def _take(self, name: str | None, told: ua.DataValue) -> None:
-        if name is None:
-            return
-        self._told[name] = told
-        if name == "plant_heartbeat":
-            beat = (told.Value.Value if told.Value is not None else None, told.SourceTimestamp)
-            if beat != self._beat and told.StatusCode is not None and told.StatusCode.is_good():
-                self._beat = beat
-                self._fresh.set()
+        self._told.take(self._names.get(node.nodeid), data.monitored_item.Value)
 
     async def _subscribe(self, client: Client) -> None:
         file = self._link.file
@@ -182,7 +143,7 @@ class PlantClient:
                     points[f"{side} {name}"] = Point(self._node(tag), scale)
         for key in ("active", "switch", "plant_heartbeat"):
             points[key] = Point(self._node(getattr(file.handshake, key)))
-        self._points = points
+        self._told = Told(self._link, points)
         self._names = {point.node: name for name, point in points.items()}
         if len(self._names) < len(points):
             raise LinkError(f"{self._link.path}: two quantities have the same tag; give each its own")
@@ -195,7 +156,7 @@ class PlantClient:
                     f"{self._link.path}: {name}: the server has no node {points[name].node}; correct the tag"
                 )
             if name != "plant_heartbeat":
-                self._told[name] = read
+                self._told.take(name, read)
         interval = 1000 * self._link.scenario.dt / self._link.file.cycle.speed
         subscription = await client.create_subscription(min(max(interval / 10, 5.0), 500.0), self)
         each = ua.DataChangeFilter(ua.DataChangeTrigger.StatusValueTimestamp, ua.DeadbandType.None_, 0.0)
@@ -232,33 +193,3 @@ class PlantClient:
         results = await self._within_time(client.uaclient.write_attributes(nodes, told, ua.AttributeIds.Value))
         for result in results:
             result.check()
-
-    def _tag(self, name: str) -> TagValue | None:
-        told = self._told.get(name)
-        if told is None or told.StatusCode is None:
-            return None
-        point, code = self._points[name], told.StatusCode
-        number = told.Value.Value if told.Value is not None else None
-        value = float(number) if isinstance(number, (int, float)) else math.nan
-        quality = Quality.GOOD if code.is_good() else Quality.UNCERTAIN if code.is_uncertain() else Quality.BAD
-        return TagValue(point.scale.model(value), quality, _time(told) - point.delay_s)
-
-    def _good(self, name: str) -> object:
-        told = self._told.get(name)
-        if told is None or told.StatusCode is None or not told.StatusCode.is_good() or told.Value is None:
-            return None
-        return told.Value.Value
-
-    def _number(self, name: str) -> float:
-        value = self._good(name)
-        return self._points[name].scale.model(float(value)) if isinstance(value, (int, float)) else math.nan
-
-    def _switch(self) -> Mode | None:
-        value = self._good("switch")
-        return Mode(value) if isinstance(value, int) and 0 <= value <= Mode.CLOSED else None
-
-
-def _time(told: ua.DataValue | None) -> float:
-    """Source time [s since 1970], NaN where there is none."""
-    stamp = None if told is None else told.SourceTimestamp
-    return math.nan if stamp is None else stamp.timestamp()

@@ -5,6 +5,7 @@ Map
 attempts.py     Failed log-ins by address: each further attempt waits longer.
 access.py       Tokens, sessions, and what a request must have before it counts.
 picture.py      What the page shows of a cycle: plain numbers and words, nothing that a script could run.
+beside.py       The card of discovery, and what runs in shadow.
 axes.py         The panels over time: which lines they have, and the numbers of a cycle for them.
 hub.py          The last hour, and the browsers that listen; one that is slow is dropped.
 application.py  What is served: the page, its stream, and the actions.

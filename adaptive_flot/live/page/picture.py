@@ -10,12 +10,12 @@ import numpy as np
 from adaptive_flot.contracts import Estimate, OperatingPoint, Plan, Sample, Status, full_parameters
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from adaptive_flot.live.link_file import TRIED, Link
-from adaptive_flot.live.page.axes import Axes, Shown, is_share, plain
-from adaptive_flot.live.running.progress import Progress, Stage
+from adaptive_flot.live.link_file import Link
+from adaptive_flot.live.page.axes import Axes, plain
+from adaptive_flot.live.page.beside import BesideTheChart
+from adaptive_flot.live.running.progress import Progress
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.safety.modes import Mode
-from adaptive_flot.live.shadow.process import ShadowView
 
 SOLVED = (Status.OK, Status.RETRIED, Status.SOFTENED)
 NO_DECISION, NO_VALUE = "no decision", "not read"
@@ -51,6 +51,7 @@ class Pictures:
 
     def __init__(self, link: Link) -> None:
         self.link, self.axes = link, Axes(link)
+        self._beside = BesideTheChart(link, self.axes)
         scenario = link.scenario
         self._names = scenario.model.names("outputs")
         measured = [name for name in link.file.tags if name in self._names]
@@ -108,9 +109,10 @@ class Pictures:
                 for a in progress.alarms.values()
             ],
             "reverts": progress.extended,
-            "card": self._card(progress),
+            "effects": self._beside.effects(progress),
+            "card": self._beside.card(progress, self._offset),
             "discovery": self._said,
-            "shadows": [self._shadow(v) for v in progress.shadows.values()],
+            "shadows": [self._beside.shadow(v) for v in progress.shadows.values()],
             "plan": self._planned(progress),
         }
         return row, now
@@ -204,67 +206,6 @@ class Pictures:
             state = NO_VALUE if check is None else check.value
             found.append({"name": name.replace("_", " "), "state": state, "age": plain(age)})
         return found
-
-    def _card(self, progress: Progress) -> dict[str, Any] | None:
-        if progress.card is None:
-            return None
-        card, finding = progress.card, progress.card.finding
-        tried = progress.shadows.get(TRIED)
-        stages = (Stage.FOUND, Stage.REVERTED, *(() if tried is not None and tried.runs else (Stage.SHADOW,)))
-        return {
-            "since": plain(self._clock(card.since), 14),
-            "word": finding.word,
-            "reason": finding.reason,
-            "evidence": list(finding.evidence),
-            "errors": [self._error(*e) for e in finding.errors],
-            "tried": [self._error(name, self._unit(name), a, b) for name, a, b in card.errors],
-            "stage": card.stage.value,
-            "by": card.by,
-            "can": bool(finding.effects),
-            "tries": bool(finding.effects) and card.stage in stages,
-        }
-
-    def _shadow(self, view: ShadowView) -> dict[str, Any]:
-        plan, newest = view.plan, view.newest
-        who = f"{plan.estimator}{f' and {plan.controller}' if plan.controller else ''}"
-        more = f", {len(plan.effects)} effect{'s' * (len(plan.effects) > 1)}" if plan.effects else ""
-        wants = []
-        if newest is not None and newest.decision is not None:
-            inputs = self.link.scenario.model.names("inputs")
-            moved = [a for a in self.axes.axes if a.kind == "input"]
-            wants = [
-                {
-                    "name": a.shown.label,
-                    "unit": a.shown.unit,
-                    "value": plain(a.shown.factor * float(newest.decision.inputs[inputs.index(a.name)]), 4),
-                }
-                for a in moved
-            ]
-        return {
-            "role": plan.role.replace("_", " "),
-            "who": who + more,
-            "status": view.status,
-            "runs": view.runs,
-            "left_out": view.left_out,
-            "rows": view.compared.rows,
-            "ms": None if newest is None else plain(1000 * newest.seconds, 3),
-            "errors": [self._error(name, self._unit(name), a, b) for name, a, b in view.compared.errors],
-            "wants": wants,
-        }
-
-    def _unit(self, output: str) -> str:
-        return self.link.scenario.model.outputs[self._names.index(output)].unit
-
-    def _error(self, name: str, unit: str, before: float, after: float) -> dict[str, Any]:
-        share = name in self._names and is_share(self.link.scenario.model.outputs[self._names.index(name)])
-        shown = Shown.of(name, unit, (before, after), share)
-        factor = shown.factor
-        return {
-            "name": shown.label,
-            "unit": shown.unit,
-            "before": plain(factor * before, 3),
-            "after": plain(factor * after, 3),
-        }
 
     def _planned(self, progress: Progress) -> dict[str, Any] | None:
         if self._plan is None or progress.outcome.sample is None:

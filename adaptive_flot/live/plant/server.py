@@ -32,10 +32,7 @@ from adaptive_flot.live.plant.tags import (
 )
 from adaptive_flot.live.plant.users import Users
 
-POLICIES = [
-    ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
-    ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
-]
+POLICIES = [ua.SecurityPolicyType[f"{name}_SignAndEncrypt"] for name in ("Aes256Sha256RsaPss", "Basic256Sha256")]
 TYPES = {"number": ua.VariantType.Int64, "flag": ua.VariantType.Boolean, "text": ua.VariantType.String}
 START = {"number": 0, "flag": False, "text": ""}
 Distort = Callable[[Tag, ua.DataValue, int], ua.DataValue | None]

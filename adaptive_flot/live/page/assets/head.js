@@ -13,6 +13,8 @@ const AdaptiveFlotHead = (() => {
     if (what) box.querySelector(".what").textContent = what;
     const shown = box.querySelector(".value");
     shown.replaceChildren(document.createTextNode(value));
+    const digits = value.length - (value.includes(".") ? 0.5 : 0); // what has no unit is one of few known words
+    shown.classList.toggle("long", Boolean(unit) && digits + (unit.length + 1) / 2 > 6);
     if (unit) shown.append(AdaptiveFlotText.element("span", "unit", ` ${unit}`));
     box.querySelector(".note").textContent = note;
   }
@@ -28,6 +30,11 @@ const AdaptiveFlotHead = (() => {
     const words = limit === undefined ? "" : `${source}${low ? "below its limit of" : "limit"} ${fixed(limit, 1)} ${g.unit}`;
     const look = seen === null ? "" : lasts ? "bad" : low ? "mild" : "good";
     tile("grade", fixed(seen, 2), g.unit, words, `${look} ${g.measured === null ? "held" : ""}`, g.label);
+  }
+
+  function money(rate) {
+    const size = Math.abs(rate ?? 0);
+    tile("money", fixed(rate, size < 100 ? 2 : size < 1000 ? 1 : 0), rate === null ? "" : "/h", "by the scenario's prices");
   }
 
   function decides(now) {
@@ -88,7 +95,7 @@ const AdaptiveFlotHead = (() => {
   function show(now) {
     grade(now);
     tile("recovery", fixed(now.head.recovery, 1), now.head.recovery === null ? "" : "%", "of the model");
-    tile("money", fixed(now.head.money, 2), now.head.money === null ? "" : "/h", "by the scenario's prices");
+    money(now.head.money);
     decides(now);
     solve(now);
     link(now);
@@ -101,6 +108,7 @@ const AdaptiveFlotHead = (() => {
       spec = told;
       drawn = "";
     },
+    money,
     show,
   };
 })();

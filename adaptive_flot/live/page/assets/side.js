@@ -46,19 +46,20 @@ const AdaptiveFlotSide = (() => {
     return [table];
   }
 
-  function card({ found, words, reverts }) {
+  function card({ found, words, reverts, effects }) {
     const said = words && !(found && words.startsWith("search ended")) ? [element("p", "soft said", `Last: ${words}`)] : [];
     const revert = () => AdaptiveFlotLive.button("Revert", () => AdaptiveFlotLive.ask("revert"), { sure: true, off: !reverts });
-    if (!found) return [element("p", "soft", "Nothing was found that the model lacks."), ...(reverts ? [revert()] : []), ...said];
-    const parts = [element("p", "stage", `${found.stage}${found.by ? ` by ${found.by}` : ""}`)];
+    const more = reverts ? [element("p", "in-use", `The model in use is extended: ${effects.join(", ")}.`)] : [];
+    if (!found) return [...(reverts ? [...more, revert()] : [element("p", "soft", "Nothing was found that the model lacks.")]), ...said];
+    const parts = [...more, element("p", "stage", `${found.stage}${found.by ? ` by ${found.by}` : ""}`)];
     parts.push(element("p", "reason", `${found.since === null ? "" : `At ${clock(found.since)}: `}${found.reason}`));
     if (found.evidence.length) {
-      const more = document.createElement("details");
-      more.append(element("summary", "", "Evidence"));
+      const evidence = document.createElement("details");
+      evidence.append(element("summary", "", "Evidence"));
       const list = element("ul", "");
       for (const words of found.evidence) list.append(element("li", "", words));
-      more.append(list);
-      parts.push(more);
+      evidence.append(list);
+      parts.push(evidence);
     }
     if (found.errors.length) parts.push(element("p", "soft", "Error on rows that chose nothing:"), ...errors(found.errors, "as it is", "extended"));
     if (found.tried.length) parts.push(element("p", "soft", "One-step error in shadow, before it was applied:"), ...errors(found.tried, "acting", "extended"));
@@ -101,7 +102,7 @@ const AdaptiveFlotSide = (() => {
   function answers(list) {
     if (!list.length) return [element("p", "soft", "Nothing yet in this session.")];
     return [...list].reverse().slice(0, 8).map((a) => {
-      const row = element("p", "answer", `${a.person}: ${a.action}`);
+      const row = element("p", "answer", `${a.at ? `${clock(Date.parse(a.at) / 1000)} ` : ""}${a.person}: ${a.action}`);
       row.append(element("span", "soft", `${a.answer}`));
       return row;
     });
@@ -109,7 +110,7 @@ const AdaptiveFlotSide = (() => {
 
   function show(now) {
     fill("alarms", now.alarms, alarms);
-    fill("found", { found: now.card, words: now.discovery, reverts: now.reverts }, card);
+    fill("found", { found: now.card, words: now.discovery, reverts: now.reverts, effects: now.effects }, card);
     fill("shadows", now.shadows, shadows);
     fill("strips", { tags: now.tags, solver: { state: now.solver.state } }, tags);
     fill("answers", now.answers, answers);
