@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -224,6 +224,7 @@ def discover(
     tag_map: AnyMap | None = None,
     processes: int | None = None,
     budget: float | None = None,
+    compiled: bool = True,
     progress: bool = False,
 ) -> Finding | Change:
     """Find what physical effect a model lacks, from a measured record; or what has changed since a reference.
@@ -245,6 +246,8 @@ def discover(
         Fits that run at once; default as many as there are cores.
     budget
         Seconds after which the search in a single record ends with what it has come to.
+    compiled
+        Whether long runs are machine code, where this system has a C compiler. The numbers agree to rounding.
     progress
         Show the stages in a terminal.
 
@@ -270,6 +273,7 @@ def discover(
     if several and budget is not None:
         raise ModelError("budget: several records are judged as a whole; leave it out")
     made, origin = read_model(model)
+    made = replace(made, record_code=compiled)
     sources = (*(file for r in (*records, *references) for file in record_files(r, tag_map)), *origin.files)
     tags = read_map(tag_map)
     with staged(progress, name) as advance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -39,6 +40,10 @@ def discover(
     budget: Annotated[
         float | None, typer.Option(min=1.0, help="Seconds after which the search ends with what it has come to.")
     ] = None,
+    compile_: Annotated[
+        bool,
+        typer.Option("--compile/--no-compile", help="Long runs as machine code, where this system has a C compiler."),
+    ] = True,
     report: Annotated[bool, typer.Option(help="Draw the report page too; a batch of records may do without.")] = True,
 ) -> None:
     """Find what physical effect a model lacks, from a measured record, and show the error before and after.
@@ -67,7 +72,7 @@ def discover(
     if several and budget is not None:
         raise ModelError("--budget: several records are judged as a whole; leave it out")
     tag_map = None if map_ is None else load_tag_map(map_)
-    made = make_model(model, cell=cell, folder=first.parent)
+    made = replace(make_model(model, cell=cell, folder=first.parent), record_code=compile_)
     workers, page = processes or available_processes(), folder / "report.html"
     name = ", ".join(path.stem for path in data)
     with stage_bar(name) as progress:

@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeVarTuple
+from typing import Any, TypeVar, TypeVarTuple
 
 import casadi as ca
 
@@ -36,6 +36,7 @@ from adaptive_flot.greybox.scope import Scope, Site
 __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
 
 Arguments = TypeVarTuple("Arguments")
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,6 +83,9 @@ class Model(Checks, Described):
         Effects attached by `with_effects`; their parameters and states follow those of the model.
     compiled
         Whether steppers and estimators turn what they call in a loop into machine code.
+    record_code
+        Whether runs of whole records that take many steps are machine code where that can be had; see
+        `stepping/whole_record`. Their numbers agree with the plain ones to rounding.
 
     Raises
     ------
@@ -107,7 +111,8 @@ class Model(Checks, Described):
     edges: tuple[str, ...] = ()
     effects: tuple[Effect, ...] = ()
     compiled: bool = False
-    _functions: FunctionCache[ca.Function] = field(default_factory=FunctionCache, init=False, repr=False, compare=False)
+    record_code: bool = False
+    _functions: FunctionCache[Any] = field(default_factory=FunctionCache, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self.check_groups()
@@ -207,13 +212,14 @@ class Model(Checks, Described):
         The directions are (dx, seeds): `seeds` (np, q) are those of the parameters, constants, most of them zero.
         """
         key = tangent, seeds.shape, tuple(seeds.sparsity().find()), tuple(seeds.nonzeros())
-        return self._functions.get(key, lambda: tangent(self._built, seeds))
+        made: ca.Function = self._functions.get(key, lambda: tangent(self._built, seeds))
+        return made
 
     def steps_in(self, dt: float) -> int:
         """Steps of the fast integration in dt [s], as many as `max_step_s` asks for."""
         return max(1, math.ceil(dt / self.max_step_s - 1e-9))
 
-    def derived(self, builder: Callable[[Model, *Arguments], ca.Function], *arguments: *Arguments) -> ca.Function:
+    def derived(self, builder: Callable[[Model, *Arguments], Made], *arguments: *Arguments) -> Made:
         """Return `builder(model, *arguments)`, made once for this model and those of other parameter values.
 
         Parameters
@@ -223,7 +229,8 @@ class Model(Checks, Described):
         arguments
             Its further arguments, hashable. Builder and arguments together are the key.
         """
-        return self._functions.get((builder, arguments), lambda: builder(self, *arguments))
+        made: Made = self._functions.get((builder, arguments), lambda: builder(self, *arguments))
+        return made
 
     @property
     def decay(self) -> ca.Function:

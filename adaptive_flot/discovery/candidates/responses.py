@@ -10,18 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.nodes import IntArray, NodeStepper, substeps
-from adaptive_flot.greybox.stepping.rows import over_rows
+from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
-ROWS_AT_ONCE = 500
 FILLED_AT_ONCE = 64
 """Rows of responses that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
 LEAST_VALUE = 1e-6
@@ -78,25 +77,9 @@ class Responses:
         self.nuisance = self._nuisance()
 
     def _jacobians(self, stepper: Stepper, names: tuple[str, ...], p: FloatArray) -> None:
-        function = stepper.one_step_jacobians(names)
-        nx, q, ny = len(self.fit.initial_state), len(names), len(stepper.model.outputs)
         time = self.problem.record.time if self._nodes is None else self._nodes.times
         n = len(self._steps)
-        self._A, self._G = np.empty((n, nx, nx)), np.empty((n, nx, q))
-        self._C, self._H = np.empty((n, ny, nx)), np.empty((n, ny, q))
-        mapped: dict[int, ca.Function] = {}
-        for start in range(0, n, ROWS_AT_ONCE):
-            rows = slice(start, min(start + ROWS_AT_ONCE, n))
-            count = rows.stop - rows.start
-            call = mapped.setdefault(count, over_rows(function, count))
-            blocks = call(self._at[rows].T, time[rows], self._steps[rows].T, p)
-            for target, value, height, width in (
-                (self._A, blocks[2], nx, nx),
-                (self._G, blocks[3], nx, q),
-                (self._C, blocks[4], ny, nx),
-                (self._H, blocks[5], ny, q),
-            ):
-                target[rows] = np.array(value).reshape(height, count, width).transpose(1, 0, 2)
+        self._A, self._G, self._C, self._H = row_jacobians(stepper, self._at[:n], time[:n], self._steps, p, names)
         columns = list(self.problem.columns)
         self._C, self._H = self._C[:, columns], self._H[:, columns]
         # what moves no state acts at once: such responses are worked out at all rows, between the nodes too
@@ -172,14 +155,16 @@ class Responses:
         at_once, slow = np.flatnonzero(self._at_once[where]), np.flatnonzero(~self._at_once[where])
         # those that move a state, then those that only start somewhere: a block is quicker than picked columns
         moving = np.concatenate([slow, np.arange(len(where), r)])
-        pushed, source_of = slice(0, len(slow)), where[slow]
+        source_of = where[slow]
         by_step = (profiles[1:] if self._nodes is None else self._nodes.means(profiles))[:, slow]
-        S, out = S[:, moving], np.empty((len(self._steps) + 1, m, len(moving)))
-        for i in range(len(self._steps)):
-            np.matmul(self._C[i], S, out=out[i + 1])  # outputs at the end of the interval, by the state at its start
-            out[i + 1][:, pushed] += self._H[i][:, source_of] * by_step[i]
-            S = self._A[i] @ S
-            S[:, pushed] += self._G[i][:, source_of] * by_step[i]
+        out = np.empty((len(self._steps) + 1, m, len(moving)))
+        out[1:] = linear_run(
+            (self._A, self._G, self._C, self._H),
+            S[:, moving],
+            source_of,
+            by_step,
+            as_machine_code=self.fit.model.record_code,
+        )
         out[0] = out[1]
         kept = np.arange(len(profiles)) if rows is None else np.flatnonzero(rows)
         responses = np.empty((len(kept), m, r))

@@ -12,5 +12,8 @@ fastcall.py   Calls of a compiled function without copies.
 recursion.py  Many intervals in one call.
 nodes.py      A densely sampled record in longer intervals.
 rows.py       Rows of a record in blocks.
+row_jacobians.py Jacobians of the step in every row of a run.
+linear_run.py Responses of a linearised run to many profiles at once.
+whole_record/ A whole record in one call of machine code, with derivatives.
 record.py     Free runs over a record.
 """

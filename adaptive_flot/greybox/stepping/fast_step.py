@@ -135,22 +135,30 @@ def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
     """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
     n, q = decay.along.shape
     z, step = ca.SX.sym("z", n), ca.SX.sym("h")
-    phi1, phi2, phi3, phi1_half = (_series if isinstance(h, float) else closed_phi)(z)
-    weights = [
-        z / 2 * phi1_half + 1,
-        step / 2 * phi1_half,
-        z * phi1 + 1,
-        step * (phi1 - 3 * phi2 + 4 * phi3),
-        2 * step * (phi2 - 2 * phi3),
-        step * (4 * phi3 - phi2),
-    ]
-    values = ca.Function("weights", [z, step], weights)(h * decay.value, h)
+    factors = weights(z, step, series=isinstance(h, float))
+    values = ca.Function("weights", [z, step], factors)(h * decay.value, h)
     if not q:
         return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
     # each weight depends on its own decay rate only: one derivative serves all directions
-    slopes = ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in weights])
+    slopes = ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in factors])
     moved = [_scaled(d * h, decay.along) for d in slopes(h * decay.value, h)]
     return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
+
+
+def weights(z: ca.SX, h: ca.SX, *, series: bool) -> list[ca.SX]:
+    """Factors of state and slopes in the method for z = decay h: half, half_slope, whole, first, middle, last.
+
+    By the series near zero alone, or for any z <= 0.
+    """
+    phi1, phi2, phi3, phi1_half = (_series if series else closed_phi)(z)
+    return [
+        z / 2 * phi1_half + 1,
+        h / 2 * phi1_half,
+        z * phi1 + 1,
+        h * (phi1 - 3 * phi2 + 4 * phi3),
+        2 * h * (phi2 - 2 * phi3),
+        h * (4 * phi3 - phi2),
+    ]
 
 
 def _series(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

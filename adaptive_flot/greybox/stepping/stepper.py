@@ -26,12 +26,17 @@ from adaptive_flot.greybox.stepping import step_functions
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
+from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord, whole_record
 
 MOST_UNROLLED = 4
 """Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
 ten of them, with derivatives, takes longer to make than a record takes to simulate."""
 CHUNK = 64
 """Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""
+
+
+LEAST_STEPS = 2500
+"""Steps from which a run is worth the compiler's time, where the model asks for it."""
 
 
 class Stepper:
@@ -117,6 +122,10 @@ class Stepper:
         x = self._initial(x0)
         if self.accurate:
             return self._simulate_by_rows(x, u, p, t)
+        quick = self.record_code(len(u), None)
+        if quick is not None:
+            found = quick(x, u, p, t0)
+            return Trajectory(t + self.dt, found.states, found.outputs, found.signals)
         if self._single is not None:
             one_by_one = p if p.ndim == 1 else np.repeat(p, self.substeps, axis=0)
             run = self._single.simulate(x, np.repeat(u, self.substeps, axis=0), one_by_one, t0)
@@ -160,6 +169,11 @@ class Stepper:
         u, p, t = self._tables(inputs, parameters, t0)
         if p.ndim != 1:
             raise ModelError("sensitivities need one parameter vector for the whole record, got one a row")
+        quick = self.record_code(len(u), tuple(wrt))
+        if quick is not None:
+            start = np.asarray(x0_gradient, dtype=float).reshape(len(self._initial(x0)), -1)
+            found = quick(self._initial(x0), u, p, t0, start)
+            return Sensitivities(found.outputs, found.gradients, found.last_state, found.last_gradient)
         if self._single is not None:
             every = np.repeat(u, self.substeps, axis=0)
             all_steps = self._single.simulate_sensitivities(x0, every, p, wrt, x0_gradient, t0)
@@ -178,6 +192,12 @@ class Stepper:
             ys.append(y.T[:count])
             dys.append(dy.reshape(len(y), len(rows), q).transpose(1, 0, 2)[:count])
         return Sensitivities(np.vstack(ys), np.concatenate(dys), x, gradient)
+
+    def record_code(self, rows: int, wrt: tuple[str, ...] | None) -> WholeRecord | None:
+        """Machine code for a run of so many intervals, where the model asks for it and it is worth it."""
+        if not self.model.record_code or self.accurate or rows * self.substeps < LEAST_STEPS:
+            return None
+        return self.model.derived(whole_record, self.interval, wrt)
 
     def sensitivity_step(self, wrt: Sequence[str], unknowns: int | None = None) -> ca.Function:
         """The step with the sensitivity of the state carried along, exact for the map.
