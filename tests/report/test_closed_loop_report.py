@@ -100,7 +100,7 @@ def test_disturbances_are_shown_with_what_is_known_of_them(result: Result) -> No
     label = "feed_concentration.chalcopyrite"
     table = run.table.copy()
     table["feed_flow_m3_s_true"], table[f"{label}_true"], table[f"{label}_known"] = feed, 10.6, 10.5
-    panels = closed_loop.operation_panels(series.cases([(scenario, [replace(run, table=table)])])[0])
+    panels = closed_loop.operation_panels(series.cases([(scenario, [replace(run, columns=dict(table))])])[0])
     shown = {p.label: [t.label for t in p.traces] for p in panels}
     assert shown["feed flow"] == ["truth", "measured"]
     assert shown["feed concentration chalcopyrite"] == ["truth", "measured"]
@@ -147,6 +147,6 @@ def test_each_fault_has_a_strip_of_when_it_acted(result: Result) -> None:
         faults=["stuck air_flow; nan_state" if 350 < t <= 360 else "" for t in run.table["time_s"]]
     )
     table.loc[table["time_s"] > 400, "faults"] = "nan_state"
-    found = {s.label: s for s in closed_loop.strips(series.cases([(scenario, [replace(run, table=table)])])[0])}
+    found = {s.label: s for s in closed_loop.strips(series.cases([(scenario, [replace(run, columns=dict(table))])])[0])}
     assert found["stuck air flow"].spells()[1:] == [("fault", 350.0, 360.0), ("no fault", 360.0, 420.0)]
     assert [state for state, *_ in found["nan state"].spells()] == ["no fault", "fault", "no fault", "fault"]

@@ -159,7 +159,7 @@ def test_roles_and_swings(result: Result) -> None:
     table = run.table.copy()
     table["n_std"] = 0.01
     table["n_estimate"] = 1 + 0.02 * (np.arange(len(table)) % 2)
-    assert swing_share(case, replace(run, table=table), "n") == 1.0
+    assert swing_share(case, replace(run, columns=dict(table)), "n") == 1.0
     assert swing_share(case, case.first["fixed"], "n") == 0.0
 
 
@@ -174,8 +174,7 @@ def test_closed_loop_shows_each_time_series(result: Result) -> None:
     scenario, runs = result
     column = scenario.model.inputs[0].column
     moved = [
-        replace(r, table=r.table.assign(**{column: 1.1 * r.table[column]})) if r.estimator == "rpem" else r
-        for r in runs
+        replace(r, columns={**r.columns, column: 1.1 * r.table[column]}) if r.estimator == "rpem" else r for r in runs
     ]
     panels, still = series.input_panels(series.cases([(scenario, moved)])[0])
     assert [t.label for t in panels[0].traces] == ["input (fixed)", "input (rpem)"]
