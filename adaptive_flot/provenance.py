@@ -18,6 +18,7 @@ HASH_DIGITS = 16
 _ROOT = Path(__file__).parents[1]
 
 
+@cache
 def package_version() -> str:
     """Version of this package."""
     try:

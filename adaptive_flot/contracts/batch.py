@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 import numpy as np
 
@@ -157,3 +157,17 @@ class BatchEstimator(Protocol):
     def fit(self, record: Dataset) -> BatchFit:
         """Fit a record."""
         ...
+
+
+class FitsMany(BatchEstimator, Protocol):
+    """A batch estimator that fits many records at once."""
+
+    def fit_many(self, records: Sequence[Dataset]) -> list[BatchFit | Exception]:
+        """What `fit` gives for each record, or what went wrong with one; it does not depend on the other records."""
+        ...
+
+
+def fits_many(estimator: BatchEstimator) -> TypeGuard[FitsMany]:
+    """Whether `fit_many` is what `fit` gives: not where a derived class has its own `fit`."""
+    first = {name: next((c for c in type(estimator).__mro__ if name in vars(c)), None) for name in ("fit", "fit_many")}
+    return first["fit_many"] is not None and first["fit"] is first["fit_many"]

@@ -113,11 +113,11 @@ def steady_state_gradient(
     columns = model.indices("parameters", wrt)
     scale = np.array([q.scale for q in model.states])
     scaled = by_state * scale[None, :] / scale[:, None]
-    moved = _solved(scaled, by_parameters[:, columns] / scale[:, None])
+    moved = solve_for_slope(scaled, by_parameters[:, columns] / scale[:, None])
     return cast(FloatArray, -moved * scale[:, None])
 
 
-def _solved(slope: FloatArray, by_parameters: FloatArray) -> FloatArray:
+def solve_for_slope(slope: FloatArray, by_parameters: FloatArray) -> FloatArray:
     """Solve slope @ moved = by_parameters; where a valve within its band leaves a state free, that state stays.
 
     Should the others then have no solution (a stuck valve within a control loop), the smallest move is taken.

@@ -31,8 +31,8 @@ LOST = (asyncio.CancelledError, concurrent.futures.CancelledError, OSError, Time
 """What a lost scheduler looks like from here."""
 AHEAD = 4
 """Runs handed to the cluster for each of its threads, so that none waits for the next one."""
-MOST_TOGETHER = 16
-"""Most seeds that go side by side: two blocks of eight lanes, and what an interruption loses."""
+MOST_TOGETHER = 64
+"""Most seeds that go side by side, and what an interruption loses: a second or two of work."""
 
 Rows = Sequence[Mapping[str, Any]]
 AnyFuture = Future[Any]

@@ -6,8 +6,9 @@ Identification*, 1999, chapter 7; Gauss-Newton in a trust region with bounds, `s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -18,6 +19,7 @@ from adaptive_flot.errors import DataError, ModelError, near_match
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from estimators.pem.free_runs import FreeRuns, InitialState
+from estimators.pem.in_step import SearchesInStep, can_go_in_step
 from estimators.pem.problem import Problem, Search
 from estimators.pem.starts import scattered
 
@@ -85,7 +87,36 @@ class Pem:
         DataError
             Fewer measurements than unknowns, or no initial state in the record where it should be given.
         """
-        problem = self._runs.problem(record)
+        return self._fit(record, self._runs.problem(record), None)
+
+    @np.errstate(all="ignore")
+    def fit_many(self, records: Sequence[Dataset]) -> list[BatchFit | Exception]:
+        """Fit several records, each as `fit` does (to 1e-9), or what went wrong with one.
+
+        Records with the same times are searched in step where the model is machine code: a record is a lane. A fit does
+        not depend, to the bit, on the other records.
+        """
+        if not records or not can_go_in_step(self._runs, records):
+            return [_outcome(lambda record=record: self.fit(record)) for record in records]  # type: ignore[misc]
+        made = self._in_step.problems(records)
+        pairs = [(r, p) for r, p in zip(records, made, strict=True) if isinstance(p, Problem)]
+        searches = iter(self._in_step.search([r for r, _ in pairs], [p for _, p in pairs]) if pairs else [])
+        fits = list[BatchFit | Exception]()
+        for record, problem in zip(records, made, strict=True):
+            if isinstance(problem, Problem):
+                search = next(searches)
+                fits.append(_outcome(lambda r=record, p=problem, s=search: self._fit(r, p, s)))  # type: ignore[misc]
+            else:
+                fits.append(problem)
+        return fits
+
+    @cached_property
+    def _in_step(self) -> SearchesInStep:
+        # made when first asked for: compiling it takes seconds
+        return SearchesInStep(self._runs)
+
+    def _fit(self, record: Dataset, problem: Problem, first: Search | None) -> BatchFit:
+        """The fit of a record; `first` is the search from the model's own values where that is done already."""
         measured = record.outputs[:, self._runs.columns]
         present = np.isfinite(measured)
         if present.sum() <= len(problem.centre):
@@ -93,7 +124,7 @@ class Pem:
                 f"{record.name}: {int(present.sum())} measurements of {', '.join(self.setup.outputs)} for "
                 f"{len(problem.centre)} unknowns; give a longer record or fit fewer parameters"
             )
-        first = self._runs.search(record, problem, np.zeros(len(problem.centre)))
+        first = first or self._runs.search(record, problem, np.zeros(len(problem.centre)))
         searches = [first, *self._further(record, problem, first)]
         evaluations = sum(s.evaluations for s in searches)
         best = min(searches, key=lambda s: s.criterion)
@@ -167,7 +198,7 @@ class Pem:
             noise_std=noise,
             parameters=p,
             initial_state=x0,
-            last_state=self._runs.simulator.last_state(record, x0, p),
+            last_state=self._runs.last_state(record, problem, unknowns),
             evaluations=evaluations,
             status=Status.PROJECTED if at_bound.any() else Status.OK,
             identifiability=Identifiability.judge(
@@ -196,6 +227,13 @@ class Pem:
                 "the model can not simulate the record from its first guess",
             ),
         )
+
+
+def _outcome(fit: Callable[[], BatchFit]) -> BatchFit | Exception:
+    try:
+        return fit()
+    except Exception as error:
+        return error
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:

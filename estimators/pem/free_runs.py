@@ -46,7 +46,9 @@ class FreeRuns:
         quick = OneMember.where_compiled(setup.model, setup.dt)
         self.simulator = RecordSimulator(setup.model, setup.dt, stepper=quick)
         names = setup.model.names("states") if free is None else free
-        self._free = setup.model.indices("states", names) if initial_state == "estimated" else []
+        self.free = setup.model.indices("states", names) if initial_state == "estimated" else []
+        self.starts_steady = initial_state == "steady" or (initial_state == "estimated" and setup.model.starts_steady)
+        self.least_noise = 1e-12 * np.array([setup.model.outputs[c].scale for c in self.columns])
 
     def search(self, record: Dataset, problem: Problem, start: FloatArray, most: int | None = None) -> Search:
         """The search from one start (unknowns,), weighted anew until the noise levels stand still."""
@@ -75,8 +77,8 @@ class FreeRuns:
         quiet = 1.4826 * np.nanmedian(np.abs(np.diff(errors, axis=0)), axis=0) / np.sqrt(2)
         return bool(np.all(self._noise(errors) < AT_NOISE * quiet))
 
-    def problem(self, record: Dataset) -> Problem:
-        """Centre, scale and range of what is unknown of a record.
+    def problem(self, record: Dataset, steady: FloatArray | None = None) -> Problem:
+        """Centre, scale and range of what is unknown of a record, whose steady start (nx,) may be known.
 
         Raises
         ------
@@ -85,14 +87,14 @@ class FreeRuns:
         """
         model = self.setup.model
         parameters = [model.parameters[i] for i in model.indices("parameters", self.setup.parameters)]
-        states = [model.states[i] for i in self._free]
+        states = [model.states[i] for i in self.free]
         if self.initial_state == "given":
             if record.initial_state is None:
                 raise DataError(f"{record.name}: the first row does not hold all states; use initial_state: estimated")
             start = record.initial_state
         else:
-            start = self._start(record)
-        centre = np.array([p.value for p in parameters] + [start[i] for i in self._free])
+            start = self._start(record) if steady is None else steady
+        centre = np.array([p.value for p in parameters] + [start[i] for i in self.free])
         scale = np.array([p.scale for p in parameters] + [q.scale for q in states])
         prior = np.array([p.prior_std or np.inf for p in parameters] + [q.scale for q in states]) / scale
         lower = (np.array([p.lower for p in parameters] + [q.lower for q in states]) - centre) / scale
@@ -102,7 +104,7 @@ class FreeRuns:
     def _start(self, record: Dataset) -> FloatArray:
         model = self.setup.model
         guess = np.array([model.initial_guess.get(q.name, q.scale) for q in model.states])
-        if self.initial_state == "estimated" and not model.starts_steady:
+        if not self.starts_steady:
             return guess
         return steady_state(model, record.inputs[0], time=float(record.time[0])).state
 
@@ -117,7 +119,7 @@ class FreeRuns:
         if self.initial_state == "steady":
             return p, self._steady(record, p, problem.steady)
         x0 = problem.steady.copy()
-        x0[self._free] = values[q:]
+        x0[self.free] = values[q:]
         return p, x0
 
     def rows(
@@ -129,9 +131,8 @@ class FreeRuns:
 
     def _noise(self, errors: FloatArray) -> FloatArray:
         """Root mean square of each output's error (m,), kept off zero."""
-        scale = np.array([self.setup.model.outputs[c].scale for c in self.columns])
         rms = np.array([np.sqrt(np.nanmean(e**2)) for e in errors.T])
-        return cast(FloatArray, np.maximum(rms, 1e-12 * scale))
+        return cast(FloatArray, np.maximum(rms, self.least_noise))
 
     def errors(self, record: Dataset, problem: Problem, unknowns: FloatArray, measured: FloatArray) -> FloatArray:
         """Measured (N, m) less the free run from some unknowns; NaN where the model has no such run."""
@@ -149,6 +150,11 @@ class FreeRuns:
         """Parameter vector (np,) and initial state (nx,) of some unknowns."""
         return problem.once("start", unknowns, lambda: self._unpack(record, problem, unknowns))
 
+    def last_state(self, record: Dataset, problem: Problem, unknowns: FloatArray) -> FloatArray:
+        """State (nx,) at the last row of the free run from some unknowns."""
+        p, x0 = self.start_of(record, problem, unknowns)
+        return problem.once("last state", unknowns, lambda: self.simulator.last_state(record, x0, p))
+
     def _jacobian(self, record: Dataset, problem: Problem, unknowns: FloatArray) -> FloatArray:
         """d(prediction)/d(unknowns) (N, m, q + free)."""
         return self.gradients(record, problem, unknowns)[0]
@@ -165,7 +171,7 @@ class FreeRuns:
             x0_gradient[:, :q] = steady_state_gradient(
                 self.setup.model, x0, record.inputs[0], p, names, float(record.time[0])
             )
-        x0_gradient[self._free, q + np.arange(len(self._free))] = 1.0
+        x0_gradient[self.free, q + np.arange(len(self.free))] = 1.0
         _, gradient, last = self.simulator.sensitivities(record, x0, p, names, x0_gradient)
         return gradient[:, self.columns, :] * problem.scale, last * problem.scale
 

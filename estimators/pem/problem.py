@@ -47,11 +47,14 @@ class Problem:
         """Evaluate once for the same unknowns: each search starts, and is judged, where the one before ended."""
         key = (what, unknowns.tobytes())
         if key not in self.seen:
-            value = evaluate()
-            if len(self.seen) == KEPT_EVALUATIONS:
-                del self.seen[next(iter(self.seen))]
-            self.seen[key] = value
+            self.remember(what, unknowns, evaluate())
         return cast(_T, self.seen[key])
+
+    def remember(self, what: str, unknowns: FloatArray, value: object) -> None:
+        """Keep what was evaluated elsewhere, in the place of what was kept for longest."""
+        if len(self.seen) == KEPT_EVALUATIONS:
+            del self.seen[next(iter(self.seen))]
+        self.seen[what, unknowns.tobytes()] = value
 
 
 @dataclass(frozen=True)

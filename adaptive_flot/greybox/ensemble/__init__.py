@@ -8,4 +8,5 @@ lane_library.py      The machine code, called on blocks of members.
 lanes.py             A function for many members over many rows; by CasADi's `map` where nothing can be compiled.
 one_member.py        A single record in one call.
 ensemble.py          Simulation of the members of a model, with or without sensitivities.
+steady_states.py     Steady states of the members of a model.
 """

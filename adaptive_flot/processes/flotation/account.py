@@ -18,7 +18,7 @@ def account(table: pd.DataFrame, model: Model, dt: float, prices: Prices, grade_
     Parameters
     ----------
     table
-        Time series of a run (see `time_series`), the rows to account for.
+        Time series of a run (see `TimeSeries.table`), the rows to account for.
     model
         The nominal model: feed concentration of the valuable mineral [kg/m3], where the table does not hold its own.
     dt

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -19,7 +19,7 @@ from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.results.accounts import control_account
 from adaptive_flot.runner.results.plans import plan_table
 from adaptive_flot.runner.results.run_arrays import RunArrays
-from adaptive_flot.runner.results.timeseries import fits, status_names, time_series
+from adaptive_flot.runner.results.timeseries import TimeSeries
 from adaptive_flot.runner.scenario.realisation import Realisation
 
 
@@ -31,8 +31,8 @@ class Run(Described):
     ----------
     estimator, controller, seed
         What ran.
-    columns
-        Time series, one entry an interval, by the name of the column; see `time_series`.
+    series
+        Time series.
     fit
         Fit in percent of each adapted parameter (by label) and driving output, over t > `fits_after_s`.
     status_counts
@@ -56,7 +56,7 @@ class Run(Described):
     estimator: str
     controller: str
     seed: int
-    columns: Mapping[str, Any]
+    series: TimeSeries
     fit: dict[str, float]
     status_counts: dict[str, int]
     initial: BatchFit
@@ -70,13 +70,13 @@ class Run(Described):
     @cached_property
     def table(self) -> pd.DataFrame:
         """Time series as a table; made when first asked for, since a study of many runs needs none."""
-        return pd.DataFrame(self.columns)
+        return self.series.table()
 
     def described(self) -> dict[str, object]:
         """What ran and how well it fits; see `Described`."""
         quality = {f"fit of {name}": f"{value:.2f} %" for name, value in self.fit.items()}
         who = {"estimator": self.estimator, "controller": self.controller, "seed": self.seed}
-        return {**who, "intervals": len(self.columns["time_s"]), **quality}
+        return {**who, "intervals": len(self.series.run.time), **quality}
 
     @classmethod
     def of(
@@ -91,11 +91,11 @@ class Run(Described):
     ) -> Run:
         """The run that left these arrays, of an estimator that was built for `setup`; its time is yet to be told."""
         scenario = realisation.scenario
-        columns = time_series(scenario, arrays, setup)
+        series = TimeSeries(scenario, arrays, setup)
         earned: dict[str, float] = {}
         control: dict[str, Any] = {}
         if scenario.prices is not None and scenario.limits is not None:
-            table = pd.DataFrame(columns)
+            table = series.table()
             accounted = table[table["time_s"] > scenario.fits_after + 1e-9]
             least = scenario.limits.outputs["concentrate_grade"][0]
             earned = account(accounted, scenario.plant_model, scenario.dt, scenario.prices, least)
@@ -104,9 +104,9 @@ class Run(Described):
             estimator,
             controller,
             realisation.seed,
-            columns,
-            fits(scenario, columns),
-            dict(Counter(status_names(arrays.statuses))),
+            series,
+            series.fits(),
+            series.status_counts(),
             initial,
             account=earned,
             control=control,

@@ -12,6 +12,7 @@ from adaptive_flot.contracts.delayed_measurements import taking_delayed_values
 from adaptive_flot.described import Described
 from adaptive_flot.errors import ScenarioError, near_match
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
+from adaptive_flot.greybox.ensemble.steady_states import SteadyStates
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.realisation import Realisation
@@ -95,6 +96,11 @@ class Prepared(Described):
     def plants(self) -> Ensemble:
         """The simulated plants of many runs side by side."""
         return Ensemble(self.scenario.plant_model, self.scenario.dt)
+
+    @cached_property
+    def steady_plants(self) -> SteadyStates:
+        """Their steady states."""
+        return SteadyStates(self.scenario.plant_model)
 
     @cached_property
     def batch(self) -> BatchEstimator:

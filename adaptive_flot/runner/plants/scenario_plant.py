@@ -30,7 +30,11 @@ def make_plant(realisation: Realisation, model: Model | None = None) -> Simulate
 
 def initial_state(scenario: Scenario, model: Model, inputs: FloatArray, parameters: FloatArray) -> FloatArray:
     """State (nx,) of a model in which a run starts: steady at its first inputs (nu,) but for `initial_state`."""
-    x0 = steady_state(model, inputs, parameters).state
+    return with_given_states(scenario, model, steady_state(model, inputs, parameters).state)
+
+
+def with_given_states(scenario: Scenario, model: Model, x0: FloatArray) -> FloatArray:
+    """A steady state (nx,) with the states that the scenario gives."""
     columns = [q.column for q in model.states]
     for column, value in scenario.file.initial_state.items():
         if column in columns:

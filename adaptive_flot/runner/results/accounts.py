@@ -14,7 +14,7 @@ def control_account(table: pd.DataFrame) -> dict[str, Any]:
     Parameters
     ----------
     table
-        Time series of a run (see `time_series`), the rows to account for.
+        Time series of a run (see `TimeSeries.table`), the rows to account for.
 
     Returns
     -------

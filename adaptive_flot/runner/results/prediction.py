@@ -23,7 +23,7 @@ def one_move_errors(table: pd.DataFrame, plans: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     table, plans
-        Of one run; see `time_series` and `plan_table`.
+        Of one run; see `TimeSeries.table` and `plan_table`.
 
     Returns
     -------

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from adaptive_flot import metrics
 from adaptive_flot.contracts import Setup, Status
@@ -20,43 +23,75 @@ _NAMES = {id(status): status.name.lower() for status in Status}
 """Names in the tables by the identity of each status: its own hash and name cost a call for every row."""
 
 
-def time_series(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, Any]:
-    """Columns of the table of a run whose estimator was built for `setup`: `time_s`, inputs, and more with suffixes.
+@dataclass(frozen=True)
+class TimeSeries:
+    """What is shown of a run, and measured by: its arrays with the names that they have in tables.
 
-    Suffixes, by kind of quantity:
-
-    - inputs: `_true` where what acted is not what was known;
-    - outputs: `_true`, `_measured`, `_predicted`, `_innovation`, `_innovation_std`;
-    - adapted parameters: `_true`, `_estimate`, `_std`, and for each pair of them `_correlation` (as
-      `n_C_correlation`), as the estimator claims them;
-    - other parameters that move or are measured: `_true`, `_known`; NaN where the plant, or the estimator's model, has
-      no such parameter.
-
-    Then follow `status` of the estimator, `control_status` and `decided_by`. `faults` are there where a scenario has
-    any. `control_message` says which constraints were in the way where an optimisation failed, and which limits were
-    given up where no plan keeps all. `softened_<name>` is how far the plan goes beyond that limit, in the unit of the
-    output, state or input; NaN where it is kept. `solve_seconds` is how long the optimisation took.
+    Attributes
+    ----------
+    scenario
+        The scenario.
+    run
+        What the run left behind.
+    setup
+        What its estimator was built for.
     """
-    columns: dict[str, Any] = {"time_s": run.time}
-    columns |= _inputs(scenario, run) | _outputs(scenario, run) | _adapted(scenario, run, setup)
-    columns |= _others(scenario, run, setup)
-    columns["status"] = status_names(run.statuses)
-    columns["control_status"] = status_names(run.control_statuses)
-    columns["decided_by"] = list(run.decided_by)
-    if scenario.file.faults:
-        columns["faults"] = ["; ".join(names) for names in run.faults]
-    if any(run.messages):
-        columns["control_message"] = list(run.messages)
-    for name in dict.fromkeys(name for softened in run.softened for name in softened):
-        columns[f"{SOFTENED}{name}"] = [softened.get(name, np.nan) for softened in run.softened]
-    if np.isfinite(run.solve_seconds).any():
-        columns["solve_seconds"] = run.solve_seconds
-    return columns
 
+    scenario: Scenario
+    run: RunArrays
+    setup: Setup
 
-def status_names(statuses: Sequence[Status]) -> list[str]:
-    """Names of statuses as tables have them."""
-    return [_NAMES[id(status)] for status in statuses]
+    def table(self) -> pd.DataFrame:
+        """One row an interval: `time_s`, inputs, and columns with suffixes.
+
+        Suffixes, by kind of quantity:
+
+        - inputs: `_true` where what acted is not what was known;
+        - outputs: `_true`, `_measured`, `_predicted`, `_innovation`, `_innovation_std`;
+        - adapted parameters: `_true`, `_estimate`, `_std`, and for each pair of them `_correlation` (as
+          `n_C_correlation`), as the estimator claims them;
+        - other parameters that move or are measured: `_true`, `_known`; NaN where the plant, or the estimator's model,
+          has no such parameter.
+
+        Then follow `status` of the estimator, `control_status` and `decided_by`. `faults` are there where a scenario
+        has any. `control_message` says which constraints were in the way where an optimisation failed, and which limits
+        were given up where no plan keeps all. `softened_<name>` is how far the plan goes beyond that limit, in the unit
+        of the output, state or input; NaN where it is kept. `solve_seconds` is how long the optimisation took.
+        """
+        scenario, run = self.scenario, self.run
+        columns: dict[str, Any] = {"time_s": run.time}
+        columns |= _inputs(scenario, run) | _outputs(scenario, run) | _adapted(scenario, run, self.setup)
+        columns |= _others(scenario, run, self.setup)
+        columns["status"] = [_NAMES[id(status)] for status in run.statuses]
+        columns["control_status"] = [_NAMES[id(status)] for status in run.control_statuses]
+        columns["decided_by"] = list(run.decided_by)
+        if scenario.file.faults:
+            columns["faults"] = ["; ".join(names) for names in run.faults]
+        if any(run.messages):
+            columns["control_message"] = list(run.messages)
+        for name in dict.fromkeys(name for softened in run.softened for name in softened):
+            columns[f"{SOFTENED}{name}"] = [softened.get(name, np.nan) for softened in run.softened]
+        if np.isfinite(run.solve_seconds).any():
+            columns["solve_seconds"] = run.solve_seconds
+        return pd.DataFrame(columns)
+
+    def fits(self) -> dict[str, float]:
+        """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
+        scenario, run, model = self.scenario, self.run, self.scenario.model
+        accounted = run.time > scenario.fits_after + 1e-9
+        quality = {}
+        for name in scenario.setup.parameters:
+            label = model.parameters[model.index("parameters", name)].label
+            true = _column(run.parameters, scenario.plant_model.names("parameters"), name)
+            found = _column(run.estimates, self.setup.parameters, name)
+            quality[label] = metrics.fit(true[accounted], found[accounted])
+        for name, j in zip(scenario.setup.outputs, model.indices("outputs", scenario.setup.outputs), strict=True):
+            quality[name] = metrics.fit(run.true[accounted, j], run.prediction[accounted, j])
+        return quality
+
+    def status_counts(self) -> dict[str, int]:
+        """How often the estimator returned which status."""
+        return {_NAMES[key]: count for key, count in Counter(map(id, self.run.statuses)).items()}
 
 
 def _inputs(scenario: Scenario, run: RunArrays) -> dict[str, Any]:
@@ -128,17 +163,3 @@ def _others(scenario: Scenario, run: RunArrays, setup: Setup) -> dict[str, Any]:
         if p in measured:
             columns[f"{p.label}_known"] = _column(known, model.names("parameters"), p.name)
     return columns
-
-
-def fits(scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, float]:
-    """Fits as the paper defines them: adapted parameters, then driving outputs, over t > `fits_after_s`."""
-    accounted = np.asarray(columns["time_s"]) > scenario.fits_after + 1e-9
-    model, setup = scenario.model, scenario.setup
-    labels = [model.parameters[i].label for i in model.indices("parameters", setup.parameters)]
-    pairs = {label: (f"{label}_true", f"{label}_estimate") for label in labels}
-    for i in model.indices("outputs", setup.outputs):
-        q = model.outputs[i]
-        pairs[q.name] = (f"{q.column}_true", f"{q.column}_predicted")
-    return {
-        name: metrics.fit(columns[true][accounted], columns[found][accounted]) for name, (true, found) in pairs.items()
-    }

@@ -12,9 +12,10 @@ from adaptive_flot.contracts import AnyController, Decision, DecisionTable, Setu
 from adaptive_flot.contracts.controller import decides_all
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
+from adaptive_flot.greybox.ensemble.steady_states import SteadyStates
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.loop.returned import checked_decision, checked_decisions
-from adaptive_flot.runner.plants.scenario_plant import initial_state
+from adaptive_flot.runner.plants.scenario_plant import initial_state, with_given_states
 from adaptive_flot.runner.plants.true_outputs import TrueOutputs
 from adaptive_flot.runner.results.run_arrays import RunArrays
 from adaptive_flot.runner.scenario.checks import check_realisation
@@ -23,12 +24,11 @@ from adaptive_flot.runner.scenario.realisation import Realisation
 
 @dataclass(frozen=True)
 class Member:
-    """A run before its estimator: its place among the others, its start, what acts and what is known of it by row."""
+    """A run before its estimator: its place among the others, what acts and what is known of it by row."""
 
     place: int
     realisation: Realisation
     decisions: DecisionTable | Sequence[Decision]
-    x0: FloatArray
     acting: FloatArray
     shown: FloatArray
     known: FloatArray | None
@@ -40,16 +40,15 @@ class Member:
         Raises
         ------
         RangeError, ModelError
-            An input or parameter of this seed, or its steady state, leaves the model's range.
+            An input or parameter of this seed leaves the model's range.
         """
         check_realisation(realisation)
         scenario = realisation.scenario
         decisions, inputs = _decided(controller, len(scenario.starts), len(setup.model.inputs))
         around = realisation.disturbances(setup.model)
-        x0 = initial_state(scenario, scenario.plant_model, realisation.schedule[0], realisation.parameters[0])
         acting = np.where(np.isnan(around.inputs), inputs, around.inputs)
         shown = np.where(np.isnan(around.shown), inputs, around.shown)
-        return cls(place, realisation, decisions, x0, acting, shown, around.parameters)
+        return cls(place, realisation, decisions, acting, shown, around.parameters)
 
 
 def _decided(
@@ -129,10 +128,28 @@ def _columns(decisions: DecisionTable | Sequence[Decision], n: int) -> dict[str,
     }
 
 
-def simulate_plants(plants: Ensemble, members: Sequence[Member]) -> list[Seen]:
+def starts(steady: SteadyStates, members: Sequence[Member]) -> list[FloatArray | Exception]:
+    """State (nx,) in which each member's plant starts, or why there is none."""
+    if not members:
+        return []
+    inputs = np.array([m.realisation.schedule[0] for m in members])
+    states, good = steady.find(inputs, np.array([m.realisation.parameters[0] for m in members]))
+    found = list[FloatArray | Exception]()
+    for m, state, fine in zip(members, states, good, strict=True):
+        r = m.realisation
+        scenario, plant = r.scenario, r.scenario.plant_model
+        try:
+            alone = None if fine else initial_state(scenario, plant, r.schedule[0], r.parameters[0])
+            found.append(with_given_states(scenario, plant, state) if alone is None else alone)
+        except Exception as error:
+            found.append(error)
+    return found
+
+
+def simulate_plants(plants: Ensemble, members: Sequence[Member], x0: Sequence[FloatArray]) -> list[Seen]:
     """What the plants of the members leave behind."""
     run = plants.simulate(
-        np.array([m.x0 for m in members]),
+        np.array(x0),
         np.array([m.acting for m in members]),
         np.array([m.realisation.parameters for m in members]),
         keep=["states", "outputs"],

@@ -12,11 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.contracts.batch import BatchFit
+from adaptive_flot.contracts.batch import BatchFit, fits_many
 from adaptive_flot.contracts.ensemble_record import EnsembleRecord, tracks_ensembles
 from adaptive_flot.contracts.track import Track
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.side_by_side.plants import Member, Seen, simulate_plants
+from adaptive_flot.runner.commands.side_by_side.plants import Member, Seen, simulate_plants, starts
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.starts import prior_of, record_of_rows
 from adaptive_flot.runner.scenario.realisation import Realisation
@@ -75,8 +76,11 @@ def run_side_by_side(
             members.append(Member.of(i, realisation, controller, setup))
         except Exception as error:
             found[i] = error
-    if members:
-        seen = simulate_plants(prepared.plants, members)
+    begun = list(zip(members, starts(prepared.steady_plants, members), strict=True))
+    found |= {m.place: start for m, start in begun if isinstance(start, Exception)}
+    able = [(m, start) for m, start in begun if not isinstance(start, Exception)]
+    if able:
+        seen = simulate_plants(prepared.plants, [m for m, _ in able], [start for _, start in able])
         found |= _estimated(prepared, estimator_name, controller_name, seen, initial)
     each = round((time.perf_counter() - begin) / len(realisations), 4)
     results = (found[i] for i in range(len(realisations)))
@@ -90,15 +94,17 @@ def _estimated(
     scenario, rows = prepared.scenario, prepared.scenario.initial_rows
     setup, found = scenario.setup, dict[int, Run | Exception]()
     estimator = prepared.estimator(estimator_name, members[0].member.realisation)
+    records = [
+        record_of_rows(scenario, setup, m.time[:rows], m.member.shown[:rows], m.measured[:rows]) for m in members
+    ]
     started, states = list[Seen](), []
-    for one in members:
+    for one, record, fit in zip(members, records, _initial_fits(prepared, members, records, initial), strict=True):
         place = one.member.place
         try:
-            record = record_of_rows(scenario, setup, one.time[:rows], one.member.shown[:rows], one.measured[:rows])
-            fitted = initial[place]
-            if "fit" not in fitted:
-                fitted["fit"] = prepared.batch.fit(record)
-            states.append(estimator.init(prior_of(prepared, estimator_name, setup, record, fitted["fit"])))
+            if isinstance(fit, Exception):
+                raise fit
+            initial[place]["fit"] = fit
+            states.append(estimator.init(prior_of(prepared, estimator_name, setup, record, fit)))
             started.append(one)
         except Exception as error:
             found[place] = error
@@ -115,6 +121,24 @@ def _estimated(
         except Exception as error:
             found[place] = error
     return found
+
+
+def _initial_fits(
+    prepared: Prepared, members: Sequence[Seen], records: Sequence[Dataset], known: Sequence[Fits]
+) -> list[BatchFit | Exception]:
+    """The batch fit of each member's record: the one that is known, or one that is made here."""
+    wanted = [k for k, one in enumerate(members) if "fit" not in known[one.member.place]]
+    batch, made = prepared.batch, list[BatchFit | Exception]()
+    if fits_many(batch):
+        made = batch.fit_many([records[k] for k in wanted])
+    else:
+        for k in wanted:
+            try:
+                made.append(batch.fit(records[k]))
+            except Exception as error:
+                made.append(error)
+    new = dict(zip(wanted, made, strict=True))
+    return [new[k] if k in new else known[one.member.place]["fit"] for k, one in enumerate(members)]
 
 
 def _record(members: Sequence[Seen], rows: int) -> EnsembleRecord:
