@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 
 from adaptive_flot.contracts import Setup, Status
@@ -13,7 +14,7 @@ from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
 from estimators.rpem.state import RpemState
-from estimators.rpem.update import UpdateOptions, update_function
+from estimators.rpem.update import UpdateOptions
 from estimators.shared.ensemble import Flags, driving, known_parameters, statuses
 from estimators.shared.information import Information
 from estimators.shared.state_correction import StateCorrection
@@ -27,12 +28,17 @@ class RpemEnsemble:
 
     Parameters
     ----------
-    setup, options, correction, information
+    setup, options, correction, information, update
         Those of the estimator.
     """
 
     def __init__(
-        self, setup: Setup, options: UpdateOptions, correction: StateCorrection, information: Information | None
+        self,
+        setup: Setup,
+        options: UpdateOptions,
+        correction: StateCorrection,
+        information: Information | None,
+        update: ca.Function,
     ) -> None:
         self._setup, self._correction, self._information = setup, correction, information
         self._columns = setup.model.indices("outputs", setup.outputs)
@@ -40,8 +46,7 @@ class RpemEnsemble:
         self._recursive = options.gradient == "recursive"
         if self._recursive:
             carried["S"] = "S_next"
-        function = update_function(setup, options)
-        self._lanes = Lanes(function, carried, MATRICES, as_machine_code=setup.model.compiled)
+        self._lanes = Lanes(update, carried, MATRICES, as_machine_code=setup.model.compiled)
 
     def __call__(self, states: Sequence[RpemState], record: EnsembleRecord) -> list[tuple[RpemState, Track] | None]:
         """State after the samples and estimates of each member; None for one with a sample to be skipped.

@@ -110,9 +110,8 @@ class Rpem:
         if self._information is None and not self._correction.outputs:
             self._block = RecordBlock(setup, self.options)
         matrices = ("S", "covariance", "free", "gain", "S_next", "covariance_next", "information")
-        self._update = FastCall(
-            update_function(setup, self.options), matrices=matrices, as_machine_code=setup.model.compiled
-        )
+        self._function = update_function(setup, self.options)
+        self._update = FastCall(self._function, matrices=matrices, as_machine_code=setup.model.compiled)
         self._recursive = gradient == "recursive"
 
     def init(self, prior: Prior) -> RpemState:
@@ -223,7 +222,7 @@ class Rpem:
     @cached_property
     def _ensemble(self) -> RpemEnsemble:
         # made when first asked for: compiling it takes seconds
-        return RpemEnsemble(self.setup, self.options, self._correction, self._information)
+        return RpemEnsemble(self.setup, self.options, self._correction, self._information, self._function)
 
     def _by_samples(
         self, state: RpemState, time: FloatArray, inputs: FloatArray, outputs: FloatArray

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -15,12 +15,14 @@ from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
 from adaptive_flot.processes.flotation.account import account
-from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.results.accounts import control_account
 from adaptive_flot.runner.results.plans import plan_table
 from adaptive_flot.runner.results.run_arrays import RunArrays
 from adaptive_flot.runner.results.timeseries import TimeSeries
 from adaptive_flot.runner.scenario.realisation import Realisation
+
+if TYPE_CHECKING:
+    from adaptive_flot.runner.adaptation.inquiry import Inquiry  # discovery and its libraries take a second
 
 
 @dataclass(frozen=True, repr=False)
