@@ -23,6 +23,7 @@ from adaptive_flot.live.page.server import PageServer
 from adaptive_flot.live.plant.link_text import link_text
 from adaptive_flot.live.requests import Action, Answered, Inbox, Request
 from adaptive_flot.live.running.progress import Card, Progress, Stage
+from adaptive_flot.live.running.run import NOTHING
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.shadow.comparison import Compared
@@ -105,16 +106,21 @@ def visit(browser: Browser, shown: Shown, token: str, width: int = 1400) -> Tab:
     """Log in as a person does."""
     tab = opened(browser, apart=True)
     tab.look(width, 900, dark=False)
-    tab.go(shown.server.address)
+    log_in(browser, tab, shown.server, token)
+    seen(tab, "!document.body.classList.contains('waiting')")
+    shown.show()
+    seen(tab, "document.querySelector('#over-time').dataset.newest")
+    return tab
+
+
+def log_in(browser: Browser, tab: Tab, server: PageServer, token: str) -> None:
+    """Fill the form in and send it."""
+    tab.go(server.address)
     fill = f"document.querySelector('[name=token]').value = {json.dumps(token)};"
     tab.run(f"{fill} document.querySelector('[name=name]').value = 'A. Person'")
     browser.events = [e for e in browser.events if e.get("method") != "Page.loadEventFired"]
     tab.run("document.querySelector('form').submit()")
     browser.wait_for("Page.loadEventFired", tab.session)
-    seen(tab, "!document.body.classList.contains('waiting')")
-    shown.show()
-    seen(tab, "document.querySelector('#over-time').dataset.newest")
-    return tab
 
 
 @pytest.fixture(scope="module")
@@ -315,6 +321,24 @@ def test_who_may_only_look_has_no_button_that_acts(browser: Browser, shown: Show
         == 0
     )
     tab.close()
+
+
+def test_a_page_of_a_link_that_has_never_seen_its_plant_says_so(browser: Browser, shown: Shown) -> None:
+    link, last = shown.server.hub._pictures.link, shown.last
+    cut_off = replace(last.outcome, mode=Mode.MONITOR, sample=None, estimate=None, decision=None, checks={}, acting={})
+    never = replace(last, snapshot=NOTHING, outcome=cut_off, connected=False)
+    with served(link) as (server, inbox):
+        tab = opened(browser, apart=True)
+        log_in(browser, tab, server, ACT)
+        server.show(never)
+        has(tab, "#clock", "The plant has told nothing yet")
+        has(tab, "#tile-link", "lost")
+        server.show(last)
+        seen(
+            tab, "document.querySelector('#over-time').dataset.newest && document.querySelector('#clock').dataset.time"
+        )
+        assert errors(tab) == [] and server.problem == "" and not inbox.take()
+        tab.close()
 
 
 def test_an_extended_model_in_use_is_told_and_can_be_reverted_where_its_card_is_gone(tab: Tab, shown: Shown) -> None:

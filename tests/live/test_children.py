@@ -12,6 +12,7 @@ from pathlib import Path
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.live.finding import Finding
+from adaptive_flot.live.link.children import NICE
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.shadow.worker import ShadowPlan, ShadowStepper
 from tests.live.page_bench import wait_for
@@ -35,7 +36,7 @@ time.sleep(3600)
 
 
 def _begun(folder: Path, name: str) -> None:
-    (folder / f"{name}.part").write_text(str(os.getpid()))
+    (folder / f"{name}.part").write_text(f"{os.getpid()} {os.nice(0)}")
     (folder / f"{name}.part").rename(folder / name)
     time.sleep(3600)
 
@@ -68,7 +69,8 @@ def test_a_killed_link_leaves_no_process_behind(link: Link, tmp_path: Path) -> N
     finally:
         os.kill(parent.pid, signal.SIGKILL)
         parent.wait()
-    children = [int(file.read_text()) for file in files]
+    children, niceness = zip(*(map(int, file.read_text().split()) for file in files), strict=True)
+    assert set(niceness) == {min(19, os.nice(0) + NICE)}, "the cycle goes first"
     try:
         wait_for(lambda: not any(runs(number) for number in children), 60)
     finally:

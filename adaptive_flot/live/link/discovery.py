@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from adaptive_flot.child_processes import end_with_parent
 from adaptive_flot.contracts import Decision, Estimate, PlantRecord, Sample, Setup, Status
 from adaptive_flot.contracts.delayed_measurements import in_time
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.finding import Finding
+from adaptive_flot.live.link.children import beside_the_cycle
 from adaptive_flot.live.link.estimation import missing
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.outcome import Outcome
@@ -165,7 +165,7 @@ class LiveDiscovery:
         """A process that shares nothing with this one: the link has threads, which no fork may copy."""
         if self._pool is None:
             context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, context, initializer=end_with_parent, initargs=(os.getpid(),))
+            self._pool = ProcessPoolExecutor(1, context, initializer=beside_the_cycle, initargs=(os.getpid(),))
         return self._pool
 
 

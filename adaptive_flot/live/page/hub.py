@@ -87,7 +87,9 @@ class Hub:
         self._now = json.dumps({**now, "answers": list(self._answers)}, allow_nan=False)
         text = json.dumps(row, allow_nan=False)
         time = row[0]
-        if time < self._last - HOUR_S / 60:  # the plant's clock went back: what was before can not be shown beside it
+        if time is None:  # the plant has told nothing yet
+            text = "null"
+        elif time < self._last - HOUR_S / 60:  # the plant's clock went back: what was before can not be shown beside it
             self._rows.clear()
         elif time <= self._last:
             text = "null"

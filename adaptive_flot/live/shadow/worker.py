@@ -6,7 +6,6 @@ It has no client and no address of a plant. What it decides goes back to the lin
 from __future__ import annotations
 
 import multiprocessing
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from adaptive_flot.child_processes import end_with_parent
 from adaptive_flot.contracts import Decision, Estimate, Prior, Sample, TracksInputs
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.live.link.children import beside_the_cycle
 from adaptive_flot.live.link.estimation import Estimation, EstimationState
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.store.beside import ShadowResult
@@ -28,9 +27,6 @@ from adaptive_flot.runner.adaptation.bumpless_transfer import states_at_rest
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.returned import checked_decision
 from adaptive_flot.runner.scenario.realisation import Realisation
-
-NICE = 10
-"""The acting cycle goes first."""
 
 
 @dataclass(frozen=True)
@@ -177,8 +173,7 @@ def work(connection: Connection, link_file: Path, plan: ShadowPlan, make: Make) 
     """Main function of the process: it ends with the link, or with the first error, which it tells."""
     link = multiprocessing.parent_process()
     if link is not None and link.pid is not None:
-        end_with_parent(link.pid)
-    os.nice(NICE)
+        beside_the_cycle(link.pid)
     try:
         stepper = make(link_file, plan)
         connection.send(None)  # built: it can start where the acting estimator stands now

@@ -70,8 +70,8 @@ const AdaptiveFlotLive = (() => {
 
   function show(now, row) {
     heard = performance.now();
-    byId("clock").dataset.time = now.time;
-    byId("clock").textContent = `Plant's clock ${AdaptiveFlotText.clock(now.time)}`;
+    if (now.time !== null) byId("clock").dataset.time = now.time;
+    byId("clock").textContent = now.time === null ? "The plant has told nothing yet" : `Plant's clock ${AdaptiveFlotText.clock(now.time)}`;
     AdaptiveFlotHead.show(now);
     AdaptiveFlotSide.show(now);
     AdaptiveFlotOverTime.show(now, row);
