@@ -20,6 +20,7 @@ from adaptive_flot.runner.commands.run_files import write_runs
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
+from tests.report.changed_runs import with_table
 from tests.report.test_run_report import Links
 
 Result = tuple[Scenario, list[Run]]
@@ -100,7 +101,7 @@ def test_disturbances_are_shown_with_what_is_known_of_them(result: Result) -> No
     label = "feed_concentration.chalcopyrite"
     table = run.table.copy()
     table["feed_flow_m3_s_true"], table[f"{label}_true"], table[f"{label}_known"] = feed, 10.6, 10.5
-    panels = closed_loop.operation_panels(series.cases([(scenario, [replace(run, columns=dict(table))])])[0])
+    panels = closed_loop.operation_panels(series.cases([(scenario, [with_table(run, table)])])[0])
     shown = {p.label: [t.label for t in p.traces] for p in panels}
     assert shown["feed flow"] == ["truth", "measured"]
     assert shown["feed concentration chalcopyrite"] == ["truth", "measured"]
@@ -147,6 +148,6 @@ def test_each_fault_has_a_strip_of_when_it_acted(result: Result) -> None:
         faults=["stuck air_flow; nan_state" if 350 < t <= 360 else "" for t in run.table["time_s"]]
     )
     table.loc[table["time_s"] > 400, "faults"] = "nan_state"
-    found = {s.label: s for s in closed_loop.strips(series.cases([(scenario, [replace(run, columns=dict(table))])])[0])}
+    found = {s.label: s for s in closed_loop.strips(series.cases([(scenario, [with_table(run, table)])])[0])}
     assert found["stuck air flow"].spells()[1:] == [("fault", 350.0, 360.0), ("no fault", 360.0, 420.0)]
     assert [state for state, *_ in found["nan state"].spells()] == ["no fault", "fault", "no fault", "fault"]

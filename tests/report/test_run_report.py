@@ -23,6 +23,7 @@ from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
+from tests.report.changed_runs import with_table
 
 Result = tuple[Scenario, list[Run]]
 
@@ -159,7 +160,7 @@ def test_roles_and_swings(result: Result) -> None:
     table = run.table.copy()
     table["n_std"] = 0.01
     table["n_estimate"] = 1 + 0.02 * (np.arange(len(table)) % 2)
-    assert swing_share(case, replace(run, columns=dict(table)), "n") == 1.0
+    assert swing_share(case, with_table(run, table), "n") == 1.0
     assert swing_share(case, case.first["fixed"], "n") == 0.0
 
 
@@ -174,7 +175,7 @@ def test_closed_loop_shows_each_time_series(result: Result) -> None:
     scenario, runs = result
     column = scenario.model.inputs[0].column
     moved = [
-        replace(r, columns={**r.columns, column: 1.1 * r.table[column]}) if r.estimator == "rpem" else r for r in runs
+        with_table(r, r.table.assign(**{column: 1.1 * r.table[column]})) if r.estimator == "rpem" else r for r in runs
     ]
     panels, still = series.input_panels(series.cases([(scenario, moved)])[0])
     assert [t.label for t in panels[0].traces] == ["input (fixed)", "input (rpem)"]
