@@ -20,6 +20,47 @@ from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 
+def quantile_of(probability: float) -> float:
+    """Quantile of the standard normal distribution for a probability from 0.5 to below 1; ModelError for another."""
+    if not 0.5 <= probability < 1:
+        raise ModelError(f"economic_mpc: limit_probability = {probability:g}; give one from 0.5 to below 1")
+    return float(norm.ppf(probability))
+
+
+class SteadyGains:
+    """Steady-state derivatives of outputs by the adapted parameters.
+
+    Parameters
+    ----------
+    setup
+        Model, sampling interval and adapted parameters (q).
+    outputs
+        Indices of the outputs (k,).
+    """
+
+    def __init__(self, setup: ControllerSetup, outputs: list[int]) -> None:
+        self._outputs = outputs
+        jacobians = Stepper(setup.model, setup.dt).one_step_jacobians(setup.parameters)
+        self._jacobians = FastCall(jacobians, matrices=("dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"))
+
+    def __call__(self, time: float, state: FloatArray, inputs: FloatArray, p: FloatArray) -> FloatArray:
+        """Derivatives (k, q); 0 where there is no finite one.
+
+        Parameters
+        ----------
+        time
+            Time [s].
+        state, inputs, p
+            State (nx,), inputs (nu,) and all parameters (np,) now.
+        """
+        _, _, A, B, C, D = self._jacobians(state, time, inputs, p)
+        try:
+            g = (C @ np.linalg.solve(np.eye(len(A)) - A, B) + D)[self._outputs]
+        except np.linalg.LinAlgError:
+            return np.zeros((len(self._outputs), B.shape[1]))
+        return np.asarray(np.where(np.isfinite(g), g, 0.0))
+
+
 class ChanceConstraint:
     """Standard deviations of outputs, times the quantile that a probability asks for.
 
@@ -39,12 +80,8 @@ class ChanceConstraint:
     """
 
     def __init__(self, setup: ControllerSetup, outputs: list[int], probability: float) -> None:
-        if not 0.5 <= probability < 1:
-            raise ModelError(f"economic_mpc: limit_probability = {probability:g}; give one from 0.5 to below 1")
-        self.quantile = float(norm.ppf(probability))
-        self._outputs = outputs
-        jacobians = Stepper(setup.model, setup.dt).one_step_jacobians(setup.parameters)
-        self._jacobians = FastCall(jacobians, matrices=("dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"))
+        self.quantile = quantile_of(probability)
+        self._gains = SteadyGains(setup, outputs)
 
     def backoff(
         self, time: float, state: FloatArray, inputs: FloatArray, p: FloatArray, covariance: FloatArray
@@ -60,11 +97,7 @@ class ChanceConstraint:
         covariance
             Of the adapted parameters (q, q).
         """
-        _, _, A, B, C, D = self._jacobians(state, time, inputs, p)
-        try:
-            g = (C @ np.linalg.solve(np.eye(len(A)) - A, B) + D)[self._outputs]
-        except np.linalg.LinAlgError:
-            return np.zeros(len(self._outputs))
+        g = self._gains(time, state, inputs, p)
         variance = np.einsum("ki,ij,kj->k", g, covariance, g)
         kept: FloatArray = np.where(np.isfinite(variance), self.quantile * np.sqrt(np.maximum(variance, 0.0)), 0.0)
         return kept

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.contracts import Economics, Limits
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 from controllers.economic_mpc.layout import StageLayout
 from controllers.economic_mpc.stage import write_stage
 
@@ -33,6 +33,8 @@ class OptimalControlProblem:
         Expressions for `casadi.nlpsol`: x, f, g, p.
     equality
         Which constraints are equations, for fatrop.
+    structure
+        Options of fatrop that say where the stages lie.
     names
         A name for each constraint, for messages.
     begin
@@ -69,6 +71,11 @@ class OptimalControlProblem:
         for kind in ("gap", "initial", "equations"):
             equations[layout.rows[kind]] = True
         self.equality: list[bool] = equations.tolist()
+        self.structure: dict[str, Any] = {"structure_detection": "auto"}
+
+    def physical(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest value of each variable, see `StageLayout.physical`."""
+        return self.layout.physical()
 
     def split(self, x: ca.MX) -> tuple[ca.MX, ca.MX]:
         """Variables of the stages (block, horizon), and where each of them ends (state_size, horizon)."""
@@ -79,14 +86,14 @@ class OptimalControlProblem:
 
     def initial(self, x: ca.MX, p: ca.MX) -> ca.MX:
         """Residual of the initial condition (state_size,)."""
-        return x[: self.layout.state_size] - self._now(p)
+        return x[: self.layout.state_size] - self.now(p)
 
     def joined(self, initial: ca.MX, lines: ca.MX) -> ca.MX:
         """One vector of the initial condition and the other constraints of each stage (rows of a stage, horizon)."""
         gap = self.layout.state_size
         return ca.vertcat(lines[:gap, 0], initial, lines[gap:, 0], ca.vec(lines[:, 1:]))
 
-    def _now(self, p: ca.MX) -> ca.MX:
+    def now(self, p: ca.MX) -> ca.MX:
         """State and inputs before the first stage, scaled."""
         symbols, layout = self.stage.arguments, self.layout
         now = ca.vertcat(symbols.state / layout.x_scale, symbols.previous / layout.u_scale)

@@ -5,34 +5,26 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Estimate, Plan, Sample, Status
+from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.chance_constraint import ChanceConstraint
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Bounds, with_further_states
 from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
 from controllers.economic_mpc.output_bias import OutputBias
-from controllers.economic_mpc.planner import Found, Planner
+from controllers.economic_mpc.planner import Found, Planner, Uncertainty
 from controllers.economic_mpc.probing import ProbeState, Probing, price
-from controllers.economic_mpc.softening import Softening, by_name, in_words
+from controllers.economic_mpc.scenarios import Misfit
+from controllers.economic_mpc.softening import Softening
 from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.told import Teller, Told
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
 OWN = "economic_mpc"
-
-
-class Told(NamedTuple):
-    """What a decision tells of its plan: the plan, words on it, and how far beyond each limit it goes."""
-
-    plan: Plan
-    words: str
-    softened: Mapping[str, float]
 
 
 class EconomicMpc:
@@ -67,6 +59,11 @@ class EconomicMpc:
     limit_probability
         Probability with which the limits of outputs are to hold, given the covariance of the estimate: they are backed
         off further by what that asks (`chance_constraint.py`). Default no further back-off.
+    scenarios
+        Number of scenarios, 1, 3, 9 or 27, in which the first move has to keep the limits (`scenarios.py`). The outer
+        ones lie where `limit_probability` (then 0.95 by default) puts them; limits are not backed off for it.
+    branch
+        Moves that scenarios look ahead, beside the nominal one; default 5, or the horizon if that is less.
     priority
         Names of the limited outputs and states, the one to give up last first. Where no plan keeps every limit, they
         are given up from the back (`softening.py`). Default: outputs, then states.
@@ -94,6 +91,8 @@ class EconomicMpc:
         limit_penalty: float | None = None,
         backoff: float | None = None,
         limit_probability: float | None = None,
+        scenarios: int = 1,
+        branch: int | None = None,
         priority: Sequence[str] | None = None,
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
@@ -116,34 +115,33 @@ class EconomicMpc:
         self.layout = self.problem.layout
         self.solver: Solver = make_solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
-        chance: ChanceConstraint | None = None
-        if limit_probability is not None:
-            chance = ChanceConstraint(setup, [e.index for e in self.layout.output_limits], limit_probability)
         own = [economics.typical_rate if cost is None else cost for cost in (move_cost, limit_penalty)]
         own = [own[0], *[own[1]] * self.layout.slacks_size]
         self._value_scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
         self._bounds = Bounds.of(limits, self.layout)
         self.planner = Planner(
             setup,
-            self.layout,
+            self.problem,
             self._bounds,
             limits=self.layout.limit_values(backoff),
             prices=self._value_scale * np.array([*economics.prices(), *own]),
-            chance=chance,
             softening=Softening(self.problem, self._bounds, priority, budget_s),
+            uncertainty=Uncertainty(limit_probability, scenarios, branch),
+            solver=solver,
             budget_s=budget_s,
         )
         self._biases = [
             OutputBias(name, setup.model.index("outputs", name), setup.dt, bias_time_s) for name in self.layout.outputs
         ]
         self.probing = None if probing is None else Probing(self.layout, limits, **probing)
-        self._outputs = FastCall(self.problem.outputs, matrices=("outputs",))
+        self._tell = Teller(self.problem)
 
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
         unheard = (time,) * len(self._biases)
         probe = None if self.probing is None else ProbeState(time)
-        return MpcState(0, time, None, None, None, 0, (0.0,) * len(self._biases), unheard, probe)
+        unmoved = (0.0,) * len(self._biases)
+        return MpcState(0, time, None, None, None, 0, unmoved, unheard, Misfit.none(len(unmoved)), probe)
 
     def with_failing_solver(self) -> EconomicMpc:
         """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
@@ -158,7 +156,7 @@ class EconomicMpc:
         if not isinstance(before, EconomicMpc):
             raise ModelError("economic_mpc: only the state of an economic_mpc can be taken over")
         bias = tuple(b + own.change(known, again) for b, own in zip(state.bias, self._biases, strict=True))
-        state = replace(state, bias=bias)
+        state = replace(state, bias=bias, tree=None)
         if state.plan is None or len(self.setup.model.states) == len(before.setup.model.states):
             return state
         plan = with_further_states(state.plan, before.layout, self.layout, again[-1].state)
@@ -188,7 +186,10 @@ class EconomicMpc:
             return state
         filters = zip(self._biases, state.bias, state.heard, strict=True)
         after = [own.after(bias, heard, estimate) for own, bias, heard in filters]
-        return replace(state, bias=tuple(bias for bias, _ in after), heard=tuple(heard for _, heard in after))
+        bias = tuple(bias for bias, _ in after)
+        came = [own.corrected(estimate, value) for own, value in zip(self._biases, bias, strict=True)]
+        misfit = state.misfit.after(estimate.time, np.array(came), self.setup.dt)
+        return replace(state, bias=bias, heard=tuple(heard for _, heard in after), misfit=misfit)
 
     def _optimise(
         self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
@@ -199,9 +200,13 @@ class EconomicMpc:
             state, found = self._probe(self.probing, state, held, estimate, found)
         solution = found.solution
         if solution.validity is Validity.VALID:
-            plan = replace(state, plan=solution.variables, multipliers=solution.multipliers, age=0)
+            told = self._tell(estimate.time, found)
+            misfit = state.misfit.planned(told.plan, self.layout.outputs)
+            plan = replace(
+                state, plan=solution.variables, multipliers=solution.multipliers, age=0, misfit=misfit, tree=found.tree
+            )
             first = self.layout.inputs_of(solution.variables)[0]
-            return self._apply(plan, held, first, found.status, solution, self._told(estimate.time, found))
+            return self._apply(plan, held, first, found.status, solution, told)
         if state.plan is not None and state.age + 1 < self.layout.horizon:
             older = replace(state, age=state.age + 1)
             planned = self.layout.inputs_of(state.plan)[older.age]
@@ -225,16 +230,6 @@ class EconomicMpc:
         probe, paid = probing.pay(probe, cost, estimate.time)
         dip = replace(found, solution=replace(asked, seconds=free.seconds + asked.seconds))
         return replace(state, probe=probe), dip if paid else found
-
-    def _told(self, time: float, found: Found) -> Told:
-        solution = found.solution
-        inputs = self.layout.inputs_of(solution.variables)
-        ends = time + self.layout.move_s * np.arange(1.0, self.layout.horizon + 1)
-        (outputs,) = self._outputs(solution.variables, found.arguments)
-        moves = dict(zip(self.layout.moved_names, inputs.T, strict=True))
-        plan = Plan(ends, moves, dict(zip(self.layout.outputs, outputs.T, strict=True)))
-        words = "; ".join(part for part in (in_words(found.given_up), found.note) if part)
-        return Told(plan, words, by_name(found.given_up))
 
     def _apply(
         self,

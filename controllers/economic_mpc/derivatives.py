@@ -20,7 +20,7 @@ from controllers.economic_mpc.collocation import CSE, OptimalControlProblem
 from controllers.economic_mpc.layout import DEGREE
 
 IntArray = NDArray[np.intp]
-T = TypeVar("T", ca.SX, ca.MX)
+T = TypeVar("T", ca.DM, ca.SX, ca.MX)
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,13 @@ class Pattern:
 class Derivatives:
     """Mapped functions of a problem, each with the stages as columns.
 
+    Parameters
+    ----------
+    problem
+        The problem.
+    stages
+        Number of stages, each with arguments p of its own (a column each); default: those of the horizon, p for all.
+
     Attributes
     ----------
     jacobian, jacobian_pattern
@@ -52,8 +59,9 @@ class Derivatives:
         (nnz, horizon), both triangles; without the part of the gradient that the next stage's gap adds.
     """
 
-    def __init__(self, problem: OptimalControlProblem) -> None:
+    def __init__(self, problem: OptimalControlProblem, stages: int | None = None) -> None:
         self.problem = problem
+        self._stages, self._alike = stages or problem.layout.horizon, stages is None
         stage = problem.stage
         w, p, t = stage.variables, stage.arguments.vector, stage.begin
         lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", stage.constraints.numel())
@@ -78,7 +86,10 @@ class Derivatives:
     def _mapped(self, name: str, inputs: list[ca.SX], results: list[ca.SX], shared: list[int]) -> ca.Function:
         """A function of all stages; the inputs with the indices `shared` are the same for all."""
         one = ca.Function(f"stage_{name}", inputs, results, CSE)
-        return one.map(name, "serial", self.problem.layout.horizon, shared, [])
+        if self._alike:
+            return one.map(name, "serial", self._stages, shared, [])
+        factor = [i for i, given in enumerate(inputs) if i in shared and given.is_scalar()]  # that of the objective
+        return one.map(name, "serial", self._stages, factor, [])
 
     def _hessian(self, slope: ca.SX) -> ca.SX:
         """Both triangles from one: of each pair of entries only one is worked out, the one that takes less.
@@ -100,7 +111,7 @@ class Derivatives:
         below = np.flatnonzero(rows != columns)
         rows, columns = np.append(rows, columns[below]), np.append(columns, rows[below])
         entries = _entries(upper)
-        return _sparse((layout.block, layout.block), rows, columns, ca.vertcat(entries, entries[below.tolist()]))
+        return sparse((layout.block, layout.block), rows, columns, ca.vertcat(entries, entries[below.tolist()]))
 
 
 class Assembled:
@@ -140,7 +151,7 @@ class Assembled:
         meets = np.vstack([layout.rows["initial"], layout.rows["gap"]])
         shape = (self._lam_g.numel(), layout.size)
         ones = ca.MX.ones(x.size, 1)
-        return _sparse(
+        return sparse(
             shape,
             np.concatenate([rows, meets.ravel()]),
             np.concatenate([columns, x.ravel()]),
@@ -158,7 +169,7 @@ class Assembled:
         keep = np.flatnonzero(pattern.rows <= pattern.columns) if triangle else np.arange(len(pattern.rows))
         begin = np.arange(layout.horizon)[:, None] * layout.block
         rows, columns = ((begin + index[keep]).ravel() for index in (pattern.rows, pattern.columns))
-        hessian = _sparse((layout.size, layout.size), rows, columns, ca.vec(entries[keep.tolist(), :]))
+        hessian = sparse((layout.size, layout.size), rows, columns, ca.vec(entries[keep.tolist(), :]))
         return ca.vertcat(ca.vec(whole), meets[:, -1]), hessian
 
     def _function(self, name: str, *, multipliers: bool = False, **results: ca.MX) -> ca.Function:
@@ -173,7 +184,7 @@ def _entries(matrix: ca.SX) -> ca.SX:
     return stored
 
 
-def _sparse(shape: tuple[int, int], rows: IntArray, columns: IntArray, entries: T) -> T:
+def sparse(shape: tuple[int, int], rows: IntArray, columns: IntArray, entries: T) -> T:
     """Matrix of entries given in any order."""
     order = np.lexsort((rows, columns))  # by columns, as CasADi stores them
     pattern = ca.Sparsity.triplet(*shape, rows[order].tolist(), columns[order].tolist())

@@ -21,7 +21,7 @@ from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.derivatives import Assembled
 from controllers.economic_mpc.layout import Multipliers
 from controllers.economic_mpc.real_time_iteration import RealTimeIteration
-from controllers.economic_mpc.verification import NlpSolution, Solver, Verifier, no_solution
+from controllers.economic_mpc.verification import Nlp, NlpSolution, Solver, Verifier, no_solution
 
 BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
 """Barrier parameter in units of the objective (see `Economics.typical_rate`). A larger one for fatrop would save
@@ -40,8 +40,13 @@ def make_solver(problem: OptimalControlProblem, name: str, budget_s: float) -> S
     if name not in SOLVERS:
         raise ModelError(f"economic_mpc: unknown solver {name!r}; {near_match(name, SOLVERS)}")
     if name == "rti":
-        return RealTimeIteration(problem, InteriorPoint(problem, "fatrop", budget_s))
-    return InteriorPoint(problem, name, budget_s)
+        return RealTimeIteration(problem, interior_point(problem, "fatrop", budget_s))
+    return interior_point(problem, name, budget_s)
+
+
+def interior_point(problem: OptimalControlProblem, name: str, budget_s: float) -> InteriorPoint:
+    """`ipopt` or `fatrop` for the problem of one plan."""
+    return InteriorPoint(problem, Assembled(problem).functions(name), name, budget_s)
 
 
 class InteriorPoint:
@@ -51,18 +56,20 @@ class InteriorPoint:
     ----------
     problem
         The NLP.
+    derivatives
+        Its derivatives, by the names of the solver option `cache`.
     name
         `ipopt` or `fatrop` (exploits the stage structure).
     budget_s
         Wall-clock time after which ipopt stops (soft: ipopt checks it between iterations; fatrop counts iterations).
     """
 
-    def __init__(self, problem: OptimalControlProblem, name: str, budget_s: float) -> None:
+    def __init__(self, problem: Nlp, derivatives: dict[str, ca.Function], name: str, budget_s: float) -> None:
         self.problem = problem
         self.name = name
         options = _ipopt(budget_s) if name == "ipopt" else _fatrop(problem)
         common: dict[str, Any] = {
-            "cache": Assembled(problem).functions(name),
+            "cache": derivatives,
             "print_time": False,
             "error_on_fail": False,
         }
@@ -107,9 +114,9 @@ class FailingSolver:
         return no_solution(len(start), len(bounds["lbg"]), "the solver was made to fail")
 
 
-def _fatrop(problem: OptimalControlProblem) -> dict[str, Any]:
+def _fatrop(problem: Nlp) -> dict[str, Any]:
     return {
-        "structure_detection": "auto",
+        **problem.structure,
         "equality": problem.equality,
         "fatrop.print_level": 0,
         "fatrop.tol": 50 * BARRIER["fatrop"],  # what is left of the barrier counts as an error

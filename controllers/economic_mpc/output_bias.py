@@ -33,6 +33,11 @@ class OutputBias:
         """Bias and time of its newest value [s] after an estimate."""
         return self._filtered(bias, heard, estimate.time, self._newest(estimate))
 
+    def corrected(self, estimate: Estimate, bias: float) -> float:
+        """The output as it is now: what the model alone predicts, and the bias; free of most of the noise."""
+        predicted = float(estimate.prediction[self.index])
+        return predicted + bias - (0.0 if estimate.discrepancy is None else float(estimate.discrepancy[self.index]))
+
     def change(self, known: Sequence[Estimate], again: Sequence[Estimate]) -> float:
         """What the filter would show more had it been given other estimates `again` of the samples of `known`.
 

@@ -9,12 +9,17 @@ import numpy as np
 from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status, full_parameters
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.chance_constraint import ChanceConstraint
-from controllers.economic_mpc.layout import Bounds, StageLayout
+from controllers.economic_mpc.chance_constraint import ChanceConstraint, quantile_of
+from controllers.economic_mpc.collocation import OptimalControlProblem
+from controllers.economic_mpc.layout import Bounds
 from controllers.economic_mpc.softening import GivenUp, Softening
 from controllers.economic_mpc.stage import Arguments
 from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.tree_planner import TreePlanner
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
+
+BRANCH, PROBABILITY = 5, 0.95
+"""Defaults of the tree: moves that a branch looks ahead, and what places the outer scenarios."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,8 @@ class Found:
         What it was solved with.
     given_up
         Limits that the plan does not keep.
+    tree
+        Variables of all scenarios (S, n); None without a tree.
     note
         What went wrong on the way to a valid solution; empty for nothing.
     """
@@ -41,6 +48,16 @@ class Found:
     bounds: dict[str, FloatArray]
     given_up: tuple[GivenUp, ...] = ()
     note: str = ""
+    tree: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What is done about what the estimate leaves open; see `EconomicMpc`."""
+
+    limit_probability: float | None
+    scenarios: int
+    branch: int | None
 
 
 class Planner:
@@ -50,14 +67,16 @@ class Planner:
     ----------
     setup
         Of the controller.
-    layout, bounds
-        Of the problem.
+    problem, bounds
+        The problem of one plan, and its ranges.
     limits, prices
         Values of the output limits, and prices as the problem has them.
-    chance
-        Back-off from the covariance; None for none.
     softening
         Order in which limits are given up.
+    uncertainty
+        What is done about it.
+    solver
+        Name of the solver.
     budget_s
         Wall-clock time of a solve [s]; there is no further one when it took longer.
     """
@@ -65,18 +84,34 @@ class Planner:
     def __init__(
         self,
         setup: ControllerSetup,
-        layout: StageLayout,
+        problem: OptimalControlProblem,
         bounds: Bounds,
         *,
         limits: FloatArray,
         prices: FloatArray,
-        chance: ChanceConstraint | None,
         softening: Softening,
+        uncertainty: Uncertainty,
+        solver: str,
         budget_s: float,
     ) -> None:
-        self.setup, self.layout, self.softening, self.budget_s = setup, layout, softening, budget_s
-        self._bounds = layout.bounds(bounds)
-        self._limits, self._prices, self._chance = limits, prices, chance
+        self.setup, self.layout, self.softening, self.budget_s = setup, problem.layout, softening, budget_s
+        self._bounds = self.layout.bounds(bounds)
+        self._limits, self._prices = limits, prices
+        self._chance: ChanceConstraint | None = None
+        self.tree: TreePlanner | None = None
+        asked = uncertainty.limit_probability
+        if uncertainty.scenarios != 1:
+            self.tree = TreePlanner(
+                setup,
+                problem,
+                scenarios=uncertainty.scenarios,
+                branch=min(BRANCH, self.layout.horizon) if uncertainty.branch is None else uncertainty.branch,
+                quantile=quantile_of(PROBABILITY if asked is None else asked),
+                solver="ipopt" if solver == "ipopt" else "fatrop",
+                budget_s=budget_s,
+            )
+        elif asked is not None:
+            self._chance = ChanceConstraint(setup, [e.index for e in self.layout.output_limits], asked)
         self._ode = FastCall(setup.model.ode)
 
     def find(self, solver: Solver, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate) -> Found:
@@ -111,6 +146,7 @@ class Planner:
         if solution.validity is not Validity.VALID:
             return Found(solution, status, arguments, bounds)
         given_up, note = self.softening.given_up(solution.variables, now.limits), ""
+        tree: FloatArray | None = None
         if not self.softening.is_in_order(given_up) and solution.seconds <= self.budget_s:
             tried = self.softening.in_order(now, bounds, solution)
             if tried.validity is Validity.VALID:
@@ -118,8 +154,18 @@ class Planner:
             else:
                 solution = replace(solution, seconds=tried.seconds)
                 note = "not in the stated order, since a further solve failed"
+        elif self.tree is not None and solution.seconds <= self.budget_s:
+            scenarios = self.tree.scenarios(now, held, estimate, state)
+            if not scenarios.are_alike:
+                before = state.tree if state.age == 0 else None
+                found = self.tree.find(now, bounds, solution, scenarios, before)
+                if found is None:
+                    note = "the nominal plan, since no solution was found for its scenarios"
+                else:
+                    solution, tree = found.solution, found.scenarios
+                    given_up = self.softening.given_up(solution.variables, now.limits)
         given_up = (*back, *given_up)
-        return Found(solution, Status.SOFTENED if given_up else status, arguments, bounds, given_up, note)
+        return Found(solution, Status.SOFTENED if given_up else status, arguments, bounds, given_up, note, tree)
 
     def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
         """Values of the output limits, moved inwards by what the estimate leaves open."""

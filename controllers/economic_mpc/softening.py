@@ -24,7 +24,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Bounds
-from controllers.economic_mpc.nlp_solvers import InteriorPoint
+from controllers.economic_mpc.nlp_solvers import interior_point
 from controllers.economic_mpc.stage import Arguments
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
@@ -87,7 +87,7 @@ class Softening:
     ) -> None:
         self.layout, self.bounds, self.budget_s = problem.layout, bounds, budget_s
         layout = self.layout
-        self.solver: Solver = InteriorPoint(problem, "ipopt", budget_s)
+        self.solver: Solver = interior_point(problem, "ipopt", budget_s)
         ends = [(e.output, e.name, layout.model.outputs[e.index].unit) for e in layout.output_limits]
         states = [layout.model.states[layout.model.index("states", name)] for name in layout.states]
         self._limits = [*ends, *((q.name, f"range of {q.name}", q.unit) for q in states)]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.probing import ProbeState
+from controllers.economic_mpc.scenarios import Misfit
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,10 @@ class MpcState:
         that is off does not break a limit for good.
     heard
         Time of the newest value in each of these filters [s].
+    misfit
+        How far plans were off.
+    tree
+        Scaled variables of all scenarios of the last tree (S, n); None without one.
     probe
         Last dip and what probing has cost; None without probing.
     """
@@ -41,4 +46,6 @@ class MpcState:
     age: int
     bias: tuple[float, ...]
     heard: tuple[float, ...]
+    misfit: Misfit
     probe: ProbeState | None = None
+    tree: FloatArray | None = None

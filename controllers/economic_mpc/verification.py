@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
+import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Multipliers
 
 LARGEST_VIOLATION = 1e-4
@@ -63,6 +63,20 @@ def no_solution(size: int, constraints: int, message: str, seconds: float = 0.0)
     return NlpSolution(nothing, (nothing, lost), Validity.NOT_FINITE, message, 0, seconds)
 
 
+class Nlp(Protocol):
+    """What solvers and the verification know of a problem: that of one plan, or of a tree of them."""
+
+    nlp: dict[str, Any]
+    names: list[str]
+    equality: list[bool]
+    structure: dict[str, Any]
+    constraints: ca.Function
+
+    def physical(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest value of each variable (n,)."""
+        ...
+
+
 class Solver(Protocol):
     """Finds a plan. Never raises: a failure is a value."""
 
@@ -83,10 +97,10 @@ class Verifier:
     Solvers report infeasible and NaN alike and may return inputs far outside their bounds.
     """
 
-    def __init__(self, problem: OptimalControlProblem) -> None:
+    def __init__(self, problem: Nlp) -> None:
         self.names = problem.names
         self._constraints = FastCall(problem.constraints)
-        self._lowest, self._highest = problem.layout.physical()
+        self._lowest, self._highest = problem.physical()
 
     def __call__(self, x: FloatArray, arguments: FloatArray, bounds: dict[str, FloatArray]) -> tuple[Validity, str]:
         """Validity of variables (n,), and in words what is wrong."""

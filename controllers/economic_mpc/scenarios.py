@@ -1,0 +1,115 @@
+"""What may be otherwise than the estimate says: parameters and output errors along the axes that move limited outputs.
+
+The uncertain quantities are the adapted parameters, with the covariance of the estimate, and the error of each limited
+output after a move, with the spread that past plans had (`Misfit`). Their joint covariance is S S'. With the
+steady-state derivatives G of the limited outputs, the singular value decomposition ``G S = U D V'`` gives the axes
+``S V``: the first ones move limited outputs most, the others not at all (to first order). Scenarios are a grid of three
+points on the first axes: the estimate, and ``quantile`` standard deviations to both sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from adaptive_flot.contracts import Plan
+from adaptive_flot.greybox.model import FloatArray
+
+MEMORY = 20
+"""Plans over which the spread of their errors is estimated."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far limited outputs came out from what was planned for the end of a move.
+
+    Attributes
+    ----------
+    expected
+        Time [s] and outputs (k,) that the newest plan gives for the end of its first move; None without one.
+    variance
+        Mean square of the errors (k,).
+    count
+        Plans that it rests on, at most `MEMORY`.
+    """
+
+    expected: tuple[float, tuple[float, ...]] | None
+    variance: tuple[float, ...]
+    count: int = 0
+
+    @classmethod
+    def none(cls, outputs: int) -> Misfit:
+        """Nothing was planned yet."""
+        return cls(None, (0.0,) * outputs)
+
+    def after(self, time: float, came: FloatArray, dt: float) -> Misfit:
+        """One comparison later, if the newest plan was for this time; `came` are the outputs (k,) without noise."""
+        if self.expected is None or abs(self.expected[0] - time) > dt / 2:
+            return self
+        error = came - np.array(self.expected[1])
+        if not np.isfinite(error).all():
+            return Misfit(None, self.variance, self.count)
+        count = min(self.count + 1, MEMORY)
+        before = np.array(self.variance)
+        variance = before + (error**2 - before) / count
+        return Misfit(None, tuple(variance.tolist()), count)
+
+    def planned(self, plan: Plan, outputs: tuple[str, ...]) -> Misfit:
+        """Remember what a plan gives for the end of its first move."""
+        first = tuple(float(plan.outputs[name][0]) for name in outputs)
+        return Misfit((float(plan.time[0]), first), self.variance, self.count)
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """Points of the grid, the estimate first.
+
+    Attributes
+    ----------
+    parameters
+        Adapted parameters of each (S, q).
+    biases
+        What is added to the error of each limited output (S, k).
+    """
+
+    parameters: FloatArray
+    biases: FloatArray
+
+    @property
+    def are_alike(self) -> bool:
+        """Whether all are the estimate."""
+        return bool((self.parameters == self.parameters[0]).all() and not self.biases.any())
+
+
+def grid(
+    theta: FloatArray, covariance: FloatArray, spread: FloatArray, gains: FloatArray, axes: int, quantile: float
+) -> Scenarios:
+    """Scenarios on a grid.
+
+    Parameters
+    ----------
+    theta, covariance
+        Adapted parameters (q,) and their covariance (q, q).
+    spread
+        Standard deviation of the error of each limited output (k,).
+    gains
+        Steady-state derivatives of the limited outputs by the parameters (k, q).
+    axes
+        Number a of axes; there are 3^a scenarios. Axes beyond q + k have no length.
+    quantile
+        Distance of the outer points, in standard deviations.
+    """
+    q, k = len(theta), len(spread)
+    values, vectors = np.linalg.eigh(covariance)
+    root = np.zeros((q + k, q + k))
+    root[:q, :q] = vectors * np.sqrt(np.maximum(values, 0.0))
+    root[q:, q:] = np.diag(spread)
+    effect = np.hstack([gains, np.eye(k)]) @ root
+    directions = np.linalg.svd(effect, full_matrices=True)[2].T
+    found = np.zeros((q + k, axes))
+    found[:, : min(axes, q + k)] = (root @ directions)[:, :axes]
+    points = np.array(sorted(product((0.0, -1.0, 1.0), repeat=axes), key=lambda at: sum(map(abs, at))))
+    moved = quantile * points @ found.T
+    return Scenarios(theta + moved[:, :q], moved[:, q:])

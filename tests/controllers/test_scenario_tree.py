@@ -1,0 +1,176 @@
+"""The tree of scenarios: the nominal plan where nothing is uncertain, and a first move for all where something is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox import FloatArray, Model, Stepper
+from adaptive_flot.testing import ControllerCase, controller_case
+from controllers.economic_mpc.collocation import OptimalControlProblem
+from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.nlp_solvers import InteriorPoint, make_solver
+from controllers.economic_mpc.scenario_tree import ScenarioTree
+from controllers.economic_mpc.scenarios import Misfit, grid
+from controllers.economic_mpc.verification import Validity
+from tests.controllers.test_collocation import BOUNDS, HELD, MOVE_S, arguments, cell_problem, cold
+
+COUNT, BRANCH = 3, 4
+
+
+@pytest.fixture(scope="module")
+def problem(model: Model) -> OptimalControlProblem:
+    return cell_problem(model, 6)
+
+
+@pytest.fixture(scope="module")
+def tree(problem: OptimalControlProblem) -> ScenarioTree:
+    return ScenarioTree(problem, COUNT, BRANCH)
+
+
+def solved(tree: ScenarioTree, solver: str, each: list[FloatArray], start: FloatArray) -> list[FloatArray]:
+    found = InteriorPoint(tree, tree.functions(solver), solver, 20.0)(
+        np.concatenate(each), tree.bounds(tree.layout.bounds(BOUNDS)), tree.joined([start] * tree.count)
+    )
+    assert found.validity is Validity.VALID, found.message
+    return tree.split(found.variables)
+
+
+@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+def test_equal_scenarios_are_the_nominal_plan(problem: OptimalControlProblem, model: Model, solver: str) -> None:
+    """Branches as long as the horizon, told the same as the nominal plan and earning the same, are that plan."""
+    start, now = cold(problem, model), arguments(model)
+    nominal = make_solver(problem, solver, 10.0)(now, problem.layout.bounds(BOUNDS), start)
+    whole = ScenarioTree(problem, COUNT, problem.layout.horizon)
+    for plan in solved(whole, solver, [now] * COUNT, start):
+        inputs = problem.layout.inputs_of(plan)
+        np.testing.assert_allclose(inputs / problem.layout.inputs_of(nominal.variables), 1.0, atol=1e-3)
+
+
+def test_both_solvers_find_the_same_tree(tree: ScenarioTree, model: Model) -> None:
+    """fatrop is told where the stages lie, ipopt is not: a wrong structure would show."""
+    each, start = different(model), cold(tree.problem, model)
+    plans = [solved(tree, solver, each, start) for solver in ("fatrop", "ipopt")]
+    for one, other in zip(*plans, strict=True):
+        one, other = tree.layout.inputs_of(one)[:BRANCH], tree.layout.inputs_of(other)[:BRANCH]
+        np.testing.assert_allclose(one / other, 1.0, atol=2e-3)
+
+
+def different(model: Model) -> list[FloatArray]:
+    """Arguments of the nominal cell, and of cells with another coalescence and with another grade."""
+    theta = model.parameter_values.copy()
+    theta[model.index("parameters", "C")] *= 1.05
+    return [arguments(model), arguments(model, parameters=theta), arguments(model, biases=np.array([-0.004]))]
+
+
+def test_scenarios_share_the_first_move_and_keep_states_of_their_own(tree: ScenarioTree, model: Model) -> None:
+    """Each branch is what the cell does with its own parameters under its own moves, and keeps its own grade limit."""
+    each = different(model)
+    plans = solved(tree, "fatrop", each, cold(tree.problem, model))
+    inputs = [tree.layout.inputs_of(plan)[:BRANCH] for plan in plans]
+    for other in inputs[1:]:
+        np.testing.assert_allclose(other[0], inputs[0][0], rtol=1e-6)
+        assert np.abs(other[1:] / inputs[0][1:] - 1).max() > 1e-3
+    theta = model.parameter_values.copy()
+    theta[model.index("parameters", "C")] *= 1.05
+    x0 = tree.layout.stages(plans[1])[0, : len(model.states)] * tree.layout.x_scale
+    held = np.column_stack([inputs[1][:, 0], np.full(BRANCH, HELD[1]), inputs[1][:, 1]])
+    run = Stepper(model, 1.0).simulate(x0, np.repeat(held, int(MOVE_S), axis=0), theta)
+    came = run.outputs[int(MOVE_S) - 1 :: int(MOVE_S), model.index("outputs", "concentrate_grade")]
+    planned = np.array(tree.problem.outputs(plans[1], each[1])).ravel()[:BRANCH]
+    np.testing.assert_allclose(planned, came, rtol=3e-3)
+    for plan, told in zip(plans, each, strict=True):
+        assert np.array(tree.problem.outputs(plan, told)).ravel()[:BRANCH].min() > 0.2 - 1e-4
+
+
+def test_the_derivatives_are_those_of_the_problem(tree: ScenarioTree, model: Model) -> None:
+    """Jacobian and gradients against CasADi's own, at a point that is no solution."""
+    generator = np.random.default_rng(1)
+    x = tree.joined([cold(tree.problem, model)] * COUNT) * (1 + 0.01 * generator.standard_normal(tree.size))
+    p, lam = np.concatenate(different(model)), generator.standard_normal(tree.rows)
+    symbols, of_g = (tree.nlp["x"], tree.nlp["p"]), ca.MX.sym("lam", tree.rows)
+    ours = tree.functions("fatrop")
+    jacobian = ca.Function("J", [*symbols], [ca.jacobian(tree.nlp["g"], symbols[0])])
+    g, by_x = ours["nlp_jac_g"](x, p)
+    np.testing.assert_allclose(np.array(by_x), np.array(jacobian(x, p)), atol=1e-9)
+    np.testing.assert_allclose(np.array(g), np.array(tree.constraints(x, p)), atol=1e-12)
+    slope = ca.Function("s", [*symbols, of_g], [ca.gradient(tree.nlp["f"] + ca.dot(of_g, tree.nlp["g"]), symbols[0])])
+    np.testing.assert_allclose(np.array(ours["nlp_hess_l"](x, p, 1.0, lam)[0]), np.array(slope(x, p, lam)), atol=1e-8)
+    value = ca.Function("f", [*symbols], [ca.gradient(tree.nlp["f"], symbols[0])])
+    np.testing.assert_allclose(np.array(ours["nlp_grad_f"](x, p)), np.array(value(x, p)), atol=1e-8)
+
+
+def decided(options: dict[str, Any], std: float) -> tuple[FloatArray, ControllerCase]:
+    """Inputs of 35 samples, two optimisations among them; parameters known to `std`, plans as good as they say."""
+    case = controller_case(EconomicMpc, horizon=6, solver="fatrop", **options)
+    state = case.controller.init(0.0)
+    state, _ = case.controller.decide(state, None, None)
+    rows = []
+    for sample, estimate in zip(case.samples[:35], case.estimates[:35], strict=True):
+        covariance = np.diag((std * estimate.parameters) ** 2)
+        state, decision = case.controller.decide(state, sample, replace(estimate, covariance=covariance))
+        state = replace(state, misfit=Misfit.none(1))
+        rows.append(decision.inputs)
+    return np.array(rows), case
+
+
+def test_a_tree_of_one_and_a_tree_without_spread_are_the_nominal_controller_to_the_bit() -> None:
+    plain, _ = decided({}, 0.02)
+    np.testing.assert_array_equal(decided({"scenarios": 1}, 0.02)[0], plain)
+    np.testing.assert_array_equal(decided({"scenarios": 9}, 0.0)[0], plain)
+
+
+def test_a_spread_holds_the_first_move_back() -> None:
+    """Less air than the nominal plan takes where n and C are known to 3 %: air lowers the grade."""
+    plain, case = decided({}, 0.03)
+    careful, _ = decided({"scenarios": 9}, 0.03)
+    air = case.setup.model.index("inputs", "air_flow")
+    assert careful[-1, air] < plain[-1, air] - 1e-6
+
+
+def test_the_first_axis_has_the_spread_of_the_output() -> None:
+    """Known answer: the output varies along the first axis by its whole standard deviation, along the others not."""
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
+    gains, spread = np.array([[0.5, -1.0]]), np.array([0.3])
+    found = grid(np.array([1.0, 2.0]), covariance, spread, gains, axes=2, quantile=1.5)
+    assert len(found.parameters) == 9 and not found.are_alike
+    np.testing.assert_array_equal(found.parameters[0], [1.0, 2.0])
+    moved = found.parameters - found.parameters[0]
+    outputs = (moved @ gains.T + found.biases).ravel()
+    std = np.sqrt(gains[0] @ covariance @ gains[0] + 0.09)
+    np.testing.assert_allclose(np.sort(outputs), 1.5 * std * np.repeat([-1.0, 0.0, 1.0], 3), atol=1e-12)
+
+
+def test_three_axes_of_three_quantities_have_their_whole_covariance() -> None:
+    """The outer points of each axis, one standard deviation away, add up to the covariance."""
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
+    found = grid(np.zeros(2), covariance, np.array([0.3]), np.array([[0.5, -1.0]]), axes=3, quantile=1.0)
+    axes = np.hstack([found.parameters, found.biases])[1:7:2]
+    expected = np.zeros((3, 3))
+    expected[:2, :2], expected[2, 2] = covariance, 0.09
+    np.testing.assert_allclose(axes.T @ axes, expected, atol=1e-12)
+
+
+def test_a_misfit_is_the_mean_square_of_what_came_less_what_was_planned() -> None:
+    misfit = Misfit.none(1)
+    errors = [0.002, -0.001, 0.004]
+    for k, error in enumerate(errors):
+        misfit = replace(misfit, expected=(30.0 * k, (0.2,)))
+        assert misfit.after(30.0 * k - 1.0, np.array([0.5]), 1.0) == misfit  # not yet
+        misfit = misfit.after(30.0 * k, np.array([0.2 + error]), 1.0)
+    assert misfit.variance[0] == pytest.approx(np.mean(np.square(errors))) and misfit.count == 3
+    silent = replace(misfit, expected=(90.0, (0.2,))).after(90.0, np.array([np.nan]), 1.0)
+    assert silent.variance == misfit.variance and silent.expected is None
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), [({"scenarios": 5}, "give 1, 3, 9 or 27"), ({"scenarios": 3, "branch": 7}, "give 1 to 6")]
+)
+def test_an_option_out_of_range_is_a_named_error(options: dict[str, int], message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        controller_case(EconomicMpc, horizon=6, **options)  # type: ignore[arg-type]
