@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.greybox.stepping.compiled import compiled
+
+CHUNK = 64
+"""Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""
 
 
 def core_count() -> int:
@@ -32,3 +38,12 @@ def over_rows(function: ca.Function, rows: int, *, as_machine_code: bool = False
     one = compiled(function) if as_machine_code else function
     threads = worker_threads()
     return one.map(rows, "thread", min(threads, rows)) if min(threads, rows) > 1 else one.map(rows)
+
+
+def chunks(n: int) -> list[tuple[NDArray[np.intp], int]]:
+    """Rows of each call, equally many in all so that one function serves them, and how many of these count.
+
+    The last call repeats its last row.
+    """
+    size = math.ceil(n / max(1, math.ceil(n / CHUNK)))
+    return [(np.minimum(np.arange(i, i + size), n - 1), min(size, n - i)) for i in range(0, n, max(size, 1))]

@@ -10,20 +10,19 @@ outputs and signals are those at that time.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping import step_functions
 from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.rows import chunks
 from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
 from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord, whole_record
@@ -31,10 +30,6 @@ from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord, who
 MOST_UNROLLED = 4
 """Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
 ten of them, with derivatives, takes longer to make than a record takes to simulate."""
-CHUNK = 64
-"""Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""
-
-
 LEAST_STEPS = 2500
 """Steps from which a run is worth the compiler's time, where the model asks for it."""
 
@@ -133,7 +128,7 @@ class Stepper:
             return Trajectory(t + self.dt, run.states[ends], run.outputs[ends], run.signals[ends])
         parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         by_row = np.tile(p, (len(u), 1)) if p.ndim == 1 else p
-        for rows, count in _chunks(len(u)):
+        for rows, count in chunks(len(u)):
             xs, ys, ss = self._steps(len(rows))(x[:, None], t[None, rows], u[rows].T, by_row[rows].T)
             parts.append((xs.T[:count], ys.T[:count], ss.T[:count]))
             x = parts[-1][0][-1]
@@ -184,7 +179,7 @@ class Stepper:
         q = gradient.shape[1]
         ys: list[FloatArray] = []
         dys: list[FloatArray] = []
-        for rows, count in _chunks(len(u)):
+        for rows, count in chunks(len(u)):
             held = np.tile(p[:, None], len(rows))
             steps = self._sensitivity_steps(tuple(wrt), q, len(rows))
             xs, gs, y, dy = steps(x[:, None], gradient, t[None, rows], u[rows].T, held)
@@ -245,15 +240,6 @@ class Stepper:
                 f"parameters have shape {p.shape}; give (np,) or (N, np), np = {len(self.model.parameters)}"
             )
         return u, p, t0 + self.dt * np.arange(len(u), dtype=float)
-
-
-def _chunks(n: int) -> list[tuple[NDArray[np.intp], int]]:
-    """Rows of each call, equally many in all so that one function serves them, and how many of these count.
-
-    The last call repeats its last row.
-    """
-    size = math.ceil(n / max(1, math.ceil(n / CHUNK)))
-    return [(np.minimum(np.arange(i, i + size), n - 1), min(size, n - i)) for i in range(0, n, max(size, 1))]
 
 
 def _by_columns(function: ca.Function) -> FastCall:

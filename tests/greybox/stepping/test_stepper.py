@@ -11,7 +11,8 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray, Model, Scope
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from adaptive_flot.greybox.stepping.stepper import CHUNK, MOST_UNROLLED, Stepper
+from adaptive_flot.greybox.stepping.rows import CHUNK
+from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
 NAMES = ["n", "C", "floatability.quartz"]
 
