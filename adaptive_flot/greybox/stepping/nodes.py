@@ -61,22 +61,34 @@ class Nodes:
 
 
 class Substeps(Nodes):
-    """All rows of a record, and as many instants between each two; `rows` tells the row at or before each."""
+    """All rows of a record, and instants between each two; `rows` tells the row at or before each."""
 
     def means(self, values: FloatArray) -> FloatArray:
         """What is held in each interval (M - 1, ...), the values of the row at its end; values (N, ...)."""
-        held: FloatArray = np.repeat(values[1:], (len(self.rows) - 1) // (len(values) - 1), axis=0)
+        held: FloatArray = values[1:][self.rows[:-1]]
         return held
 
 
-def substeps(record: Dataset, count: int) -> Substeps:
-    """Nodes that part each interval between two rows of a record into `count` equal ones."""
+def substeps(record: Dataset, counts: int | IntArray) -> Substeps:
+    """Nodes that part each interval between two rows into equal ones: as many in each, or `counts` (N - 1,)."""
     n = len(record)
-    rows = np.arange((n - 1) * count + 1, dtype=np.intp)
-    step = record.dt / count
-    inputs = np.column_stack([np.repeat(record.inputs[1:], count, axis=0), np.full(len(rows) - 1, step)])
-    weights = csr_array((np.ones(n), (np.arange(n), np.arange(n) * count)), shape=(n, len(rows)))
-    return Substeps(rows // count, record.time[0] + step * rows, inputs, weights)
+    each = np.broadcast_to(np.asarray(counts, dtype=np.intp), (n - 1,))
+    ends = np.concatenate([[0], np.cumsum(each)])
+    rows = np.append(np.repeat(np.arange(n - 1), each), n - 1)
+    fraction = (np.arange(ends[-1] + 1) - ends[rows]) / np.append(each, 1)[rows]
+    times = record.time[0] + record.dt * (rows + fraction)
+    inputs = np.column_stack([np.repeat(record.inputs[1:], each, axis=0), np.repeat(record.dt / each, each)])
+    weights = csr_array((np.ones(n), (np.arange(n), ends)), shape=(n, len(rows)))
+    return Substeps(rows, times, inputs, weights)
+
+
+def rows_after_moves(record: Dataset, share: float, rows: int) -> NDArray[np.bool_]:
+    """Intervals (N - 1,) in which an input has moved by more than a share of its range, and `rows` intervals after."""
+    u = record.inputs
+    moved = (np.abs(np.diff(u, axis=0)) > share * np.ptp(u, axis=0)).any(axis=1)
+    moved[0] = True  # a record may start anywhere
+    reach = np.convolve(moved, np.ones(rows + 1))[: len(moved)]
+    return np.asarray(reach > 0.5)
 
 
 def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:

@@ -17,7 +17,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.fast_step import closed_phi
-from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps
+from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, rows_after_moves, substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import flotation
 from tests.discovery.heated import heated_tank, tank_record
@@ -128,3 +128,22 @@ def test_a_run_over_the_parts_of_coarse_rows_is_that_of_the_rows() -> None:
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
     held = nodes.means(record.inputs)
     np.testing.assert_array_equal(held, nodes.inputs[:, :-1])
+
+
+def test_steps_are_short_after_a_move_and_long_at_rest() -> None:
+    """Uneven parts give the run of the finest, row by row, where nothing has moved for a while."""
+    record, model = tank_record(rows=60), replace(heated_tank(), max_step_s=10.0)
+    fresh = rows_after_moves(record, 0.02, 3)
+    moved = np.flatnonzero((np.diff(record.inputs, axis=0) != 0).any(axis=1))
+    assert fresh[0] and fresh[moved].all() and not fresh.all()
+    assert not fresh[np.setdiff1d(np.arange(59), [k + i for k in (0, *moved) for i in range(4)])].any()
+    counts = np.where(fresh, 6, 1)
+    nodes = substeps(record, counts)
+    assert len(nodes.rows) == counts.sum() + 1
+    assert nodes.inputs[:, -1].sum() == pytest.approx(59 * record.dt)
+    np.testing.assert_array_equal(nodes.spread(nodes.times), record.time)
+    np.testing.assert_array_equal(nodes.means(record.inputs), nodes.inputs[:, :-1])
+    x0, p = np.array([305.0]), model.parameter_values
+    run = RecordSimulator(model, record.dt, nodes).outputs(record, x0, p)
+    finest = RecordSimulator(model, record.dt, substeps(record, 6)).outputs(record, x0, p)
+    np.testing.assert_allclose(run, finest, rtol=1e-5)
