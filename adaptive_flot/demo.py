@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from adaptive_flot.console import print_fits, progress_bar
+from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.report.run.page import write_run_report
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_summary, write_json
@@ -20,6 +21,8 @@ def main() -> None:
     """Run, print, write; results go to results/demo."""
     begin = time.perf_counter()
     scenarios = [load_scenario(name) for name in SCENARIOS]
+    if compiler_problem() is None:  # the same numbers to rounding, in a quarter of the time
+        scenarios = [s.compiled() for s in scenarios]
     runs_each = [len(s.file.estimators) * len(SEEDS) for s in scenarios]
     print(f"The paper's scenarios with ramps and with steps, {len(SEEDS)} seeds: {sum(runs_each)} runs")
     with progress_bar("runs", sum(runs_each)) as advance:

@@ -32,6 +32,9 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.step_functions import sensitivity_step, step
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.runner.commands.run import AT_ONCE, run_one
+from adaptive_flot.runner.commands.side_by_side import run_side_by_side
+from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from benchmarks import jax_step, scipy_reference
@@ -167,6 +170,23 @@ def rpem(case: _Case) -> list[tuple[Way, float]]:
     )
 
 
+def study() -> list[tuple[Way, float]]:
+    """Processor time a run of `paper_1000`, with its batch fit and its summary; a step is a run."""
+    scenario = load_scenario("paper_scenario_1").compiled()
+    prepared, seeds = Prepared.of(scenario, ["rpem"]), range(1, AT_ONCE + 1)
+
+    def together() -> object:
+        drawn = [Realisation(scenario, seed) for seed in seeds]
+        return run_side_by_side(prepared, "rpem", "schedule", drawn, [{} for _ in drawn])
+
+    return _timed(
+        [
+            Way(f"{AT_ONCE} seeds side by side", together, AT_ONCE),
+            Way("one seed alone", lambda: run_one(prepared, "rpem", "schedule", Realisation(scenario, 1), {}), 1),
+        ]
+    )
+
+
 def _timed(ways: list[Way]) -> list[tuple[Way, float]]:
     for way in ways:
         way.work()
@@ -215,6 +235,11 @@ def main() -> None:
             rate = f"{1 / (taken * RECORD_S):.1f}"
             table.add_row(way.what, f"{1e9 * taken:.0f}", rate, f"{taken / found[0][1]:.1f}")
         console.print(table)
+    runs = Table("way", "ms a run", "times as long", title="A run of the study paper_1000")
+    found = study()
+    for way, taken in found:
+        runs.add_row(way.what, f"{1e3 * taken:.1f}", f"{taken / found[0][1]:.1f}")
+    console.print(runs)
     console.print(_threads(case))
 
 

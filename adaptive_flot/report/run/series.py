@@ -89,7 +89,14 @@ class CaseRuns:
 
     def shown(self, run: Run) -> pd.DataFrame:
         """Rows of a run that the report shows and the fits use: t > `fits_after_s`."""
-        return run.table[run.table["time_s"] > self.scenario.fits_after + 1e-9]
+        if id(run) not in self._shown:
+            self._shown[id(run)] = run, run.table[run.table["time_s"] > self.scenario.fits_after + 1e-9]
+        return self._shown[id(run)][1]
+
+    @cached_property
+    def _shown(self) -> dict[int, tuple[Run, pd.DataFrame]]:
+        """What `shown` has cut out, with its run: a page asks for it ten times a run."""
+        return {}
 
 
 def cases(results: Sequence[tuple[Scenario, Sequence[Run]]]) -> list[CaseRuns]:

@@ -19,6 +19,7 @@ from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.ekf import Ekf
 from estimators.fixed import Fixed
+from estimators.mhe import Mhe
 from estimators.rpem import Rpem, rpem_full
 from estimators.rpem.state import RpemState
 from tests.estimators.toys import decay
@@ -36,6 +37,7 @@ ESTIMATORS: dict[str, Make] = {
     "rpem_full": rpem_full,
     "rpem_full, correcting": lambda s: rpem_full(s, correct_state={"y": 0.02}),
     "ekf": Ekf,
+    "fixed": Fixed,
     "ekf, integrated": lambda s: Ekf(s, walk="integrated", state_noise=1e-3),
 }
 
@@ -105,7 +107,7 @@ def test_estimates_are_those_of_each_member_alone(name: str, machine_code: bool)
     assert {s for track in tracks for s in track.statuses} >= {Status.OK, Status.MISSING}
 
 
-@pytest.mark.parametrize("name", ["rpem", "rpem_full", "ekf"])
+@pytest.mark.parametrize("name", ["rpem", "rpem_full", "ekf", "fixed"])
 def test_a_sample_that_is_no_number_is_skipped_by_its_own_member_alone(name: str) -> None:
     priors, record = members()
     record.inputs[2, 30] = np.nan
@@ -114,7 +116,7 @@ def test_a_sample_that_is_no_number_is_skipped_by_its_own_member_alone(name: str
     assert np.isfinite(tracks[2].parameters).all()
 
 
-@pytest.mark.parametrize("name", ["rpem", "ekf"])
+@pytest.mark.parametrize("name", ["rpem", "ekf", "fixed"])
 def test_what_is_known_of_parameters_is_used(name: str) -> None:
     priors, record = members()
     p = decay().parameter_values * np.linspace(0.9, 1.1, MEMBERS)[:, None, None]
@@ -140,7 +142,7 @@ class Named(Rpem):
 def test_an_update_of_its_own_is_not_passed_over() -> None:
     setup = Setup(decay(), 0.5, ("a", "b"), ("y",))
     assert tracks_ensembles(Rpem(setup)) and tracks_ensembles(Named(setup))
-    assert not tracks_ensembles(Other(setup)) and not tracks_ensembles(Fixed(setup))
+    assert not tracks_ensembles(Other(setup)) and not tracks_ensembles(Mhe(setup))
 
 
 @needs_compiler

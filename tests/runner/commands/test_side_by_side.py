@@ -98,18 +98,19 @@ def test_a_seed_that_can_not_run_does_not_stop_the_others(
 def test_the_command_takes_seeds_together_where_it_may(
     write_scenario: WriteScenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In the order of the seeds, whatever went side by side; `fixed` does not."""
-    groups: list[list[int]] = []
+    """In the order of the seeds, whatever went side by side; `oracle` does not."""
+    groups: list[tuple[str, list[int]]] = []
 
     def seen(prepared: Prepared, name: str, controller: str, realisations: list[Realisation], fits: Any) -> Any:
-        groups.append([r.seed for r in realisations])
+        groups.append((name, [r.seed for r in realisations]))
         return run_side_by_side(prepared, name, controller, realisations, fits)
 
     monkeypatch.setattr(run_module, "run_side_by_side", seen)
     monkeypatch.setattr(run_module, "AT_ONCE", 2)
-    runs = run_scenario(load_scenario(write_scenario()).compiled(), seeds=[3, 1, 2])
-    assert [(r.seed, r.estimator) for r in runs] == [(s, e) for s in (3, 1, 2) for e in ("fixed", "rpem")]
-    assert groups == [[3, 1], [2]]
+    names = ["oracle", "fixed", "rpem"]
+    runs = run_scenario(load_scenario(write_scenario()).compiled(), names, seeds=[3, 1, 2])
+    assert [(r.seed, r.estimator) for r in runs] == [(s, e) for s in (3, 1, 2) for e in names]
+    assert groups == [("fixed", [3, 1]), ("rpem", [3, 1]), ("fixed", [2]), ("rpem", [2])]
 
 
 class Watching(Schedule):
@@ -125,7 +126,7 @@ class Watching(Schedule):
 @pytest.mark.parametrize(
     ("changes", "estimator", "controller"),
     [
-        ({}, "fixed", "schedule"),
+        ({}, "imm", "schedule"),
         ({}, "oracle", "schedule"),
         ({}, "rpem", f"{__file__}:Watching"),
         ({"plant": {"integrator": "accurate"}}, "rpem", "schedule"),
