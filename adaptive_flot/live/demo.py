@@ -1,6 +1,7 @@
 """`make live-demo`: a test plant, a link and its page on this machine with one command, until Ctrl-C.
 
-The plant has an effect that the link's model lacks. Discovery finds it after some minutes; a person then decides.
+The plant has an effect that the link's model lacks. Discovery finds it after some ten minutes; a person then decides.
+It plays twice as fast as real time: a decision that has to give up a limit takes up to half a second.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from adaptive_flot.live.plant.server import ServerPlace
 from adaptive_flot.live.program import live
 from adaptive_flot.runner.scenario.loading import load_scenario
 
-SCENARIO, SPEED, HOURS = "undeclared_effect", 5.0, 24.0
+SCENARIO, SPEED, HOURS = "undeclared_effect", 2.0, 24.0
 CASE = ("economic_mpc", "rpem_discovery")
 SHADOWS = {"fixed": {"estimator": "fixed", "controller": "economic_mpc"}}
 FOLDER = Path("results/live_demo")
@@ -45,7 +46,8 @@ def main(folder: Path = FOLDER, port: int = 4840, page: int = 8050, cycles: int 
     write_text(link, link_text(scenario, url, certificates, speed=SPEED, page=page, case=CASE, shadows=SHADOWS))
     command = [sys.executable, "-m", "adaptive_flot", "serve-plant", SCENARIO, "--auto-operator"]
     options = {"--certificates": certificates, "--speed": SPEED, "--hours": HOURS, "--port": port}
-    plant = subprocess.Popen([*command, *(str(part) for pair in options.items() for part in pair)])
+    arguments = [str(part) for pair in options.items() for part in pair]
+    plant = subprocess.Popen([*command, *arguments], start_new_session=True)  # Ctrl-C reaches the link alone
     try:
         print(f"Memory: {folder / 'live.sqlite'}; read it with `adaptive-flot export {link} --out record.csv`")
         print(f"Token for acting: {token_file(certificates, 'act').read_text().strip()}")
