@@ -73,7 +73,7 @@ def long_link(folder: Path, name: str, cycles: int) -> Link:
 
 def lockstep_figures(found: Found) -> dict[str, object]:
     """Figures of a run in one process, by name."""
-    audit, milliseconds = found.audit, 1000 * found.seconds
+    audit = found.audit
     return {
         "cycles": audit.cycles,
         "cycles by mode": dict(audit.modes),
@@ -86,11 +86,26 @@ def lockstep_figures(found: Found) -> dict[str, object]:
         "rows lost, doubled": f"{found.rows.lost}, {found.rows.doubled} of {found.rows.cycles} cycles",
         "largest bump at a change of mode [rate limits]": round(audit.bump, 6),
         "sheddings for bad cycles; cycles each, most": f"{len(audit.shed_cycles)}; {max(audit.shed_cycles, default=0)}",
-        "cycle with storage, median and 99 % [ms]": quantiles(milliseconds[:, 0]),
-        "the same, time of the processor [ms]": quantiles(milliseconds[:, 1]),
+        **times(found),
         "load of the machine, least and most": "{:.1f} and {:.1f}".format(*found.load),
         "memory growth after the first 1000 cycles [MB]": round(found.grown_mb, 1),
     }
+
+
+def times(found: Found) -> dict[str, object]:
+    """Times of cycles with storage, by the clock and of the processor, with and without a solve."""
+    figures: dict[str, object] = {}
+    kinds = {
+        "cycle with storage": found.solves | True,
+        "... that solves": found.solves,
+        "... that does not": ~found.solves,
+    }
+    for kind, rows in kinds.items():
+        for column, what in enumerate(("by the clock", "of the processor")):
+            if rows.any():
+                milliseconds = 1000 * found.seconds[rows, column]
+                figures[f"{kind}, {what}: median and 99 % [ms]"] = quantiles(milliseconds)
+    return figures
 
 
 def quantiles(milliseconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

@@ -35,6 +35,8 @@ class Found:
     ----------
     seconds
         Of each cycle, by the clock and of the processor (cycles, 2).
+    solves
+        Whether a solver ran in it (cycles,).
     load
         Average number of processes that wanted a core in a minute, least and most during the run.
     """
@@ -42,6 +44,7 @@ class Found:
     audit: Audit
     rows: Rows
     seconds: np.ndarray[tuple[int, int], np.dtype[np.float64]]
+    solves: np.ndarray[tuple[int], np.dtype[np.bool_]]
     grown_mb: float
     counted: dict[str, int]
     sessions: int
@@ -83,7 +86,7 @@ class Lockstep:
 
     def run(self, cycles: int) -> Found:
         """Run so many cycles."""
-        seconds, begin = np.zeros((cycles, 2)), 0.0
+        seconds, solves, begin = np.zeros((cycles, 2)), np.zeros(cycles, dtype=bool), 0.0
         loads: list[float] = []
         for k in range(cycles):
             begin = resident_mb() if k == WARM else begin
@@ -92,7 +95,7 @@ class Lockstep:
             self._next_event()
             self.direct.interval()
             self.audit.interval(self.direct.state.panel)
-            seconds[k] = self._one()
+            seconds[k], solves[k] = self._one()
             self._operate()
         grown = resident_mb() - begin if cycles > WARM else float("nan")
         engine = open_database("sqlite:///bench.sqlite", self.folder)
@@ -100,7 +103,7 @@ class Lockstep:
         counted = {**self.counted, **self.faults.counted}
         refused = self.direct.state.panel.refused
         load = min(loads), max(loads)
-        return Found(self.audit, rows, seconds, grown, counted, len(self.stepped), refused, load)
+        return Found(self.audit, rows, seconds, solves, grown, counted, len(self.stepped), refused, load)
 
     def _next_event(self) -> None:
         kind, left = self._event or (None, 0)
@@ -121,8 +124,8 @@ class Lockstep:
             panel = replace(self.direct.state.panel, active=False, asked=False, remote={})
             self.direct.state = replace(self.direct.state, panel=panel)
 
-    def _one(self) -> tuple[float, float]:
-        """One cycle; how long it took by the clock, and of the processor [s]."""
+    def _one(self) -> tuple[tuple[float, float], bool]:
+        """One cycle; how long it took by the clock and of the processor [s], and whether a solver ran."""
         kind = None if self._event is None else self._event[0]
         cut_off = kind in ("hung server", "server killed")
         snapshot = self.direct.snapshot(alive=not cut_off, in_time=self._in_time, written=self._well)
@@ -137,7 +140,8 @@ class Lockstep:
         taken = self._take(outcome, cut_off, late, refusing)
         self._well = taken or not outcome.writes
         self.audit.cycle(before, snapshot, outcome, self.faults, taken and not late, not cut_off)
-        return seconds
+        solves = outcome.decision is not None and bool(np.isfinite(outcome.decision.solve_seconds))
+        return seconds, solves
 
     def _take(self, outcome: Outcome, cut_off: bool, late: bool, refusing: bool) -> bool:
         """What reaches the plant; whether it took the set-points."""
