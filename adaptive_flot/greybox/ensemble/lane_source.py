@@ -9,32 +9,12 @@ x^y is exp(y log|x|) with the signs and special values of C. Its relative error 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import casadi as ca
 
 from adaptive_flot.greybox.stepping.compiled import CompileError
-
-_CODES = {getattr(ca, name): name[3:] for name in dir(ca) if name.startswith("OP_")}
-_UNARY: Mapping[str, str] = {
-    **{"ASSIGN": "{0}", "NEG": "-{0}", "SQ": "{0}*{0}", "TWICE": "2.*{0}", "INV": "1./{0}", "NOT": "{0}==0."},
-    **{"SIGN": "lane_sign({0})", "FABS": "fabs({0})"},
-    **{
-        name: name.lower() + "({0})"
-        for name in (
-            *("EXP", "LOG", "SQRT", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SINH", "COSH", "TANH", "ASINH"),
-            *("ACOSH", "ATANH", "FLOOR", "CEIL", "ERF", "LOG1P", "EXPM1"),
-        )
-    },
-}
-_BINARY: Mapping[str, str] = {
-    **{"ADD": "{0}+{1}", "SUB": "{0}-{1}", "MUL": "{0}*{1}", "DIV": "{0}/{1}"},
-    **{"LT": "{0}<{1}", "LE": "{0}<={1}", "EQ": "{0}=={1}", "NE": "{0}!={1}"},
-    **{"AND": "({0}!=0.)&({1}!=0.)", "OR": "({0}!=0.)|({1}!=0.)", "IF_ELSE_ZERO": "{0}!=0.?{1}:0."},
-    **{"FMIN": "lane_min({0},{1})", "FMAX": "lane_max({0},{1})"},
-    **{"POW": "lane_pow({0},{1})", "CONSTPOW": "lane_pow({0},{1})"},
-    **{name: name.lower() + "({0},{1})" for name in ("FMOD", "REMAINDER", "ATAN2", "COPYSIGN", "HYPOT")},
-}
+from adaptive_flot.greybox.stepping.whole_record.statements import BINARY, CODES, UNARY
 
 _HEAD = """
 #include <math.h>
@@ -42,9 +22,9 @@ _HEAD = """
 #define L {lanes}
 #define INLINE static inline __attribute__((always_inline)) /* else the loop is none of vector instructions */
 {simd}
-INLINE double lane_sign(double x) {{ return x < 0. ? -1. : x > 0. ? 1. : x; }}
-INLINE double lane_min(double x, double y) {{ double r = x < y ? x : y; return y != y ? x : r; }}
-INLINE double lane_max(double x, double y) {{ double r = x > y ? x : y; return y != y ? x : r; }}
+INLINE double sign(double x) {{ return x < 0. ? -1. : x > 0. ? 1. : x; }}
+INLINE double least(double x, double y) {{ double r = x < y ? x : y; return y != y ? x : r; }}
+INLINE double most(double x, double y) {{ double r = x > y ? x : y; return y != y ? x : r; }}
 {power}
 """
 _VECTOR_FUNCTIONS = (
@@ -53,14 +33,14 @@ _VECTOR_FUNCTIONS = (
 )
 _VECTOR_PAIRS = ("atan2", "hypot")
 _DECLARED = "#pragma omp declare simd notinbranch simdlen(L)\nextern double {0}({1}) __attribute__((const));"
-_SCALAR_POWER = "#define lane_pow pow"
+_SCALAR_POWER = "#define power pow"
 _VECTOR_POWER = """
-INLINE double lane_pow(double x, double y) {
-    double size = log(fabs(x)), power = y * size;
+INLINE double power(double x, double y) {
+    double size = log(fabs(x)), exponent = y * size;
     double whole = floor(y) == y, even = floor(0.5 * y) == 0.5 * y, below = x < 0.;
-    power = (y == 0.) | (size == 0.) ? 0. : power;                             /* 1, whatever the other argument */
-    double sign = 1. + (whole - even) * (copysign(1., x) - 1.);                /* -1 for an odd power of a negative x */
-    double r = sign * exp(power);
+    exponent = (y == 0.) | (size == 0.) ? 0. : exponent;                       /* 1, whatever the other argument */
+    double side = 1. + (whole - even) * (copysign(1., x) - 1.);                /* -1 for an odd power of a negative x */
+    double r = side * exp(exponent);
     return below - below * whole > 0. ? NAN : r;
 }
 """
@@ -169,12 +149,12 @@ def _statements(function: ca.Function, starts: Sequence[int], ends: Sequence[int
         "CONST": lambda i, o, k: f"a{o[0]}={_number(function.instruction_constant(k))};",
     }
     for k in range(function.n_instructions()):
-        name = _CODES.get(function.instruction_id(k), "?")
+        name = CODES.get(function.instruction_id(k), "?")
         i, o = function.instruction_input(k), function.instruction_output(k)
         if name in make:
             body.append(make[name](i, o, k))
-        elif name in _UNARY or name in _BINARY:
-            template = _UNARY[name] if name in _UNARY else _BINARY[name]
+        elif name in UNARY or name in BINARY:
+            template = UNARY[name] if name in UNARY else BINARY[name]
             body.append(f"a{o[0]}={template.format(*(f'a{j}' for j in i))};")
         else:
             raise CompileError(f"{function.name()} has the operation {name}, which has no form in lanes")

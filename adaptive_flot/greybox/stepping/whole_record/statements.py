@@ -12,8 +12,8 @@ import casadi as ca
 
 from adaptive_flot.greybox.stepping.compiled import CompileError
 
-_CODES = {getattr(ca, name): name[3:] for name in dir(ca) if name.startswith("OP_")}
-_UNARY: Mapping[str, str] = {
+CODES = {getattr(ca, name): name[3:] for name in dir(ca) if name.startswith("OP_")}
+UNARY: Mapping[str, str] = {
     **{"ASSIGN": "{0}", "NEG": "-{0}", "SQ": "{0}*{0}", "TWICE": "2.*{0}", "INV": "1./{0}", "NOT": "{0}==0."},
     **{"SIGN": "sign({0})", "FABS": "fabs({0})"},
     **{
@@ -24,19 +24,21 @@ _UNARY: Mapping[str, str] = {
         )
     },
 }
-_BINARY: Mapping[str, str] = {
+BINARY: Mapping[str, str] = {
     **{"ADD": "{0}+{1}", "SUB": "{0}-{1}", "MUL": "{0}*{1}", "DIV": "{0}/{1}"},
     **{"LT": "{0}<{1}", "LE": "{0}<={1}", "EQ": "{0}=={1}", "NE": "{0}!={1}"},
     **{"AND": "({0}!=0.)&({1}!=0.)", "OR": "({0}!=0.)|({1}!=0.)", "IF_ELSE_ZERO": "{0}!=0.?{1}:0."},
     **{"FMIN": "least({0},{1})", "FMAX": "most({0},{1})"},
-    **{"POW": "pow({0},{1})", "CONSTPOW": "pow({0},{1})"},
+    **{"POW": "power({0},{1})", "CONSTPOW": "power({0},{1})"},
     **{name: name.lower() + "({0},{1})" for name in ("FMOD", "REMAINDER", "ATAN2", "COPYSIGN", "HYPOT")},
 }
 HELPERS = """
 static inline double sign(double x) { return x < 0. ? -1. : x > 0. ? 1. : x; }
 static inline double least(double x, double y) { double r = x < y ? x : y; return y != y ? x : r; }
 static inline double most(double x, double y) { double r = x > y ? x : y; return y != y ? x : r; }
+#define power pow
 """
+"""What the operations call beside the mathematical functions of C."""
 STRUCTURAL = frozenset({0.0, 1.0, -1.0, 2.0, 0.5})
 """Numbers that stand in the code itself: they are part of the form of an equation."""
 
@@ -75,7 +77,7 @@ def c_function(function: ca.Function, numbers: Numbers) -> str:
     places: set[int] = set()
     body: list[str] = []
     for k in range(function.n_instructions()):
-        operation = _CODES.get(function.instruction_id(k), "?")
+        operation = CODES.get(function.instruction_id(k), "?")
         i, o = function.instruction_input(k), function.instruction_output(k)
         if operation == "OUTPUT":
             body.append(f"o{o[0]}[{o[1]}]=a{i[0]};")
@@ -85,8 +87,8 @@ def c_function(function: ca.Function, numbers: Numbers) -> str:
             body.append(f"a{o[0]}=i{i[0]}[{i[1]}];")
         elif operation == "CONST":
             body.append(f"a{o[0]}={_constant(function.instruction_constant(k), numbers)};")
-        elif operation in _UNARY or operation in _BINARY:
-            template = _UNARY[operation] if operation in _UNARY else _BINARY[operation]
+        elif operation in UNARY or operation in BINARY:
+            template = UNARY[operation] if operation in UNARY else BINARY[operation]
             body.append(f"a{o[0]}={template.format(*(f'a{j}' for j in i))};")
         else:
             raise CompileError(f"{name} has the operation {operation}, which has no form in C")
