@@ -16,13 +16,14 @@ from rich.table import Table
 from adaptive_flot.greybox.data.tables import read_table, write_table
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks.mismatched_plants.plants import CHANCE, COUNT, plant
+from benchmarks.mismatched_plants.plants import CHANCE, COUNT, TREE, plant
 
 MPC, ORACLE, PI = "economic_mpc", "oracle", "pi"
 LOOPS = {
     "ekf": (MPC, "ekf"),
     "adaptive_imm": (MPC, "adaptive_imm"),
     "adaptive_imm, limit_probability 0.95": (CHANCE, "adaptive_imm"),
+    "adaptive_imm, scenarios 9": (TREE, "adaptive_imm"),
     ORACLE: (MPC, ORACLE),
     PI: (PI, "fixed"),
 }
@@ -82,10 +83,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("results/mismatched_plants"))
     parser.add_argument("--plants", type=int, default=COUNT)
+    parser.add_argument("--first-plant", type=int, default=0, help="number of the first plant")
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, from 1 on")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    jobs = [(k, seed) for seed in range(1, options.seeds + 1) for k in range(options.plants)]
+    jobs = [
+        (k, seed)
+        for seed in range(1, options.seeds + 1)
+        for k in range(options.first_plant, options.first_plant + options.plants)
+    ]
     parts = {(k, seed): options.out / f"plant{k:02d}-seed{seed}.parquet" for k, seed in jobs}
     for (k, seed), part in track(parts.items(), "mismatched plants", console=Console(stderr=True)):
         if not part.is_file():

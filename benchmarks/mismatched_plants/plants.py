@@ -22,6 +22,8 @@ from adaptive_flot.runner.scenario.scenario import Scenario
 
 CHANCE = "economic_mpc_chance"
 """The controller that backs off from the covariance of the estimate."""
+TREE = "economic_mpc_tree"
+"""The controller whose first move keeps the limits in nine scenarios."""
 BASE, COUNT, FIRST_SEED = "closed_loop_drift", 30, 7300
 WIDTHS = {
     "floatability.chalcopyrite": 0.2,
@@ -91,6 +93,7 @@ def _written(number: int, generator: np.random.Generator, folder: Path) -> Path:
     content["description"] = f"Mismatched plant {number}"
     chance = {"solver": "fatrop", "limit_probability": 0.95}
     content["controllers"][CHANCE] = {"use": "economic_mpc", "options": chance}
+    content["controllers"][TREE] = {"use": "economic_mpc", "options": {"solver": "fatrop", "scenarios": 9}}
     content["disturbances"] = {
         "feed_flow_m3_s": {"noise_std": 8.0e-7},
         "feed_concentration.chalcopyrite": {"measured": False},

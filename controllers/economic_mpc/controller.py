@@ -110,6 +110,8 @@ class EconomicMpc:
                 f"economic_mpc: limits have ranges of {list(limits.inputs)} and largest moves of {list(limits.moves)}; "
                 "give both for each input that is to be moved"
             )
+        if probing is not None and scenarios != 1:
+            raise ModelError("economic_mpc: probing compares nominal plans; give it or scenarios, not both")
         self.setup = setup
         self.problem = OptimalControlProblem(setup.model, economics, limits, horizon, move_s)
         self.layout = self.problem.layout
@@ -146,7 +148,7 @@ class EconomicMpc:
     def with_failing_solver(self) -> EconomicMpc:
         """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
         drill = copy.copy(self)
-        drill.solver = FailingSolver()
+        drill.solver, drill.planner = FailingSolver(), self.planner.without_tree()
         return drill
 
     def take_over(
@@ -202,8 +204,9 @@ class EconomicMpc:
         if solution.validity is Validity.VALID:
             told = self._tell(estimate.time, found)
             misfit = state.misfit.planned(told.plan, self.layout.outputs)
+            multipliers = solution.multipliers if found.tree is None else None
             plan = replace(
-                state, plan=solution.variables, multipliers=solution.multipliers, age=0, misfit=misfit, tree=found.tree
+                state, plan=solution.variables, multipliers=multipliers, age=0, misfit=misfit, tree=found.tree
             )
             first = self.layout.inputs_of(solution.variables)[0]
             return self._apply(plan, held, first, found.status, solution, told)

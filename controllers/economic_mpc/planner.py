@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -141,7 +142,15 @@ class Planner:
             estimate.time,
         )
         bounds, back = self.softening.way_back(self._bounds, held[moved])
-        arguments = now.vector()
+        arguments, spent = now.vector(), 0.0
+        scenarios = None if self.tree is None else self.tree.scenarios(now, held, estimate, state)
+        if self.tree is not None and scenarios is not None and state.tree is not None and state.age == 0:
+            ahead = self.tree.find(now, bounds, [self.layout.shifted(each) for each in state.tree], scenarios)
+            given_up = self.softening.given_up(ahead.solution.variables, now.limits)
+            if ahead.scenarios is not None and self.softening.is_in_order(given_up):
+                told = Status.SOFTENED if back or given_up else Status.OK
+                return Found(ahead.solution, told, arguments, bounds, (*back, *given_up), "", ahead.scenarios)
+            spent = ahead.solution.seconds
         solution, status = self._solve(solver, state, arguments, bounds, held, estimate, theta)
         if solution.validity is not Validity.VALID:
             return Found(solution, status, arguments, bounds)
@@ -154,18 +163,24 @@ class Planner:
             else:
                 solution = replace(solution, seconds=tried.seconds)
                 note = "not in the stated order, since a further solve failed"
-        elif self.tree is not None and solution.seconds <= self.budget_s:
-            scenarios = self.tree.scenarios(now, held, estimate, state)
-            if not scenarios.are_alike:
-                before = state.tree if state.age == 0 else None
-                found = self.tree.find(now, bounds, solution, scenarios, before)
-                if found is None:
-                    note = "the nominal plan, since no solution was found for its scenarios"
-                else:
-                    solution, tree = found.solution, found.scenarios
-                    given_up = self.softening.given_up(solution.variables, now.limits)
+        elif self.tree is not None and scenarios is not None and spent + solution.seconds <= self.budget_s:
+            found = self.tree.find(now, bounds, [solution.variables] * len(scenarios.parameters), scenarios)
+            spent += found.solution.seconds
+            if found.scenarios is None:
+                note = "the nominal plan, since no solution was found for its scenarios"
+            else:
+                spent += solution.seconds
+                solution, tree = replace(found.solution, seconds=0.0), found.scenarios
+                given_up = self.softening.given_up(solution.variables, now.limits)
+        solution = replace(solution, seconds=solution.seconds + spent)
         given_up = (*back, *given_up)
         return Found(solution, Status.SOFTENED if given_up else status, arguments, bounds, given_up, note, tree)
+
+    def without_tree(self) -> Planner:
+        """The same planner for the estimate alone."""
+        plain = copy.copy(self)
+        plain.tree = None
+        return plain
 
     def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
         """Values of the output limits, moved inwards by what the estimate leaves open."""

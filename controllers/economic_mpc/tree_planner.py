@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,14 +25,14 @@ SIZES = {3: 1, 9: 2, 27: 3}
 
 @dataclass(frozen=True)
 class TreePlan:
-    """The nominal plan of a solved tree, and the variables of all scenarios (S, n)."""
+    """The nominal plan of a solved tree, and the variables of all scenarios (S, n); None where it was not solved."""
 
     solution: NlpSolution
-    scenarios: FloatArray
+    scenarios: FloatArray | None
 
 
 class TreePlanner:
-    """Solves the tree from the nominal plan.
+    """Solves the tree.
 
     Parameters
     ----------
@@ -77,38 +78,31 @@ class TreePlanner:
         self._adapted = setup.model.indices("parameters", setup.parameters)
         self._gains = SteadyGains(setup, setup.model.indices("outputs", self.layout.outputs))
 
-    def scenarios(self, now: Arguments, held: FloatArray, estimate: Estimate, state: MpcState) -> Scenarios:
-        """Scenarios of a decision; see `scenarios.py`."""
+    def scenarios(self, now: Arguments, held: FloatArray, estimate: Estimate, state: MpcState) -> Scenarios | None:
+        """Scenarios of a decision, see `scenarios.py`; None where they are all alike, or not finite."""
         gains = self._gains(now.time, now.state, held, now.parameters)
         theta, spread = estimate.parameters, np.sqrt(np.array(state.misfit.variance))
+        if not (np.isfinite(estimate.covariance).all() and np.isfinite(theta).all()):
+            return None
         found = grid(theta, estimate.covariance, spread, gains, self._axes, self._quantile)
         inside = np.clip(found.parameters, np.minimum(self._lowest, theta), np.maximum(self._highest, theta))
-        return Scenarios(inside, found.biases)
+        scenarios = Scenarios(inside, found.biases)
+        return None if scenarios.are_alike else scenarios
 
     def find(
-        self,
-        now: Arguments,
-        bounds: dict[str, FloatArray],
-        nominal: NlpSolution,
-        scenarios: Scenarios,
-        before: FloatArray | None,
-    ) -> TreePlan | None:
-        """Solve; None where no valid solution was found.
+        self, now: Arguments, bounds: dict[str, FloatArray], start: Sequence[FloatArray], scenarios: Scenarios
+    ) -> TreePlan:
+        """Solve; a failure is a value.
 
         Parameters
         ----------
         now, bounds
-            What the nominal plan was solved with.
-        nominal
-            The valid nominal plan: the start.
+            What a nominal plan is solved with.
+        start
+            Variables of each scenario (n,), the nominal one first.
         scenarios
             The scenarios.
-        before
-            Variables of all scenarios of the tree before (S, n), a better start of the branches; None without one.
         """
-        branches = [nominal.variables] * self.tree.count
-        if before is not None:
-            branches[1:] = [self.layout.shifted(each) for each in before[1:]]
         arguments = [now.vector()]
         prices = now.prices.copy()
         prices[: len(prices) - self.layout.slacks_size - 1] = 0.0  # a branch has to keep limits, not to earn
@@ -116,11 +110,8 @@ class TreePlanner:
             p = now.parameters.copy()
             p[self._adapted] = theta
             arguments.append(replace(now, parameters=p, biases=now.biases + bias, prices=prices).vector())
-        solution = self.solver(np.concatenate(arguments), self.tree.bounds(bounds), self.tree.joined(branches))
-        if solution.validity is not Validity.VALID:
-            return None
+        solution = self.solver(np.concatenate(arguments), self.tree.bounds(bounds), self.tree.joined(list(start)))
         found = np.array(self.tree.split(solution.variables))
-        seconds = nominal.seconds + solution.seconds
-        return TreePlan(
-            replace(nominal, variables=found[0], seconds=seconds, found_by=f"tree, {solution.found_by}"), found
-        )
+        no_multipliers = np.zeros(self.layout.size), np.zeros(len(bounds["lbg"]))
+        nominal = replace(solution, variables=found[0], multipliers=no_multipliers)
+        return TreePlan(nominal, found if solution.validity is Validity.VALID else None)

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from adaptive_flot.contracts import Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import FloatArray, Model, Stepper
 from adaptive_flot.testing import ControllerCase, controller_case
@@ -168,9 +169,29 @@ def test_a_misfit_is_the_mean_square_of_what_came_less_what_was_planned() -> Non
     assert silent.variance == misfit.variance and silent.expected is None
 
 
+def test_a_drill_of_a_failing_solver_goes_on_with_the_plan() -> None:
+    """The tree finds nothing either: the plan of the step before goes on, as without scenarios."""
+    case = controller_case(EconomicMpc, horizon=6, solver="fatrop", scenarios=3)
+    controller = case.controller
+    assert isinstance(controller, EconomicMpc)
+    state, _ = controller.decide(controller.init(0.0), None, None)
+    state, first = controller.decide(state, case.samples[0], case.estimates[0])
+    assert first.status is Status.OK and state.tree is not None
+    late = replace(case.samples[0], time=case.samples[0].time + 30.0)
+    _, decision = controller.with_failing_solver().decide(state, late, case.estimates[0])
+    assert decision.status is Status.SHIFTED_PLAN
+    _, decision = controller.decide(state, late, case.estimates[0])
+    assert decision.status is Status.OK
+
+
 @pytest.mark.parametrize(
-    ("options", "message"), [({"scenarios": 5}, "give 1, 3, 9 or 27"), ({"scenarios": 3, "branch": 7}, "give 1 to 6")]
+    ("options", "message"),
+    [
+        ({"scenarios": 5}, "give 1, 3, 9 or 27"),
+        ({"scenarios": 3, "branch": 7}, "give 1 to 6"),
+        ({"scenarios": 3, "probing": {}}, "not both"),
+    ],
 )
-def test_an_option_out_of_range_is_a_named_error(options: dict[str, int], message: str) -> None:
+def test_an_option_out_of_range_is_a_named_error(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ModelError, match=message):
-        controller_case(EconomicMpc, horizon=6, **options)  # type: ignore[arg-type]
+        controller_case(EconomicMpc, horizon=6, **options)
