@@ -149,9 +149,9 @@ class Ensemble:
         x, u, p, t, members = self._tables(x0, inputs, parameters, t0)
         rows, each = u.shape[-2], self._rows_each
         fixed: dict[str, FloatArray] = {"x": x}
-        by_row = {"t": t, "u": np.repeat(u, each, axis=-2)}
+        by_row = {"t": t, "u": self._each_step(u)}
         if p.ndim == 3:
-            by_row["p"] = np.repeat(p, each, axis=-2)
+            by_row["p"] = self._each_step(p)
         else:
             fixed["p"] = p
         lanes = self._lanes.get("step", lambda: self._made(step_functions.step, {"x": "x_next"}))
@@ -193,10 +193,14 @@ class Ensemble:
             ),
         )
         fixed = {"x": x, "p": p, "S": gradient}
-        by_row = {"t": t, "u": np.repeat(u, each, axis=-2)}
+        by_row = {"t": t, "u": self._each_step(u)}
         found = lanes(members, u.shape[-2] * each, fixed, by_row, every=["y", "dy"], last=["x_next", "S_next"])
         rows = slice(each - 1, None, each)
         return EnsembleSensitivities(found["y"][:, rows], found["dy"][:, rows], found["x_next"], found["S_next"])
+
+    def _each_step(self, rows: FloatArray) -> FloatArray:
+        """What is held in each interval (..., N, n), for each of its steps."""
+        return rows if self._rows_each == 1 else np.repeat(rows, self._rows_each, axis=-2)
 
     def _made(
         self,

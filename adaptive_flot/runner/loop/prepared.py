@@ -100,7 +100,9 @@ class Prepared(Described):
     @cached_property
     def steady_plants(self) -> SteadyStates:
         """Their steady states."""
-        return SteadyStates(self.scenario.plant_model)
+        # with the same derivatives as a fit asks for, which then is the same machine code
+        known = self.scenario.plant_model.names("parameters")
+        return SteadyStates(self.scenario.plant_model, [p for p in self.scenario.setup.parameters if p in known])
 
     @cached_property
     def batch(self) -> BatchEstimator:
