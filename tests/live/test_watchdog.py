@@ -94,6 +94,29 @@ def test_control_is_with_the_plant_before_the_link_ends(
         asyncio.run(run())
 
 
+def test_ctrl_c_lets_a_slow_cycle_come_to_its_end(
+    write_link: Callable[..., Link], scenario: Scenario, certificates: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link = write_link(scenario, {"controller": "pi"}, port=free_port(), speed=SPEED)
+    slow, freed = threading.Event(), threading.Event()
+    real = Cycle.step
+
+    def step(cycle: Cycle, state: Any, snapshot: Any) -> Any:
+        slow.set()
+        freed.wait()
+        return real(cycle, state, snapshot)
+
+    monkeypatch.setattr(Cycle, "step", step)
+
+    async def run() -> int:
+        async with together(link, certificates) as both:
+            await both.until(slow.is_set)
+            asyncio.get_running_loop().call_later(1.0, freed.set)
+        return both.link.state.number
+
+    assert asyncio.run(run()) == 1
+
+
 def test_the_first_fit_and_slow_plants_have_more_time(write_link: Callable[..., Link], scenario: Scenario) -> None:
     link = write_link(scenario, {"cycle.ends_after_s": 60.0}, speed=1)
     assert longest_cycle_s(link, True) == 60 and longest_cycle_s(link, False) == 60 * FIRST_FIT

@@ -165,6 +165,8 @@ class LinkRun:
         longest = longest_cycle_s(self.link, self.state.estimation.inner is not None)
         waits: set[asyncio.Future[Any]] = {working} if self._stopping is None else {working, self._stopping}
         await asyncio.wait(waits, timeout=longest - patience, return_when=asyncio.FIRST_COMPLETED)
+        if self._stopping is not None and self._stopping.done():  # Ctrl-C: a cycle that is only slow comes to its end
+            await asyncio.wait({working}, timeout=ORDERLY_S)
         if not working.done():
             raise HungCycleError(
                 f"cycle {self.state.number + 1} does not end: what it calls (solver, plug-in, database) hangs; control "
