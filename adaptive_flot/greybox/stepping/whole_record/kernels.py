@@ -25,7 +25,7 @@ class Kernels:
     ends
         `(x, t, u, p) -> (y, s)` and the same entries of the Jacobian of y.
     weights
-        `(z, h) -> ` the six weights of the method for one state, and their derivatives by z.
+        `(z, h) ->` the six weights of the method for one state, and their derivatives by z.
     rates_entries, ends_entries
         Row and column of each entry of the Jacobians, by rows.
     decays
