@@ -217,6 +217,12 @@ def test_without_a_compiler_the_plain_step_runs(monkeypatch: pytest.MonkeyPatch)
     np.testing.assert_array_equal(run.outputs, Stepper(SMALL, 1.0).simulate(x0, u, SMALL.parameter_values).outputs)
 
 
+def test_a_model_of_very_many_operations_is_left_to_the_plain_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("adaptive_flot.greybox.stepping.whole_record.library.MOST_OPERATIONS", 10)
+    quick = Stepper(replace(SMALL, record_code=True, name="large"), 1.0)
+    assert quick.record_code(ROWS, None) is None
+
+
 def test_a_short_run_is_not_worth_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepper, "LEAST_STEPS", ROWS + 1)
     quick = Stepper(replace(SMALL, record_code=True), 1.0)

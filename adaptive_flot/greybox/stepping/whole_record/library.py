@@ -17,6 +17,8 @@ from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
 from adaptive_flot.greybox.stepping.whole_record.source import record_source
 
 _FLAGS = (*FLAGS, "-ftree-vectorize")
+MOST_OPERATIONS = 20_000
+"""Operations of a step above which the compiler takes longer than it saves."""
 _MATRICES = 11
 """Matrices (nx, q) of working memory."""
 
@@ -64,6 +66,9 @@ class WholeRecord:
         self._nx, nu, self._ny, self._ns = counts
         self._width, self._np = nu + (dt is None), len(model.parameters)
         made = kernels(model, self._wrt, dt is not None)
+        operations = made.rates.n_instructions() + made.ends.n_instructions()
+        if operations > MOST_OPERATIONS:
+            raise CompileError(f"{model.name} has {operations} operations; the compiler would take too long")
         sizes = self._nx, nu, self._ny, self._ns
         source, numbers = record_source(made, sizes, len(self._wrt or ()))
         self._numbers = np.array(numbers or [0.0])
