@@ -200,7 +200,9 @@ def test_the_step_after_a_failure_is_that_of_a_fresh_controller(
     _, after = decide(case, controller, state, last, moves + 1)
     fresh = FaultyController(EconomicMpc(case.setup, horizon=12, solver="fatrop"), [])
     _, expected = decide(case, fresh, fresh.init(0.0), last, moves + 1)
-    assert after.status is expected.status is Status.OK and not after.faults
+    # after long held inputs no plan may keep the grade: both then give up the same, by the same
+    assert after.status is expected.status and after.status in (Status.OK, Status.SOFTENED) and not after.faults
+    assert dict(after.softened) == dict(expected.softened)
     np.testing.assert_array_equal(after.inputs, expected.inputs)
 
 
