@@ -143,7 +143,8 @@ def posterior_cramer_rao_bound(
 ) -> FloatArray:
     """Smallest error covariance of states and parameters at the end of each interval (N, nx + q, nx + q).
 
-    Equation 21 of Tichavsky et al. (1998) in its covariance form; see the module.
+    Equation 21 of Tichavsky et al. (1998) in its covariance form; see the module. Several trajectories or sets of
+    sensors are bounded in one pass: each argument may have leading axes, which are broadcast, and so has the result.
 
     Parameters
     ----------
@@ -156,29 +157,56 @@ def posterior_cramer_rao_bound(
     start
         Covariance of states and parameters before the first interval (nx + q, nx + q).
     """
-    rows, nx, size = linear.F.shape
-    q = size - nx
-    P = np.zeros((size + q, size + q))
-    P[:size, :size] = start
-    bounds = np.empty((rows, size, size))
-    moves = slice(size, size + q)
+    nx, size = linear.F.shape[-2:]
+    move, added = _moves(drift, nx)
+    passed = np.zeros((*linear.F.shape[:-2], size + drift.keep.shape[-1], size + drift.keep.shape[-1]))
+    passed[..., :nx, :size] = linear.F
+    passed[..., nx:, nx:] = np.eye(passed.shape[-1] - nx)
+    variance = np.where(np.isfinite(noise_std), noise_std, np.inf) ** 2
+    known = _after_measurements(move, added, passed, linear.H, variance, start)
+    across = passed[..., :size, :]
+    bounds: FloatArray = across @ known @ across.swapaxes(-1, -2)
+    return (bounds + bounds.swapaxes(-1, -2)) / 2
+
+
+def _moves(drift: ParameterDrift, nx: int) -> tuple[FloatArray, FloatArray]:
+    """What the moves at the start of each interval do to z (N, nz, nz), and the covariance (N, nz, nz) they add."""
+    q = drift.keep.shape[-1]
+    first, second, renewed = (np.arange(nx, nx + q), np.arange(nx + q, nx + 2 * q), drift.variance)
+    move = np.zeros((*drift.keep.shape[:-1], nx + 2 * q, nx + 2 * q))
+    move[..., np.arange(nx + q), np.arange(nx + q)] = 1.0
+    added = np.zeros_like(move)
+    for i in (first, second):
+        move[..., i, second] = drift.keep
+        for j in (first, second):
+            added[..., i, j] = renewed
+    return move, added
+
+
+def _after_measurements(
+    move: FloatArray, added: FloatArray, passed: FloatArray, H: FloatArray, variance: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Covariance of z (N, nz, nz) when the outputs of each interval are known, before it has passed."""
+    rows, nz = passed.shape[-3], passed.shape[-1]
+    size = H.shape[-1]
+    leading = np.broadcast_shapes(passed.shape[:-3], move.shape[:-3], variance.shape[:-2], start.shape[:-2])
+    P = np.zeros((*leading, nz, nz))
+    P[..., :size, :size] = start
+    outputs = np.zeros((*H.shape[:-1], nz))
+    outputs[..., :size] = H
+    first = np.broadcast_to(np.eye(nz), passed[..., :1, :, :].shape)
+    step = move @ np.concatenate([first, passed[..., :-1, :, :]], axis=-3)
+    of_any = np.asarray(np.isfinite(variance).reshape(-1, rows, variance.shape[-1]).any(axis=0))
+    known = np.empty((*leading, rows, nz, nz))
     for k in range(rows):
-        # the moves are renewed and added to the parameters
-        keep = drift.keep[k]
-        P[moves, :] *= keep[:, None]
-        P[:, moves] *= keep
-        P[np.arange(size, size + q), np.arange(size, size + q)] += drift.variance[k]
-        P[nx:size, :] += P[moves, :]
-        P[:, nx:size] += P[:, moves]
-        for j in np.flatnonzero(np.isfinite(noise_std[k])):
-            h = np.concatenate([linear.H[k, j], np.zeros(q)])
-            spread = P @ h
-            P -= np.outer(spread, spread) / (h @ spread + noise_std[k, j] ** 2)
-        P[:nx, :] = linear.F[k] @ P[:size, :]
-        P[:, :nx] = P[:, :size] @ linear.F[k].T
-        P = (P + P.T) / 2
-        bounds[k] = P[:size, :size]
-    return bounds
+        P = step[..., k, :, :] @ P @ step[..., k, :, :].swapaxes(-1, -2) + added[..., k, :, :]
+        for j in np.flatnonzero(of_any[k]):
+            h = outputs[..., k, j, :]
+            spread = (P @ h[..., None])[..., 0]
+            gain = spread / ((h * spread).sum(axis=-1) + variance[..., k, j])[..., None]
+            P = P - spread[..., :, None] * gain[..., None, :]
+        known[..., k, :, :] = P = (P + P.swapaxes(-1, -2)) / 2
+    return known
 
 
 def model_scale(model: Model, wrt: Sequence[str]) -> FloatArray:

@@ -12,6 +12,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adaptive_flot import yaml_files
 from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.model_file import load_model_file
@@ -184,6 +185,22 @@ def test_a_value_replaced_by_an_odd_one(
     read_or_one_line(READERS[kind], file)
 
 
+def spoilt(kind: str, data: st.DataObject) -> bytes:
+    """Bytes of a valid file flipped, lines doubled or dropped, the file cut, pieces of YAML's syntax inserted."""
+    text = VALID[kind]
+    at = data.draw(st.integers(0, len(text) - 1))
+    how = data.draw(st.sampled_from(["cut", "flip", "insert", "double", "drop"]))
+    lines = text.splitlines(keepends=True)
+    line = data.draw(st.integers(0, len(lines) - 1))
+    return {
+        "cut": lambda: text[:at].encode(),
+        "flip": lambda: text.encode()[:at] + bytes([data.draw(st.integers(0, 255))]) + text.encode()[at + 1 :],
+        "insert": lambda: (text[:at] + data.draw(st.sampled_from(SNIPPETS)) + text[at:]).encode(),
+        "double": lambda: "".join([*lines[: line + 1], *lines[line:]]).encode(),
+        "drop": lambda: "".join([*lines[:line], *lines[line + 1 :]]).encode(),
+    }[how]()
+
+
 @pytest.mark.parametrize("kind", READERS)
 @settings(max_examples=60)
 @given(data=st.data())
@@ -191,18 +208,24 @@ def test_text_cut_overwritten_or_with_syntax_thrown_in(
     tmp_path_factory: pytest.TempPathFactory, kind: str, data: st.DataObject
 ) -> None:
     """Bytes of a valid file flipped, lines doubled or dropped, the file cut, pieces of YAML's syntax inserted."""
-    text = VALID[kind]
-    at = data.draw(st.integers(0, len(text) - 1))
-    how = data.draw(st.sampled_from(["cut", "flip", "insert", "double", "drop"]))
-    lines = text.splitlines(keepends=True)
-    line = data.draw(st.integers(0, len(lines) - 1))
-    raw = {
-        "cut": lambda: text[:at].encode(),
-        "flip": lambda: text.encode()[:at] + bytes([data.draw(st.integers(0, 255))]) + text.encode()[at + 1 :],
-        "insert": lambda: (text[:at] + data.draw(st.sampled_from(SNIPPETS)) + text[at:]).encode(),
-        "double": lambda: "".join([*lines[: line + 1], *lines[line:]]).encode(),
-        "drop": lambda: "".join([*lines[:line], *lines[line + 1 :]]).encode(),
-    }[how]()
+    raw = spoilt(kind, data)
     file = tmp_path_factory.getbasetemp() / f"text_{kind}.yaml"
     file.write_bytes(raw)
     read_or_one_line(READERS[kind], file)
+
+
+@pytest.mark.skipif(not yaml.__with_libyaml__, reason="this PyYAML is without libyaml")
+@pytest.mark.parametrize("kind", READERS)
+@settings(max_examples=60)
+@given(data=st.data())
+def test_a_text_taken_apart_in_c_is_what_it_is_in_python(kind: str, data: st.DataObject) -> None:
+    """The same value or the same refusal; the text of PyYAML's own messages is that of Python in both cases."""
+    text = spoilt(kind, data).decode("utf-8", "replace")
+
+    def outcome(load: Callable[[str], object]) -> object:
+        try:
+            return repr(load(text))
+        except Exception as refusal:
+            return type(refusal).__name__, str(refusal)
+
+    assert outcome(yaml_files._load) == outcome(lambda t: yaml_files._loaded(yaml_files._Loader(t)))

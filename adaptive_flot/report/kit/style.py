@@ -8,10 +8,11 @@ import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import wraps
-from typing import Any, ParamSpec
+from typing import Any, Literal, ParamSpec
 from urllib.parse import quote
 
 import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from adaptive_flot.charts.palette import GREY, NAMED, colour
@@ -77,14 +78,14 @@ def _look() -> AbstractContextManager[None]:
 
 def png_uri(figure: Figure, dpi: int = 160) -> str:
     """Return a figure as a PNG data URI; `dpi` in dots per inch."""
-    return "data:image/png;base64," + base64.b64encode(_saved(figure, "png", dpi=dpi)).decode("ascii")
+    return "data:image/png;base64," + base64.b64encode(_raster(figure, "png", dpi)).decode("ascii")
 
 
 def data_uri(figure: Figure, small: bool = False) -> str:
     """SVG where that is small enough (sharp at any size), else PNG; always coarse where it must be `small`."""
     if small:
-        return "data:image/webp;base64," + base64.b64encode(_saved(figure, "webp", dpi=SMALL_DPI)).decode("ascii")
-    svg = _saved(figure, "svg")
+        return "data:image/webp;base64," + base64.b64encode(_raster(figure, "webp", SMALL_DPI)).decode("ascii")
+    svg = _svg(figure)
     return _svg_uri(svg) if len(svg) <= LARGEST_SVG else png_uri(figure)
 
 
@@ -92,11 +93,21 @@ def _svg_uri(svg: bytes) -> str:
     return "data:image/svg+xml," + quote(svg, safe=" =:/,;()'")  # a quarter smaller than base64
 
 
-def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
+def _raster(figure: Figure, kind: Literal["png", "webp"], dpi: int) -> bytes:
+    """The same bytes as those of `Figure.savefig`, which draws everything twice."""
     stream = io.BytesIO()
     with _look():
-        figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else None, **options)
-    return _shorter(stream.getvalue()) if kind == "svg" else stream.getvalue()
+        figure.set_dpi(dpi)
+        canvas = FigureCanvasAgg(figure)
+        (canvas.print_png if kind == "png" else canvas.print_webp)(stream)  # type: ignore[no-untyped-call]
+    return stream.getvalue()
+
+
+def _svg(figure: Figure) -> bytes:
+    stream = io.BytesIO()
+    with _look():
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return _shorter(stream.getvalue())
 
 
 def _shorter(svg: bytes) -> bytes:

@@ -18,7 +18,7 @@ from adaptive_flot.report.kit.parts import Picture, Table
 from adaptive_flot.report.kit.wording import number, seed_list
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
+from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit, limits
 from adaptive_flot.runner.scenario.realisation import Realisation
 
 MOST_SEEDS = 3
@@ -47,9 +47,8 @@ def limit_part(case: CaseRuns, album: Album) -> LimitPart | None:
     if not has_limit(case.scenario):
         return None
     sensors = _sensors(case)
-    seen: dict[bytes, _Bounds] = {}
     runs = [run for run in case.runs if run.seed in case.seeds[:MOST_SEEDS]]
-    bounds = {(run.estimator, run.seed): _bounds(case, run, sensors, seen) for run in runs}
+    bounds = _bounds(case, runs, sensors)
     if not all(np.isfinite(b.alone).all() and np.isfinite(b.more).all() for b in bounds.values()):
         return None
     first = next(iter(case.first.values()))
@@ -71,17 +70,19 @@ def _sensors(case: CaseRuns) -> dict[str, float]:
     return {k: v for k, v in MORE_SENSORS.items() if k in known and k not in case.scenario.setup.outputs}
 
 
-def _bounds(case: CaseRuns, run: Run, sensors: Mapping[str, float], seen: dict[bytes, _Bounds]) -> _Bounds:
-    """Bounds of a run; in open loop all estimators of a seed share them."""
-    columns = [q.column for q in case.scenario.model.inputs]
-    acted = [f"{c}_true" if f"{c}_true" in run.table else c for c in columns]
-    inputs = run.table[acted].to_numpy()
-    key = run.seed.to_bytes(8, "little") + inputs.tobytes()
-    if key not in seen:
-        true = TrueRun(Realisation(case.scenario, run.seed), inputs)
-        shown = run.table["time_s"].to_numpy() > case.scenario.fits_after + 1e-9
-        seen[key] = _Bounds(true.limit()[shown], true.limit(more=sensors)[shown])
-    return seen[key]
+def _bounds(case: CaseRuns, runs: list[Run], sensors: Mapping[str, float]) -> dict[tuple[str, int], _Bounds]:
+    """Bounds by estimator and seed; in open loop all estimators of a seed share them."""
+    true: dict[bytes, TrueRun] = {}
+    keys = {}
+    for run in runs:
+        columns = [q.column for q in case.scenario.model.inputs]
+        inputs = run.table[[f"{c}_true" if f"{c}_true" in run.table else c for c in columns]].to_numpy()
+        keys[run.estimator, run.seed] = key = run.seed.to_bytes(8, "little") + inputs.tobytes()
+        true.setdefault(key, TrueRun(Realisation(case.scenario, run.seed), inputs))
+    shown = runs[0].table["time_s"].to_numpy() > case.scenario.fits_after + 1e-9
+    found = limits(list(true.values()), [{}, sensors])[:, :, shown]
+    by_inputs = dict(zip(true, (_Bounds(*each) for each in found), strict=True))
+    return {who: by_inputs[key] for who, key in keys.items()}
 
 
 def _panels(case: CaseRuns, bound: _Bounds, first: Run) -> list[Panel]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -95,8 +95,8 @@ class TrueRun:
         """
         q = len(self.scenario.setup.parameters)
         known = drift or drift_of_time_profile(self.adapted)
-        noise = self._noise(more or {})
-        covariance = posterior_cramer_rao_bound(self.linear, known, noise, self._first_covariance())
+        noise = self.noise(more or {})
+        covariance = posterior_cramer_rao_bound(self.linear, known, noise, self.first_covariance)
         return covariance[:, -q:, -q:]
 
     def fits(self, covariance: FloatArray) -> FloatArray:
@@ -106,7 +106,8 @@ class TrueRun:
         fits: FloatArray = 100.0 * (1.0 - np.sqrt(variance) / np.linalg.norm(self.adapted[accounted], axis=0))
         return fits
 
-    def _noise(self, more: Mapping[str, float]) -> FloatArray:
+    def noise(self, more: Mapping[str, float]) -> FloatArray:
+        """Noise of the outputs that drive the adaptation and of `more` (N, ny); NaN where none is measured."""
         s, model = self.scenario, self.scenario.plant_model
         driving = np.isin(np.arange(len(model.outputs)), model.indices("outputs", s.setup.outputs))
         noise = np.where(measured_at(s) & driving, noise_std(s), np.nan)
@@ -115,7 +116,9 @@ class TrueRun:
             noise[:, j] = relative_std * np.abs(self.outputs[:, j]).mean()
         return noise
 
-    def _first_covariance(self) -> FloatArray:
+    @cached_property
+    def first_covariance(self) -> FloatArray:
+        """Covariance of states and adapted parameters before the first interval (nx + q, nx + q)."""
         s, model = self.scenario, self.scenario.plant_model
         names = s.setup.parameters
         moved = np.zeros((len(model.states), len(names)))
@@ -124,6 +127,23 @@ class TrueRun:
         by_parameters = np.vstack([moved, np.eye(len(names))])
         covariance: FloatArray = by_parameters @ np.diag(model_scale(model, names) ** 2) @ by_parameters.T
         return covariance
+
+
+def limits(runs: Sequence[TrueRun], more: Sequence[Mapping[str, float]]) -> FloatArray:
+    """`TrueRun.limit` of runs of one scenario with each set of further outputs, in one pass.
+
+    Returns
+    -------
+    FloatArray
+        Covariances (runs, sets, N, q, q).
+    """
+    linear = LinearisedTrajectory(*(np.stack([getattr(r.linear, name) for r in runs])[:, None] for name in "FH"))
+    drifts = [drift_of_time_profile(r.adapted) for r in runs]
+    drift = ParameterDrift(*(np.stack([getattr(d, n) for d in drifts])[:, None] for n in ("keep", "variance")))
+    noise = np.stack([[r.noise(m) for m in more] for r in runs])
+    start = np.stack([r.first_covariance for r in runs])[:, None]
+    q = drift.keep.shape[-1]
+    return posterior_cramer_rao_bound(linear, drift, noise, start)[..., -q:, -q:]
 
 
 def has_limit(scenario: Scenario) -> bool:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit
+from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit, limits
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 
@@ -36,6 +38,20 @@ def test_more_sensors_lower_the_bound_of_the_ridge() -> None:
     assert alone.shape == (2400, 2, 2)
     assert (np.diagonal(more, axis1=1, axis2=2) <= np.diagonal(alone, axis1=1, axis2=2) * (1 + 1e-9)).all()
     assert np.sqrt(more[-1, 1, 1] / alone[-1, 1, 1]) < 0.9
+
+
+def test_runs_and_sets_of_sensors_in_one_pass_are_bounded_as_one_by_one() -> None:
+    """Open loop with two seeds; a sensor that only one set has says nothing to the other."""
+    scenario = load_scenario("random_walk")
+    scenario = replace(scenario, file=scenario.file.model_copy(update={"duration_s": 700.0}))
+    runs = [TrueRun(Realisation(scenario, seed), Realisation(scenario, seed).schedule) for seed in (1, 2)]
+    found = limits(runs, [{}, MORE_SENSORS])
+    assert found.shape == (2, 2, 700, 2, 2)
+    for run, pair in zip(runs, found, strict=True):
+        for more, covariance in zip(({}, MORE_SENSORS), pair, strict=True):
+            alone = run.limit(more=more)
+            scale = np.sqrt(np.diagonal(alone, axis1=1, axis2=2))
+            np.testing.assert_allclose((covariance - alone) / scale[:, :, None] / scale[:, None, :], 0.0, atol=1e-8)
 
 
 def test_a_fit_of_the_bound_is_that_of_an_error_of_its_size() -> None:
