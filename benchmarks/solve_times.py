@@ -19,6 +19,7 @@ import numpy as np
 from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.runner.commands.run import run_scenario
@@ -50,6 +51,7 @@ class Ours:
         self.model, self.adapted = setup.model, setup.model.indices("parameters", setup.parameters)
         self.controller = EconomicMpc(setup, solver=solver, scenarios=scenarios)
         self.std = STD if scenarios > 1 else 0.0
+        self._ode = FastCall(self.model.ode)
         self.state = self.controller.init(0.0)
 
     def __call__(self, time: float, state: FloatArray, parameters: FloatArray, held: FloatArray) -> FloatArray:
@@ -57,7 +59,8 @@ class Ours:
         nothing = np.zeros(len(self.model.outputs))
         theta = parameters[self.adapted]
         covariance = np.diag((self.std * theta) ** 2)
-        estimate = Estimate(time, nothing, nothing, nothing, theta, covariance, state, Status.OK)
+        predicted = self._ode(time, state, held, parameters)[1]  # scenarios ask how far past plans were off
+        estimate = Estimate(time, predicted, nothing, nothing, theta, covariance, state, Status.OK)
         self.state, decision = self.controller.decide(self.state, Sample(time, held, nothing * np.nan), estimate)
         assert decision.status in (Status.OK, Status.SOFTENED), decision.message
         return decision.inputs

@@ -13,7 +13,7 @@ from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Es
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.layout import Bounds, with_further_states
+from controllers.economic_mpc.layout import Bounds
 from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
 from controllers.economic_mpc.output_bias import OutputBias
 from controllers.economic_mpc.planner import Found, Planner, Uncertainty
@@ -21,6 +21,7 @@ from controllers.economic_mpc.probing import ProbeState, Probing, price
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.softening import Softening
 from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.taking_over import taken_over
 from controllers.economic_mpc.told import Teller, Told
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
@@ -157,12 +158,7 @@ class EconomicMpc:
         """Go on with the inputs and the plan of the same controller for a smaller model; see `TakesOver.take_over`."""
         if not isinstance(before, EconomicMpc):
             raise ModelError("economic_mpc: only the state of an economic_mpc can be taken over")
-        bias = tuple(b + own.change(known, again) for b, own in zip(state.bias, self._biases, strict=True))
-        state = replace(state, bias=bias, tree=None)
-        if state.plan is None or len(self.setup.model.states) == len(before.setup.model.states):
-            return state
-        plan = with_further_states(state.plan, before.layout, self.layout, again[-1].state)
-        return replace(state, plan=plan, multipliers=None)
+        return taken_over(state, before.layout, self.layout, self._biases, known, again)
 
     def tracked(self, state: MpcState, inputs: FloatArray) -> MpcState:
         """Go on from what really acts; see `TracksInputs.tracked`."""

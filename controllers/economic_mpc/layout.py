@@ -6,7 +6,6 @@ the moved inputs, the slacks of the limited outputs and of the limited states, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,7 +86,7 @@ class StageLayout:
     """
 
     def __init__(self, model: Model, limits: Limits, horizon: int, move_s: float) -> None:
-        self.model, self.horizon, self.move_s = model, horizon, move_s
+        self.model, self.limits, self.horizon, self.move_s = model, limits, horizon, move_s
         self.moved = sorted(model.indices("inputs", limits.inputs))
         self.moved_names = tuple(model.inputs[i].name for i in self.moved)
         self.outputs, self.states = tuple(limits.outputs), tuple(limits.states)
@@ -112,6 +111,10 @@ class StageLayout:
         self.block = self.state_size + self.control_size
         self.size = horizon * self.block + self.state_size
         self.rows = self._rows()
+
+    def with_horizon(self, horizon: int) -> StageLayout:
+        """The same stages over another horizon."""
+        return StageLayout(self.model, self.limits, horizon, self.move_s)
 
     @property
     def point_size(self) -> int:
@@ -145,6 +148,11 @@ class StageLayout:
     def stage_rows(self) -> NDArray[np.intp]:
         """Constraints of each stage, without the initial condition (horizon, rows of a stage)."""
         return np.hstack([rows for kind, rows in self.rows.items() if kind != "initial"])
+
+    @property
+    def inequalities(self) -> NDArray[np.intp]:
+        """Those of moves, outputs and states of each stage (horizon, rows)."""
+        return np.hstack([self.rows[kind] for kind in ("moves", "outputs", "states")])
 
     # -- solutions -------------------------------------------------------------------------------------------------
 
@@ -216,29 +224,3 @@ class StageLayout:
             begin = k * self.block + self.points
             ranges[begin : begin + DEGREE * self.point_size] = np.tile(point, (DEGREE, 1))
         return ranges[:, 0], ranges[:, 1]
-
-
-def with_further_states(solution: FloatArray, before: StageLayout, after: StageLayout, state: FloatArray) -> FloatArray:
-    """Variables of `after` (n,) from those of `before`: the same inputs and states, the further states as in `state`.
-
-    Parameters
-    ----------
-    solution
-        Scaled variables of `before`.
-    before, after
-        Of the problems; the states of `after` are those of `before` and then further ones.
-    state
-        State of the model of `after` (nx,), whose further states stay as they are over the horizon.
-    """
-    nx, nu, nz = len(before.x_scale), before.inputs_size, len(after.z_scale)
-    further = (state / after.x_scale)[nx:]
-
-    def extended(variables: FloatArray, sizes: Sequence[int]) -> FloatArray:
-        parts = np.split(variables, np.cumsum(sizes)[:-1])
-        holding_states = {0, *range(4, len(sizes), 2)}
-        return np.concatenate([np.concatenate([p, further]) if i in holding_states else p for i, p in enumerate(parts)])
-
-    block = before.block
-    stage = [nx, nu, nu, before.slacks_size, *[nx, nz] * DEGREE]
-    stages = [extended(solution[k * block : (k + 1) * block], stage) for k in range(before.horizon)]
-    return np.concatenate([*stages, extended(solution[before.horizon * block :], [nx, nu])])

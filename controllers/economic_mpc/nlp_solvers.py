@@ -20,6 +20,7 @@ from adaptive_flot.greybox.stepping.fastcall import FastCall
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.derivatives import Assembled
 from controllers.economic_mpc.layout import Multipliers
+from controllers.economic_mpc.newton_step import PlanStep
 from controllers.economic_mpc.real_time_iteration import RealTimeIteration
 from controllers.economic_mpc.verification import Nlp, NlpSolution, Solver, Verifier, no_solution
 
@@ -40,7 +41,7 @@ def make_solver(problem: OptimalControlProblem, name: str, budget_s: float) -> S
     if name not in SOLVERS:
         raise ModelError(f"economic_mpc: unknown solver {name!r}; {near_match(name, SOLVERS)}")
     if name == "rti":
-        return RealTimeIteration(problem, interior_point(problem, "fatrop", budget_s))
+        return RealTimeIteration(problem, PlanStep(problem), interior_point(problem, "fatrop", budget_s))
     return interior_point(problem, name, budget_s)
 
 
@@ -126,7 +127,7 @@ def _fatrop(problem: Nlp) -> dict[str, Any]:
         "fatrop.bound_push": 1e-3,
         "fatrop.bound_frac": 1e-3,
         "fatrop.lam_max": 1e8,
-        "fatrop.max_iter": 100,
+        "fatrop.max_iter": 100,  # kept: with 5, a solve ends after 5 and its plan is not valid
     }
 
 

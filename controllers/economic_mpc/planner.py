@@ -38,7 +38,7 @@ class Found:
     given_up
         Limits that the plan does not keep.
     tree
-        Variables of all scenarios (S, n); None without a tree.
+        Solution for all scenarios; None without a tree.
     note
         What went wrong on the way to a valid solution; empty for nothing.
     """
@@ -49,7 +49,7 @@ class Found:
     bounds: dict[str, FloatArray]
     given_up: tuple[GivenUp, ...] = ()
     note: str = ""
-    tree: FloatArray | None = None
+    tree: NlpSolution | None = None
 
 
 @dataclass(frozen=True)
@@ -145,17 +145,17 @@ class Planner:
         arguments, spent = now.vector(), 0.0
         scenarios = None if self.tree is None else self.tree.scenarios(now, held, estimate, state)
         if self.tree is not None and scenarios is not None and state.tree is not None and state.age == 0:
-            ahead = self.tree.find(now, bounds, [self.layout.shifted(each) for each in state.tree], scenarios)
+            ahead = self.tree.find(now, bounds, state.tree, scenarios)
             given_up = self.softening.given_up(ahead.solution.variables, now.limits)
-            if ahead.scenarios is not None and self.softening.is_in_order(given_up):
+            if ahead.tree is not None and self.softening.is_in_order(given_up):
                 told = Status.SOFTENED if back or given_up else Status.OK
-                return Found(ahead.solution, told, arguments, bounds, (*back, *given_up), "", ahead.scenarios)
+                return Found(ahead.solution, told, arguments, bounds, (*back, *given_up), "", ahead.tree)
             spent = ahead.solution.seconds
         solution, status = self._solve(solver, state, arguments, bounds, held, estimate, theta)
         if solution.validity is not Validity.VALID:
             return Found(solution, status, arguments, bounds)
         given_up, note = self.softening.given_up(solution.variables, now.limits), ""
-        tree: FloatArray | None = None
+        tree: NlpSolution | None = None
         if not self.softening.is_in_order(given_up) and solution.seconds <= self.budget_s:
             tried = self.softening.in_order(now, bounds, solution)
             if tried.validity is Validity.VALID:
@@ -164,13 +164,13 @@ class Planner:
                 solution = replace(solution, seconds=tried.seconds)
                 note = "not in the stated order, since a further solve failed"
         elif self.tree is not None and scenarios is not None and spent + solution.seconds <= self.budget_s:
-            found = self.tree.find(now, bounds, [solution.variables] * len(scenarios.parameters), scenarios)
+            found = self.tree.find(now, bounds, solution.variables, scenarios)
             spent += found.solution.seconds
-            if found.scenarios is None:
+            if found.tree is None:
                 note = "the nominal plan, since no solution was found for its scenarios"
             else:
                 spent += solution.seconds
-                solution, tree = replace(found.solution, seconds=0.0), found.scenarios
+                solution, tree = replace(found.solution, seconds=0.0), found.tree
                 given_up = self.softening.given_up(solution.variables, now.limits)
         solution = replace(solution, seconds=solution.seconds + spent)
         given_up = (*back, *given_up)

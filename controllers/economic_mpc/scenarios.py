@@ -107,9 +107,23 @@ def grid(
     root[:q, :q] = vectors * np.sqrt(np.maximum(values, 0.0))
     root[q:, q:] = np.diag(spread)
     effect = np.hstack([gains, np.eye(k)]) @ root
-    directions = np.linalg.svd(effect, full_matrices=True)[2].T
     found = np.zeros((q + k, axes))
-    found[:, : min(axes, q + k)] = (root @ directions)[:, :axes]
+    found[:, : min(axes, q + k)] = _axes(effect, root)[:, :axes]
     points = np.array(sorted(product((0.0, -1.0, 1.0), repeat=axes), key=lambda at: sum(map(abs, at))))
     moved = quantile * points @ found.T
     return Scenarios(theta + moved[:, :q], moved[:, q:])
+
+
+def _axes(effect: FloatArray, root: FloatArray) -> FloatArray:
+    """Axes (q + k, q + k), each with its side: a plan that was made for one side is no start for the other.
+
+    Those that move outputs come first, upwards; then the others, by their share of the standard deviations.
+    """
+    directions = np.linalg.svd(effect, full_matrices=True)[2].T
+    k, std = len(effect), np.linalg.norm(root, axis=1)
+    first, rest = root @ directions[:, :k], directions[:, k:]
+    share = np.divide(root, std[:, None], out=np.zeros_like(root), where=std[:, None] > 0)
+    rest = root @ rest @ np.linalg.svd(share @ rest)[2].T
+    up = [(effect @ directions[:, :k]), np.divide(rest, std[:, None], out=np.zeros_like(rest), where=std[:, None] > 0)]
+    sides = [np.sign(each[np.abs(each).argmax(axis=0), np.arange(each.shape[1])]) for each in up]
+    return np.hstack([first, rest]) * np.where(np.concatenate(sides) < 0, -1.0, 1.0)

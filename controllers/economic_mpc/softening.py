@@ -7,10 +7,12 @@ The order, from the first given up to the last:
 3. the ranges of limited states, then the limits of outputs; option `priority` changes this part.
 
 The range of an input is never given up. A plan that exceeds only what is given up first is in order, at that limit's
-price. Else the problem is solved once for each limit that can not be kept: the excess of
-the first in `priority` is minimised, then it is bounded by what was found, and the next one follows. The last solve is
-for value. All are made with ipopt, since fatrop may stall at bounds that leave hardly any room. Source: Tyler & Morari,
-Automatica 35 (1999) 565; Kerrigan & Maciejowski, IEEE CACSD (2002), section 3.
+price. Else the problem is solved once for each limit that can not be kept: the excess of the first in `priority` is
+minimised, then it is bounded by what was found, and the next one follows. The last solve is for value.
+
+Each solve takes some Newton steps with an active-set method, for which bounds that leave hardly any room are no trouble
+(fatrop may stall there). Where these do not come to the optimum, ipopt does. Source: Tyler & Morari, Automatica 35
+(1999) 565; Kerrigan & Maciejowski, IEEE CACSD (2002), section 3.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.layout import Bounds
+from controllers.economic_mpc.newton_step import PlanStep
 from controllers.economic_mpc.nlp_solvers import interior_point
+from controllers.economic_mpc.real_time_iteration import RealTimeIteration
 from controllers.economic_mpc.stage import Arguments
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
@@ -35,6 +39,8 @@ SPARE = 0.5
 """Share of the tolerance by which an excess may be larger in the solves that follow."""
 AHEAD = 100.0
 """Factor on the price of the limit whose turn it is."""
+OPTIMUM = 1e-3
+"""Largest change of a scaled variable by the last Newton step of a solve."""
 INSIDE = 1e-3
 """How far inside its range an input may go that has to come back, as a share of the range."""
 
@@ -87,7 +93,8 @@ class Softening:
     ) -> None:
         self.layout, self.bounds, self.budget_s = problem.layout, bounds, budget_s
         layout = self.layout
-        self.solver: Solver = interior_point(problem, "ipopt", budget_s)
+        complete = interior_point(problem, "ipopt", budget_s)
+        self.solver: Solver = RealTimeIteration(problem, PlanStep(problem), complete, until=OPTIMUM)
         ends = [(e.output, e.name, layout.model.outputs[e.index].unit) for e in layout.output_limits]
         states = [layout.model.states[layout.model.index("states", name)] for name in layout.states]
         self._limits = [*ends, *((q.name, f"range of {q.name}", q.unit) for q in states)]
@@ -161,7 +168,9 @@ class Softening:
         for name in self.priority:
             columns = self._columns[name]
             if (excess > self._tolerance)[:, columns].any():
-                best = self.solver(self._turn(now, name).vector(), self._capped(bounds, most), best.variables)
+                best = self.solver(
+                    self._turn(now, name).vector(), self._capped(bounds, most), best.variables, best.multipliers
+                )
                 seconds += best.seconds
                 if best.validity is not Validity.VALID or seconds > self.budget_s:
                     return replace(best, validity=_failed(best), seconds=seconds)
@@ -169,7 +178,8 @@ class Softening:
             most[:, columns] = (excess + SPARE * self._tolerance)[:, columns]
         kept = np.zeros(len(self._scale))
         kept[: len(self._true)] = np.abs(now.limits - self._true)
-        best = self.solver(now.vector(), self._capped(bounds, most + kept / self._scale), best.variables)
+        caps = self._capped(bounds, most + kept / self._scale)
+        best = self.solver(now.vector(), caps, best.variables, best.multipliers)
         return replace(best, seconds=seconds + best.seconds)
 
     def _excess(self, variables: FloatArray, limits: FloatArray) -> FloatArray:

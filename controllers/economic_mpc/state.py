@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.probing import ProbeState
 from controllers.economic_mpc.scenarios import Misfit
+from controllers.economic_mpc.verification import NlpSolution
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class MpcState:
     misfit
         How far plans were off.
     tree
-        Scaled variables of all scenarios of the last tree (S, n); None without one.
+        Solution of the last tree; None without one.
     probe
         Last dip and what probing has cost; None without probing.
     """
@@ -48,4 +49,4 @@ class MpcState:
     heard: tuple[float, ...]
     misfit: Misfit
     probe: ProbeState | None = None
-    tree: FloatArray | None = None
+    tree: NlpSolution | None = None

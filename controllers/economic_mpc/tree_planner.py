@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,10 +12,12 @@ from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.chance_constraint import SteadyGains
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.nlp_solvers import InteriorPoint
+from controllers.economic_mpc.real_time_iteration import RealTimeIteration
 from controllers.economic_mpc.scenario_tree import ScenarioTree
 from controllers.economic_mpc.scenarios import Scenarios, grid
 from controllers.economic_mpc.stage import Arguments
 from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.tree_step import TreeStep
 from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
 SIZES = {3: 1, 9: 2, 27: 3}
@@ -25,10 +26,10 @@ SIZES = {3: 1, 9: 2, 27: 3}
 
 @dataclass(frozen=True)
 class TreePlan:
-    """The nominal plan of a solved tree, and the variables of all scenarios (S, n); None where it was not solved."""
+    """The nominal plan of a tree, and the solution of all scenarios; None where that is not valid."""
 
     solution: NlpSolution
-    scenarios: FloatArray | None
+    tree: NlpSolution | None
 
 
 class TreePlanner:
@@ -71,7 +72,8 @@ class TreePlanner:
         if not 1 <= branch <= problem.layout.horizon:
             raise ModelError(f"economic_mpc: branch = {branch}; give 1 to {problem.layout.horizon}, the horizon")
         self.layout, self.tree = problem.layout, ScenarioTree(problem, scenarios, branch)
-        self.solver: Solver = InteriorPoint(self.tree, self.tree.functions(solver), solver, budget_s)
+        cold = InteriorPoint(self.tree, self.tree.functions(solver), solver, budget_s)
+        self.solver: Solver = cold if solver == "ipopt" else RealTimeIteration(self.tree, TreeStep(self.tree), cold)
         self._axes, self._quantile = SIZES[scenarios], quantile
         adapted = [setup.model.parameters[i] for i in setup.model.indices("parameters", setup.parameters)]
         self._lowest, self._highest = np.array([[p.lower, p.upper] for p in adapted]).reshape(-1, 2).T
@@ -90,7 +92,7 @@ class TreePlanner:
         return None if scenarios.are_alike else scenarios
 
     def find(
-        self, now: Arguments, bounds: dict[str, FloatArray], start: Sequence[FloatArray], scenarios: Scenarios
+        self, now: Arguments, bounds: dict[str, FloatArray], start: FloatArray | NlpSolution, scenarios: Scenarios
     ) -> TreePlan:
         """Solve; a failure is a value.
 
@@ -99,7 +101,7 @@ class TreePlanner:
         now, bounds
             What a nominal plan is solved with.
         start
-            Variables of each scenario (n,), the nominal one first.
+            The nominal plan (n,), or the tree of the move before.
         scenarios
             The scenarios.
         """
@@ -110,8 +112,12 @@ class TreePlanner:
             p = now.parameters.copy()
             p[self._adapted] = theta
             arguments.append(replace(now, parameters=p, biases=now.biases + bias, prices=prices).vector())
-        solution = self.solver(np.concatenate(arguments), self.tree.bounds(bounds), self.tree.joined(list(start)))
-        found = np.array(self.tree.split(solution.variables))
+        at, multipliers = self.tree.at, None
+        if isinstance(start, NlpSolution):
+            first, multipliers = at.shifted(start.variables), at.shifted_multipliers(start.multipliers)
+        else:
+            first = at.joined([start] * at.count)
+        solution = self.solver(np.concatenate(arguments), at.bounds(bounds), first, multipliers)
         no_multipliers = np.zeros(self.layout.size), np.zeros(len(bounds["lbg"]))
-        nominal = replace(solution, variables=found[0], multipliers=no_multipliers)
-        return TreePlan(nominal, found if solution.validity is Validity.VALID else None)
+        nominal = replace(solution, variables=at.split(solution.variables)[0], multipliers=no_multipliers)
+        return TreePlan(nominal, solution if solution.validity is Validity.VALID else None)

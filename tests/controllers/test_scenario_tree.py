@@ -16,9 +16,12 @@ from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.controller import EconomicMpc
 from controllers.economic_mpc.nlp_solvers import InteriorPoint, make_solver
+from controllers.economic_mpc.real_time_iteration import MOST_STEPS, RealTimeIteration
 from controllers.economic_mpc.scenario_tree import ScenarioTree
 from controllers.economic_mpc.scenarios import Misfit, grid
-from controllers.economic_mpc.verification import Validity
+from controllers.economic_mpc.tree_programme import TreeProgramme
+from controllers.economic_mpc.tree_step import TreeStep
+from controllers.economic_mpc.verification import NlpSolution, Validity
 from tests.controllers.test_collocation import BOUNDS, HELD, MOVE_S, arguments, cell_problem, cold
 
 COUNT, BRANCH = 3, 4
@@ -36,10 +39,10 @@ def tree(problem: OptimalControlProblem) -> ScenarioTree:
 
 def solved(tree: ScenarioTree, solver: str, each: list[FloatArray], start: FloatArray) -> list[FloatArray]:
     found = InteriorPoint(tree, tree.functions(solver), solver, 20.0)(
-        np.concatenate(each), tree.bounds(tree.layout.bounds(BOUNDS)), tree.joined([start] * tree.count)
+        np.concatenate(each), tree.at.bounds(tree.problem.layout.bounds(BOUNDS)), tree.at.joined([start] * tree.count)
     )
     assert found.validity is Validity.VALID, found.message
-    return tree.split(found.variables)
+    return tree.at.split(found.variables)
 
 
 @pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
@@ -58,7 +61,7 @@ def test_both_solvers_find_the_same_tree(tree: ScenarioTree, model: Model) -> No
     each, start = different(model), cold(tree.problem, model)
     plans = [solved(tree, solver, each, start) for solver in ("fatrop", "ipopt")]
     for one, other in zip(*plans, strict=True):
-        one, other = tree.layout.inputs_of(one)[:BRANCH], tree.layout.inputs_of(other)[:BRANCH]
+        one, other = tree.problem.layout.inputs_of(one)[:BRANCH], tree.problem.layout.inputs_of(other)[:BRANCH]
         np.testing.assert_allclose(one / other, 1.0, atol=2e-3)
 
 
@@ -73,13 +76,13 @@ def test_scenarios_share_the_first_move_and_keep_states_of_their_own(tree: Scena
     """Each branch is what the cell does with its own parameters under its own moves, and keeps its own grade limit."""
     each = different(model)
     plans = solved(tree, "fatrop", each, cold(tree.problem, model))
-    inputs = [tree.layout.inputs_of(plan)[:BRANCH] for plan in plans]
+    inputs = [tree.problem.layout.inputs_of(plan)[:BRANCH] for plan in plans]
     for other in inputs[1:]:
         np.testing.assert_allclose(other[0], inputs[0][0], rtol=1e-6)
         assert np.abs(other[1:] / inputs[0][1:] - 1).max() > 1e-3
     theta = model.parameter_values.copy()
     theta[model.index("parameters", "C")] *= 1.05
-    x0 = tree.layout.stages(plans[1])[0, : len(model.states)] * tree.layout.x_scale
+    x0 = tree.problem.layout.stages(plans[1])[0, : len(model.states)] * tree.problem.layout.x_scale
     held = np.column_stack([inputs[1][:, 0], np.full(BRANCH, HELD[1]), inputs[1][:, 1]])
     run = Stepper(model, 1.0).simulate(x0, np.repeat(held, int(MOVE_S), axis=0), theta)
     came = run.outputs[int(MOVE_S) - 1 :: int(MOVE_S), model.index("outputs", "concentrate_grade")]
@@ -92,9 +95,9 @@ def test_scenarios_share_the_first_move_and_keep_states_of_their_own(tree: Scena
 def test_the_derivatives_are_those_of_the_problem(tree: ScenarioTree, model: Model) -> None:
     """Jacobian and gradients against CasADi's own, at a point that is no solution."""
     generator = np.random.default_rng(1)
-    x = tree.joined([cold(tree.problem, model)] * COUNT) * (1 + 0.01 * generator.standard_normal(tree.size))
-    p, lam = np.concatenate(different(model)), generator.standard_normal(tree.rows)
-    symbols, of_g = (tree.nlp["x"], tree.nlp["p"]), ca.MX.sym("lam", tree.rows)
+    x = tree.at.joined([cold(tree.problem, model)] * COUNT) * (1 + 0.01 * generator.standard_normal(tree.at.size))
+    p, lam = np.concatenate(different(model)), generator.standard_normal(tree.at.rows)
+    symbols, of_g = (tree.nlp["x"], tree.nlp["p"]), ca.MX.sym("lam", tree.at.rows)
     ours = tree.functions("fatrop")
     jacobian = ca.Function("J", [*symbols], [ca.jacobian(tree.nlp["g"], symbols[0])])
     g, by_x = ours["nlp_jac_g"](x, p)
@@ -104,6 +107,57 @@ def test_the_derivatives_are_those_of_the_problem(tree: ScenarioTree, model: Mod
     np.testing.assert_allclose(np.array(ours["nlp_hess_l"](x, p, 1.0, lam)[0]), np.array(slope(x, p, lam)), atol=1e-8)
     value = ca.Function("f", [*symbols], [ca.gradient(tree.nlp["f"], symbols[0])])
     np.testing.assert_allclose(np.array(ours["nlp_grad_f"](x, p)), np.array(value(x, p)), atol=1e-8)
+
+
+def followed(tree: ScenarioTree, model: Model) -> tuple[NlpSolution, NlpSolution]:
+    """Newton steps and fatrop for a higher limit of the grade, both from the tree of a lower one."""
+    bounds, start = tree.at.bounds(tree.problem.layout.bounds(BOUNDS)), tree.at.joined([cold(tree.problem, model)] * 3)
+    complete = InteriorPoint(tree, tree.functions("fatrop"), "fatrop", 20.0)
+    first = complete(np.concatenate(different(model)), bounds, start)
+    theta = model.parameter_values.copy()
+    theta[model.index("parameters", "C")] *= 1.05
+    higher = [
+        {"limits": np.array([0.203])} | more for more in ({}, {"parameters": theta}, {"biases": np.array([-0.004])})
+    ]
+    now = np.concatenate([arguments(model, **more) for more in higher])
+    steps = RealTimeIteration(tree, TreeStep(tree), complete)
+    return steps(now, bounds, first.variables, first.multipliers), complete(now, bounds, first.variables)
+
+
+def test_newton_steps_follow_the_tree_of_a_complete_solver(tree: ScenarioTree, model: Model) -> None:
+    ours, theirs = followed(tree, model)
+    assert ours.found_by == "rti" and ours.validity is Validity.VALID and 1 <= ours.iterations <= MOST_STEPS
+    plans = [tree.at.split(solution.variables)[0] for solution in (ours, theirs)]
+    inputs = [tree.problem.layout.inputs_of(plan) for plan in plans]
+    assert np.abs(inputs[0] / HELD[[0, 2]] - 1).max() > 0.01
+    np.testing.assert_allclose(inputs[0] / inputs[1], 1.0, atol=5e-3)
+
+
+def test_a_programme_without_slacks_has_the_solution_of_the_one_with_them(
+    tree: ScenarioTree, model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours, _ = followed(tree, model)
+    asked: list[int] = []
+
+    def never(self: TreeProgramme, gradient: FloatArray, *rest: Any) -> None:
+        asked.append(len(gradient))
+
+    monkeypatch.setattr(TreeProgramme, "_without_slacks", never)
+    theirs, _ = followed(tree, model)
+    assert asked
+    np.testing.assert_allclose(ours.variables, theirs.variables, atol=5e-3)
+
+
+def test_the_next_start_is_the_tree_one_move_later(tree: ScenarioTree, model: Model) -> None:
+    """Each scenario goes on with its own second move, but for the first move, which is the nominal one's."""
+    _, solution = followed(tree, model)
+    inputs_of = tree.problem.layout.inputs_of
+    before = [inputs_of(plan) for plan in tree.at.split(solution.variables)]
+    after = [inputs_of(plan) for plan in tree.at.split(tree.at.shifted(solution.variables))]
+    for old, new in zip(before, after, strict=True):
+        np.testing.assert_array_equal(new[0], before[0][1])
+        np.testing.assert_array_equal(new[1 : BRANCH - 1], old[2:BRANCH])
+        np.testing.assert_array_equal(new[BRANCH - 1], old[BRANCH - 1] if old is not before[0] else old[BRANCH])
 
 
 def decided(options: dict[str, Any], std: float) -> tuple[FloatArray, ControllerCase]:
@@ -145,6 +199,18 @@ def test_the_first_axis_has_the_spread_of_the_output() -> None:
     outputs = (moved @ gains.T + found.biases).ravel()
     std = np.sqrt(gains[0] @ covariance @ gains[0] + 0.09)
     np.testing.assert_allclose(np.sort(outputs), 1.5 * std * np.repeat([-1.0, 0.0, 1.0], 3), atol=1e-12)
+
+
+def test_a_scenario_keeps_its_side_from_decision_to_decision() -> None:
+    """The plan of the move before is its start: nearly the same covariance gives nearly the same scenarios."""
+    generator = np.random.default_rng(5)
+    covariance, gains = np.array([[4.0, 1.0], [1.0, 2.0]]), np.array([[0.5, -1.0]])
+    first = grid(np.zeros(2), covariance, np.array([0.3]), gains, axes=3, quantile=1.0)
+    for _ in range(20):
+        near = covariance * (1 + 1e-3 * generator.standard_normal()), gains * (1 + 1e-3 * generator.standard_normal())
+        again = grid(np.zeros(2), near[0], np.array([0.3]), near[1], axes=3, quantile=1.0)
+        np.testing.assert_allclose(again.parameters, first.parameters, atol=0.05)
+        np.testing.assert_allclose(again.biases, first.biases, atol=0.05)
 
 
 def test_three_axes_of_three_quantities_have_their_whole_covariance() -> None:

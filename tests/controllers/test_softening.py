@@ -16,7 +16,11 @@ from adaptive_flot.runner.results.timeseries import SOFTENED
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.newton_step import PlanStep
+from controllers.economic_mpc.nlp_solvers import interior_point
+from controllers.economic_mpc.real_time_iteration import RealTimeIteration
 from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.verification import Validity
 
 LOW_GRADE, LOW_LEVEL = -0.06, 0.30
 """Bias of the grade, and a level [m], that no plan can make good within the first move."""
@@ -117,6 +121,37 @@ def test_a_further_solve_that_fails_leaves_the_plan_and_says_so(
     assert decision.status is Status.SOFTENED and decision.plan is not None
     assert decision.softened["concentrate_grade"] > 0.01
     assert decision.message.endswith("not in the stated order, since a further solve failed")
+
+
+@pytest.mark.parametrize("level", [None, LOW_LEVEL])
+def test_newton_steps_give_up_what_a_complete_solver_does(monkeypatch: pytest.MonkeyPatch, level: float | None) -> None:
+    """The plans of the stated order, found without ipopt, against those of ipopt."""
+    ours = make()
+    controller, state, _ = decided(ours, bias=LOW_GRADE, level=level)
+    theirs = make()
+    assert isinstance(theirs.controller, EconomicMpc)
+    ipopt = interior_point(theirs.controller.problem, "ipopt", 5.0)
+    monkeypatch.setattr(theirs.controller.planner.softening, "solver", lambda *given: ipopt(*given[:3]))
+    _, other, _ = decided(theirs, bias=LOW_GRADE, level=level)
+    assert state.plan is not None and other.plan is not None
+    inputs = [controller.layout.inputs_of(plan) for plan in (state.plan, other.plan)]
+    np.testing.assert_allclose(inputs[0], inputs[1], rtol=2e-3)
+    np.testing.assert_allclose(slacks(controller, state), slacks(controller, other), atol=2e-3)
+
+
+def test_steps_that_do_not_come_to_the_optimum_are_followed_by_a_complete_solver(case: ControllerCase) -> None:
+    controller = case.controller
+    assert isinstance(controller, EconomicMpc)
+    start, planner = decided(case)[1], controller.planner
+    assert start.plan is not None and start.multipliers is not None
+    steps = RealTimeIteration(controller.problem, PlanStep(controller.problem), controller.solver, until=0.0)
+    bounds = controller.layout.bounds(planner.softening.bounds)
+    found = steps(np.full_like(case.estimates[0].state, np.nan), bounds, start.plan, start.multipliers)
+    assert found.validity is not Validity.VALID
+    arguments = planner.find(
+        controller.solver, start, case.samples[0].inputs, case.samples[0], case.estimates[0]
+    ).arguments
+    assert steps(arguments, bounds, start.plan, start.multipliers).found_by == "fatrop"
 
 
 @pytest.mark.parametrize("priority", [["level"], ["level", "level"], ["level", "recovery"]])
