@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo live-demo test browser postgresql check format docs bench bench-discovery bench-discovery-quick bench-live bench-lanes bench-measured lock clean
+.PHONY: help install demo live-demo test pytest browser postgresql check lint types format docs bench bench-discovery bench-discovery-quick bench-live bench-lanes bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,7 +26,14 @@ install: $(READY) ## Create .venv with the pinned dependencies and this project
 demo: $(READY) ## Run the demonstration
 	@$(BIN)/python -m adaptive_flot.demo
 
-test: check browser postgresql ## Run all checks and the test suite
+# Types are checked beside the tests. Those keep all cores busy: a further thread of the linear algebra would only be in
+# their way. Programs that they start find the bytecode of those before.
+test: lint browser postgresql ## Run all checks and the test suite
+	@$(MAKE) --no-print-directory -j 2 types pytest
+
+pytest: export OPENBLAS_NUM_THREADS = 1
+pytest: export PYTHONDONTWRITEBYTECODE =
+pytest: $(READY)
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 browser: ## Install Chromium for the tests of pages where this system lets us; without it they are skipped
@@ -35,11 +42,15 @@ browser: ## Install Chromium for the tests of pages where this system lets us; w
 postgresql: ## Install PostgreSQL for the test of the live link's memory, where this system lets us; else it is skipped
 	@$(install_postgresql)
 
-check: $(READY) ## Run the static checks: ruff, mypy, import contracts
+check: lint types ## Run the static checks: ruff, mypy, import contracts
+
+lint: $(READY)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/ruff format --quiet --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+
+types: $(READY)
+	$(BIN)/mypy
 
 format: $(READY) ## Format the code and apply ruff's safe fixes
 	$(BIN)/ruff check --fix --quiet .

@@ -5,16 +5,15 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.text import Text
 
 from adaptive_flot.console_tables import print_table
-from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
-from adaptive_flot.report.estimate.innovations import innovations_sentences
 from adaptive_flot.report.kit.parts import Table as Content
 from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.absorbed import absorbed
@@ -23,9 +22,12 @@ from adaptive_flot.report.run.series import cases
 from adaptive_flot.report.run.softened import softened_table
 from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
-from adaptive_flot.runner.commands.estimate import RecordEstimate
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
+
+if TYPE_CHECKING:  # tables of runs need no discovery, whose libraries take a while to load
+    from adaptive_flot.discovery.results import Verdict
+    from adaptive_flot.runner.commands.estimate import RecordEstimate
 
 PIPE_WIDTH = 80
 """Letters a line where standard output is no terminal."""
@@ -122,6 +124,8 @@ def _fit_cell(values: Sequence[float], published: float | None) -> str:
 
 def print_estimate(result: RecordEstimate) -> None:
     """Print the errors of each estimator on the fit and the test block, and what the record identifies."""
+    from adaptive_flot.report.estimate.innovations import innovations_sentences
+
     rows = [
         (
             replay.estimator,

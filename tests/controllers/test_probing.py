@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -131,16 +132,19 @@ def test_a_dip_is_one_move_within_the_limits_and_never_towards_the_grade_limit(p
 @given(prices=st.lists(st.floats(-0.01, 0.1), min_size=1, max_size=40), wage=st.floats(0.001, 1.0))
 def test_no_sequence_of_prices_spends_more_than_the_wage(prices: list[float], wage: float) -> None:
     """Also when a price is predicted to be negative: that is no income."""
-    limits = make_limits()
-    probing, state, before = (
-        Probing(StageLayout(flotation.make_model(), limits, 2, 30.0), limits, most_cu_h=wage),
-        ProbeState(0.0),
-        0.0,
-    )
+    layout, limits = make_layout()
+    probing, state, before = Probing(layout, limits, most_cu_h=wage), ProbeState(0.0), 0.0
     for k, price in enumerate(prices):
         state, _ = probing.pay(state, price, 30.0 * (k + 1))
         assert before <= state.spent <= wage * 30.0 * (k + 1) / 3600 + 1e-12
         before = state.spent
+
+
+@cache
+def make_layout() -> tuple[StageLayout, Limits]:
+    """Made once: neither depends on what is paid."""
+    limits = make_limits()
+    return StageLayout(flotation.make_model(), limits, 2, 30.0), limits
 
 
 def make_limits() -> Limits:

@@ -13,7 +13,8 @@ from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.run.page import run_report
 from adaptive_flot.runner.adaptation import supervisor
-from adaptive_flot.runner.adaptation.extension import Extension, Finding
+from adaptive_flot.runner.adaptation.extension import Extension
+from adaptive_flot.runner.adaptation.search import Finding
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import plain, run_summary
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms

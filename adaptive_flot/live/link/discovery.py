@@ -25,8 +25,7 @@ from adaptive_flot.live.link.children import beside_the_cycle
 from adaptive_flot.live.link.estimation import missing
 from adaptive_flot.live.link_file import Link, load_link
 from adaptive_flot.live.outcome import Outcome
-from adaptive_flot.runner.adaptation.supervisor import measured_record
-from adaptive_flot.runner.adaptation.whiteness_watch import watch
+from adaptive_flot.runner.adaptation.measured_record import measured_record
 from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.results.run_arrays import innovations
 
@@ -45,7 +44,7 @@ def search(link_file: Path, record: Dataset, effects: tuple[Effect, ...]) -> Fin
     effects
         What the model in use has beyond the scenario's.
     """
-    from adaptive_flot.runner.adaptation.extension import search_record
+    from adaptive_flot.runner.adaptation.search import search_record
 
     link = load_link(link_file)
     options, setup = link.scenario.file.discovery, link.scenario.setup
@@ -89,6 +88,10 @@ class LiveDiscovery:
         self._found: Future[Finding] | None = None
         self._longest = round(link.file.cycle.longest_gap_s / self._setup.dt)
         self._alarm, self._quiet_until, self._window = "", -np.inf, 0
+        if self._options is not None:  # its libraries take a second or two to load, which no cycle may wait for
+            from adaptive_flot.runner.adaptation.whiteness_watch import watch
+
+            self._watch = watch
         rows = 0 if self._options is None else max(self._options.record_s, self._options.window_s) / self._setup.dt
         self._steps: deque[Step] = deque(maxlen=round(rows) + 1)
 
@@ -144,7 +147,7 @@ class LiveDiscovery:
         seen = np.vstack([s.outputs for s in in_time(innovations(list(self._steps)[-rows:]), self._setup)])
         names = self._options.outputs or self._setup.outputs
         columns = {name: seen[:, self._setup.model.index("outputs", name)] for name in names}
-        alarm = watch(columns, self._options.false_alarm)
+        alarm = self._watch(columns, self._options.false_alarm)
         self._alarm = "" if alarm is None else str(alarm)
         return f"alarm: {self._alarm}" if self._alarm else ""
 

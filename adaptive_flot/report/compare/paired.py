@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.compare.answer import VALUE, best, fit_names
@@ -55,7 +55,7 @@ def interval(d: FloatArray) -> tuple[float, float]:
     """95 % interval of the mean of differences (S,); NaN with fewer than two."""
     if d.size < 2:
         return float("nan"), float("nan")
-    half = float(t.ppf(0.5 + LEVEL / 2, d.size - 1)) * float(np.std(d, ddof=1)) / float(np.sqrt(d.size))
+    half = float(stdtrit(d.size - 1, 0.5 + LEVEL / 2)) * float(np.std(d, ddof=1)) / float(np.sqrt(d.size))
     return float(d.mean()) - half, float(d.mean()) + half
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from adaptive_flot.discovery.results import Verdict
+if TYPE_CHECKING:  # pages that tell of no search need no discovery
+    from adaptive_flot.discovery.results import Verdict
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.adaptation.background import Background
 from adaptive_flot.runner.adaptation.bumpless_transfer import BumplessTransfer, Rebuild, transfer
-from adaptive_flot.runner.adaptation.extension import Finding, search_record
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
+from adaptive_flot.runner.adaptation.measured_record import measured_record
+from adaptive_flot.runner.adaptation.search import Finding, search_record
 from adaptive_flot.runner.adaptation.whiteness_watch import Alarm, watch
 from adaptive_flot.runner.loop.loop import Running, Step
 from adaptive_flot.runner.results.run_arrays import innovations
@@ -155,18 +156,6 @@ class Supervisor:
         worse = [name for name, (old, new) in seen.items() if new > (1 + WORSE) * old]
         why = f"the one-step error of {', '.join(worse)} grows on rows that did not enter the search" if worse else ""
         return replace(inquiry, errors=errors, extended=not worse, why=why)
-
-
-def measured_record(steps: Sequence[Step], setup: Setup) -> Dataset:
-    """What the instruments have shown until now, delayed values in their places: no truth of the plant enters."""
-    samples = in_time([s.plant.sample for s in steps], setup)
-    return Dataset(
-        name="measured in the loop",
-        time=np.array([s.time for s in samples]),
-        dt=setup.dt,
-        inputs=np.vstack([s.inputs for s in samples]),
-        outputs=np.vstack([s.outputs for s in samples]),
-    )
 
 
 def one_step_error(estimates: Sequence[Estimate], column: int, since: float) -> float:

@@ -20,8 +20,9 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.runner.adaptation import extension, supervisor
-from adaptive_flot.runner.adaptation.extension import Extension, Finding, search_record
+from adaptive_flot.runner.adaptation import search, supervisor
+from adaptive_flot.runner.adaptation.extension import Extension
+from adaptive_flot.runner.adaptation.search import Finding, search_record
 from adaptive_flot.runner.adaptation.whiteness_watch import Alarm
 from adaptive_flot.runner.commands.fingerprint import conditions
 from adaptive_flot.runner.commands.run import run_scenario
@@ -180,7 +181,7 @@ def test_what_a_search_found_becomes_an_extension(model: Model, monkeypatch: pyt
         found = says("class", growth(0.3), growth_exponent=1.07)(model, record, **options)
         return replace(found, after=cast(Any, SimpleNamespace(initial_state=state)))
 
-    monkeypatch.setattr(extension, "discover", discover)
+    monkeypatch.setattr(search, "discover", discover)
     found = search_record(Setup(base, 1.0, ("growth_exponent", "coalescence_rate"), ("concentrate_grade",)), record, 1)
     assert found.extension.effects == (replace(growth(0.3), coefficients={"amplitude": 0.0, "exponent": 0.3}),)
     assert found.extension.parameters == {"growth_exponent": 1.07, "coalescence_rate": 6.38e-4}
@@ -193,7 +194,7 @@ def test_the_inputs_keep_their_rate_limit(
 ) -> None:
     """A large effect is taken up while the controller works: no input moves further than it may, at any sample."""
     changes = {**WATCHED, **CLOSED, "plant": {"effects": [GROWTH]}, "parameters": {}}
-    monkeypatch.setattr(extension, "discover", says("named", growth(0.6)))
+    monkeypatch.setattr(search, "discover", says("named", growth(0.6)))
     (run,) = runs(write_scenario(changes), "fixed")
     assert run.inquiries and run.inquiries[0].extended
     table = run.table[run.table["time_s"] >= 41]
@@ -206,7 +207,7 @@ def test_the_inputs_keep_their_rate_limit(
 def test_other_verdicts_leave_the_loop_alone(
     write_scenario: WriteScenario, monkeypatch: pytest.MonkeyPatch, alarming: None, word: Word
 ) -> None:
-    monkeypatch.setattr(extension, "discover", says(word, growth(0.6)))
+    monkeypatch.setattr(search, "discover", says(word, growth(0.6)))
     (watched,) = runs(write_scenario(WATCHED), "rpem")
     (unwatched,) = runs(write_scenario({"seeds": [1]}), "rpem")
     assert watched.inquiries is not None
@@ -220,7 +221,7 @@ def test_a_failed_search_leaves_the_loop_alone(
     def fails(*args: object, **options: object) -> Discovery:
         raise ModelError("nothing to search")
 
-    monkeypatch.setattr(extension, "discover", fails)
+    monkeypatch.setattr(search, "discover", fails)
     (watched,) = runs(write_scenario(WATCHED), "rpem")
     (unwatched,) = runs(write_scenario({"seeds": [1]}), "rpem")
     assert watched.inquiries is not None
@@ -232,7 +233,7 @@ def test_a_wrong_name_is_refused_by_rows_that_chose_nothing(
     write_scenario: WriteScenario, monkeypatch: pytest.MonkeyPatch, alarming: None
 ) -> None:
     """The plant has no effect; a search that claims a strong one is not believed."""
-    monkeypatch.setattr(extension, "discover", says("named", growth(2.0)))
+    monkeypatch.setattr(search, "discover", says("named", growth(2.0)))
     (run,) = runs(write_scenario({**WATCHED, "parameters": {}}), "fixed")
     assert run.inquiries is not None
     (inquiry,) = run.inquiries
@@ -250,7 +251,7 @@ def test_a_search_sees_what_was_measured_and_no_more(
         np.savez(tmp_path / "seen.npz", time=record.time, inputs=record.inputs, outputs=record.outputs)
         return says("none")(model, record, adapted=adapted, processes=processes)
 
-    monkeypatch.setattr(extension, "discover", look)
+    monkeypatch.setattr(search, "discover", look)
     changes = {**WATCHED, "plant": {"effects": [GROWTH]}, "discovery": {**OPTIONS, "record_s": 70}}
     (run,) = runs(write_scenario(changes), "rpem")
     seen = np.load(tmp_path / "seen.npz")
