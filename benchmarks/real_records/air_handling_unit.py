@@ -35,6 +35,8 @@ SHOWS = tuple(day for day in TRUTH if day not in ("03-15", "03-20", "03-21", "03
 """Days whose fault stands out of the noise: the others are leaks of 5 % and of the damper."""
 SAME_PART = {"heating_coil": "heating_valve", "cooling_coil": "cooling_valve"}
 """A coil that gives nothing and its valve that stays shut are the same to these sensors."""
+HOT_WATER, CHILLED_WATER = 60.0, 6.7
+"""Usual design temperatures of the water [degC] (140 and 44 degF); those of the unit were not recorded."""
 _COLUMNS = {
     "outdoor": "outdoor_air_temperature_degF",
     "return_air": "return_air_temperature_degF",
@@ -56,11 +58,12 @@ def make_model() -> Model:
         blend = m.input("return_air") + share * (m.input("outdoor") - m.input("return_air"))
         heating = m.site("heating_coil", m.parameter("kh") * ca.power(ca.fmax(hot, 1e-6), m.parameter("eh")))
         cooling = m.site("cooling_coil", m.parameter("kc") * ca.power(ca.fmax(cold, 1e-6), m.parameter("ec")))
+        inlet = mixed + m.parameter("fan")
         m.derivative("mixed", (blend - mixed) / m.parameter("tm"))
         m.derivative("mixed_seen", (mixed - seen) / 60.0)
-        m.derivative("heat", (heating - heat) / m.parameter("th"))
-        m.derivative("cool", (cooling - cool) / m.parameter("tc"))
-        m.derivative("supply", (mixed + m.parameter("fan") + heat - cool - supply) / 60.0)
+        m.derivative("heat", (heating * (HOT_WATER - inlet) - heat) / m.parameter("th"))
+        m.derivative("cool", (cooling * (inlet - CHILLED_WATER) - cool) / m.parameter("tc"))
+        m.derivative("supply", (inlet + heat - cool - supply) / 60.0)
         m.output("mixed", m.site("mixed_sensor", mixed, "sensor", "offset", unit="K"))
         m.output("supply", m.site("supply_sensor", supply, "sensor", "offset", unit="K"))
 
@@ -70,9 +73,9 @@ def make_model() -> Model:
     constants = (
         constant("a0", 0.05, "-", 0.0, 1.0, 0.1),
         constant("a1", 0.6, "-", 0.0, 2.0, 0.2),
-        constant("kh", 20.0, "K", 0.0, 100.0, 5.0),
+        constant("kh", 0.5, "-", 0.2, 1.0, 0.2),
         constant("eh", 1.0, "-", 0.2, 5.0, 0.3),
-        constant("kc", 10.0, "K", 0.0, 100.0, 5.0),
+        constant("kc", 0.5, "-", 0.2, 1.0, 0.2),
         constant("ec", 1.0, "-", 0.2, 5.0, 0.3),
         constant("th", 120.0, "s", 20.0, 1200.0, 60.0),
         constant("tc", 120.0, "s", 20.0, 1200.0, 60.0),

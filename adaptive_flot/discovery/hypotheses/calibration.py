@@ -113,7 +113,7 @@ def calibrate(
 
 def _fit_from(model: Model, rows: Rows, loose: Constants, start: FloatArray) -> JointFit:
     fitter = JointFitter(model, rows, loose)
-    z = fitter.start()
+    z = fitter.unknowns.start()
     z[: len(start)] = start
     return fitter.fit(z)
 

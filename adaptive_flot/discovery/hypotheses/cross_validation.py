@@ -125,7 +125,7 @@ def fit_all_rows(
     initial = [_with_effect_states(extended, x) for x in first_states(model, rows.records)]
     fitter = JointFitter(extended, rows, constants, own, initial)
     fit = (
-        fitter.fit(fitter.start())
+        fitter.fit(fitter.unknowns.start())
         if hypothesis is None or base is None
         else _first_fit(fitter, hypothesis, base, refresh, elsewhere)
     )
@@ -180,7 +180,7 @@ def _fitted_elsewhere(fitter: JointFitter, whole: JointFit, hold_constants: bool
     if hold_constants:
         zeros = np.zeros((len(whole.jacobian), len(whole.unknowns) - len(whole.coefficients)))
         return fitter.fit(whole.unknowns, most=FOLD_EVALUATIONS, shared=zeros)
-    start = fitter.inside(whole.unknowns + _step(fitter, whole))
+    start = fitter.unknowns.inside(whole.unknowns + _step(fitter, whole))
     return fitter.fit(start, most=FOLD_EVALUATIONS, shared=_masked(fitter, whole))
 
 
@@ -243,7 +243,9 @@ def _first_fit(
     for constants, count in ((None, REFINED), *((c, 1) for c in elsewhere)):
         tried: list[tuple[float, int, FloatArray]] = []
         for k, start in enumerate(hypothesis.starts):
-            z = fitter.inside(fitter.extended(base, {hypothesis.effect.parameter(c): v for c, v in start.items()}))
+            z = fitter.unknowns.inside(
+                fitter.extended(base, {hypothesis.effect.parameter(c): v for c, v in start.items()})
+            )
             if constants is not None:
                 z[len(fitter.coefficients) : len(fitter.coefficients) + len(constants)] = constants
             cost = fitter.cost(z, fitter.errors(z))

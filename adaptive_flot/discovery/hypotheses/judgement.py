@@ -17,6 +17,7 @@ from adaptive_flot.discovery.hypotheses.comparison import (
     tied,
 )
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
+from adaptive_flot.discovery.hypotheses.plausible import at_edge, moves_though_stopped
 from adaptive_flot.discovery.hypotheses.rows import Rows
 from adaptive_flot.greybox.model import FloatArray
 
@@ -136,16 +137,22 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
     if usual is not None:
         if usual.exceeded(null, count, len(blocks.edges)) is None:
             return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
-    ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
+    possible = (t for t in tested if np.isfinite(t.total) and not moves_though_stopped(rows, t))
+    ranked = sorted(possible, key=lambda t: t.total)
     standing = [t for t in ranked if stands(rows, blocks, null, t)]
     if not standing:
         why = "no single hypothesis makes the errors smaller on rows that did not fit it"
         return Judged("abstain", None, tuple(ranked[:3]), why, float("nan")), blocks
-    best = standing[0]
+    inside = [t for t in standing if not at_edge(t)]
+    if not inside:
+        why = "what fits best would have to be larger than such a fault can be, so that something else is the matter"
+        return Judged("abstain", None, tuple(standing[:3]), why, float("nan")), blocks
+    best = inside[0]
+    beyond = [t for t in standing if t.total < best.total]  # at an edge: no explanation, but as good a fit
     excess = max(level - least, 1e-12)
     explained = float((level - best.total / count) / excess)
     adequate = usual is not None and usual.exceeded(best, count, len(blocks.edges)) is None
-    alike = tied(blocks, null, best, [t for t in ranked if t is not best], adequate)
+    alike = (*beyond, *tied(blocks, null, best, [t for t in ranked if t is not best and t not in beyond], adequate))
     beaten = ranked[0] is not best and not any(t is ranked[0] for t in alike)
     best, alike = _simplest(best, alike)
     judged = Judged("named", best, alike, "", explained)

@@ -30,13 +30,18 @@ def row_jacobians(
     inputs, p
         Inputs held in each interval (n, nu), as the stepper takes them, and parameters (np,).
     wrt
-        The q parameters.
+        The q parameters; one may be there more than once.
 
     Returns
     -------
     tuple
         dx_dx (n, nx, nx), dx_dtheta (n, nx, q), dy_dx (n, ny, nx), dy_dtheta (n, ny, q).
     """
+    each = tuple(dict.fromkeys(wrt))
+    if len(each) < len(wrt):
+        columns = [each.index(name) for name in wrt]
+        A, G, C, H = row_jacobians(stepper, states, time, inputs, p, each)
+        return A, G[:, :, columns], C, H[:, :, columns]
     n, nx, q, ny = len(inputs), states.shape[1], len(wrt), len(stepper.model.outputs)
     code = stepper.record_code(n, tuple(wrt))
     if code is not None:

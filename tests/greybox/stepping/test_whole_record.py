@@ -158,9 +158,11 @@ def test_parameters_may_change_from_row_to_row() -> None:
 
 
 @needs_compiler
-def test_the_jacobians_of_each_row() -> None:
+@pytest.mark.parametrize("wrt", [["gain"], ["gain", "gain"]])
+def test_the_jacobians_of_each_row(wrt: list[str]) -> None:
+    """A parameter that is fitted already is asked for a second time where its site is a candidate again."""
     x0, u = record(SMALL)
-    wrt, p, times = ["gain"], SMALL.parameter_values, np.arange(float(ROWS))
+    p, times = SMALL.parameter_values, np.arange(float(ROWS))
     plain, quick = Stepper(SMALL, 1.0), Stepper(replace(SMALL, record_code=True), 1.0)
     states = np.vstack([x0, plain.simulate(x0, u, p).states[:-1]])
     expected = row_jacobians(plain, states, times, u, p, wrt)
