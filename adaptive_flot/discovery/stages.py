@@ -25,7 +25,7 @@ from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
 from adaptive_flot.discovery.verdict.conclude import insufficient, report_errors
-from adaptive_flot.discovery.verdict.judge import held_up, judge, least_separation, undecided_rivals
+from adaptive_flot.discovery.verdict.judge import first_that_stands, held_up, judge, least_separation, undecided_rivals
 from adaptive_flot.discovery.verdict.outputs import certain_words
 from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
@@ -124,6 +124,7 @@ def compare_with_common_nuisance(state: State) -> State:
 def judge_alternatives(state: State) -> State:
     """Turn the ranking into one of six words; what is named must itself stand on the confirm split."""
     problem, result = state.searched
+    result = first_that_stands(problem, result)
     result, judgement = held_up(problem, result, judge(result))
     said = state.screening.notes
     if problem.time_is_up:

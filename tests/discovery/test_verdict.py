@@ -13,7 +13,7 @@ from adaptive_flot.discovery.fitting.fit import row_losses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
 from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.judge import held_up, judge
+from adaptive_flot.discovery.verdict.judge import first_that_stands, held_up, judge
 from adaptive_flot.discovery.verdict.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import heated_tank
@@ -199,3 +199,14 @@ def test_a_name_is_confirmed_for_what_it_names(draught: Discovery) -> None:
     )
     assert judge(found).word == "named"
     assert held_up(draught.problem, found, judge(found))[1].word == "abstain"
+
+
+def test_what_fresh_rows_contradict_gives_way_to_a_name_that_is_as_good_and_stands(draught: Discovery) -> None:
+    """The best one makes an output worse. One as good takes its place; one that is surely worse does not."""
+    assert draught.problem is not None
+    contradicted = Verification(0.8, (0.7, 0.9), ("level",), False)
+    for worse, front in ((5.0, BY_FAN), (50.0, BY_HEATER)):
+        found = _search(draught, (BY_HEATER, False, 0.0), (BY_FAN, True, worse), verification=contradicted)
+        stands = first_that_stands(draught.problem, found)
+        assert stands.alternatives[0].names == (front,) and len(stands.alternatives) == 2
+        assert judge(stands).word == ("named" if front == BY_FAN else "abstain")

@@ -15,7 +15,7 @@ from adaptive_flot.discovery.results import OutputChange, Verification
 from adaptive_flot.greybox.model import FloatArray
 
 BLOCK_ROWS = 20
-"""Rows of a block of the paired block bootstrap: longer than the noise remembers."""
+"""Least rows of a block of the paired block bootstrap: longer than the noise remembers."""
 COMPARISON_BLOCK_ROWS = 60
 """Rows of a block in which two fits are compared: what both lack is slower than the noise."""
 SHORTEST_BLOCK = 4
@@ -33,14 +33,14 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     Confirmed where the 95 % interval of the reduction (see `_reduction`) lies above zero and no output is worse: its
     error grew by more than WORSE, and the interval of its own reduction lies below zero.
     """
-    rows = problem.rows("confirm")
+    rows, block = problem.rows("confirm"), _block_rows(problem, before, after)
     size = problem.weights * after.noise.stationary_std()
     old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
-    reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1))
+    reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
     worse = []
     for j, c in enumerate(problem.columns):
         ratio = float(np.sqrt(np.nanmean(new[:, j]) / np.maximum(np.nanmean(old[:, j]), 1e-300)))
-        if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j])[1][1] < 0:
+        if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j], block)[1][1] < 0:
             worse.append(after.model.outputs[c].name)
     return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)
 
@@ -107,7 +107,7 @@ def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
 
 def changes(problem: Problem, before: Fit, after: Fit, split: str) -> tuple[OutputChange, ...]:
     """Free-run error of each measured output on one split of the record, before and after."""
-    rows = problem.rows(split)
+    rows, block = problem.rows(split), _block_rows(problem, before, after)
     ones = np.ones_like(problem.weights)
     old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
     noise = after.noise.stationary_std()
@@ -118,7 +118,7 @@ def changes(problem: Problem, before: Fit, after: Fit, split: str) -> tuple[Outp
             continue
         a, b = (float(np.sqrt(np.nanmean(s[:, j]))) for s in (old, new))
         sigma = float(noise[j] * np.sqrt(np.mean(problem.weights[rows, j] ** 2)))
-        errors.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j])[1]))
+        errors.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j], block)[1]))
     return tuple(errors)
 
 
@@ -127,7 +127,16 @@ def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> F
     return squares
 
 
-def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, float]]:
+def _block_rows(problem: Problem, before: Fit, after: Fit) -> int:
+    """Rows of a block: more than BLOCK_ROWS where what both fits lack is slower than the noise.
+
+    Twice the rows of an effective sample (see `rows_per_effective_sample`): neighbouring blocks are then next to
+    independent.
+    """
+    return max(BLOCK_ROWS, round(2 * rows_per_effective_sample(problem, before, after)))
+
+
+def _reduction(old: FloatArray, new: FloatArray, block: int = BLOCK_ROWS) -> tuple[float, tuple[float, float]]:
     """Reduction of the root mean square error with a 95 % interval; squared errors old and new (N,), NaN where missing.
 
     With the sums O_b and N_b over blocks of neighbouring rows::
@@ -140,7 +149,7 @@ def _reduction(old: FloatArray, new: FloatArray) -> tuple[float, tuple[float, fl
     there are fewer than four blocks.
     """
     ok = np.isfinite(old) & np.isfinite(new)
-    length = int(np.clip(ok.sum() // MANY_BLOCKS, SHORTEST_BLOCK, BLOCK_ROWS))
+    length = int(np.clip(ok.sum() // MANY_BLOCKS, SHORTEST_BLOCK, block))
     count = int(ok.sum()) // length
     if count < 4 or not old[ok].sum() > 0:
         return 0.0, (float("-inf"), float("inf"))

@@ -142,14 +142,13 @@ def _at_site(
 
 
 def _stuck_or_leaking(site: Site, low: float, spread: float) -> Iterator[Hypothesis]:
-    levels = tuple({"level": low + share * spread} for share in LEVELS)
-    yield Hypothesis(
-        site.name, "own_value", "stuck", Effect(site.name, "own_value", "stuck", {"amplitude": 1.0}), ("level",), levels
-    )
+    levels, seen = tuple({"level": low + share * spread} for share in LEVELS), {"level": (low, low + spread)}
+    stuck = Effect(site.name, "own_value", "stuck", {"amplitude": 1.0})
+    yield Hypothesis(site.name, "own_value", "stuck", stuck, ("level",), levels, seen)
     effect = Effect(
         site.name, "own_value", "leak", {"amplitude": 1.0, "level": low}, {"width": ROUNDING * spread}
     )  # fmt: skip
-    yield Hypothesis(site.name, "own_value", "leaks", effect, ("level",), levels[1:])
+    yield Hypothesis(site.name, "own_value", "leaks", effect, ("level",), levels[1:], seen)
 
 
 def _frozen(site: Site, low: float, spread: float) -> Hypothesis:
@@ -171,6 +170,7 @@ def _limited(site: Site, low: float, spread: float) -> Hypothesis:
         effect,
         ("limit",),
         tuple({"limit": low + s * spread} for s in (0.3, 0.6, 0.9)),
+        {"limit": (low, low + spread)},
     )
 
 

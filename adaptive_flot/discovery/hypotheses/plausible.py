@@ -10,6 +10,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 AT_EDGE = 0.01
 """A coefficient is at the edge of its range when it is nearer to it than this share of the range."""
+ERRORS = ("span", "offset", "lag")
+"""Faults that have a size. A part may well be stuck at the end of its range."""
 STILL = 1e-6
 """A prediction that moves by a smaller share of what was measured stands still."""
 MOVES = 4.0
@@ -23,7 +25,7 @@ def at_edge(tested: Tested) -> bool:
     The record then asks for more than the fault can give. The fault is no explanation, though it may fit best.
     """
     h = tested.hypothesis
-    if h is None:
+    if h is None or h.kind not in ERRORS:
         return False
     for name, (low, high) in h.limits.items():
         value, near = tested.fit.value(h.effect.parameter(name)), AT_EDGE * (high - low)

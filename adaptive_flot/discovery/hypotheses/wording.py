@@ -22,7 +22,9 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     values = dict(zip(h.free, (value(name) for name in h.parameters), strict=True))
     site = next(s for s in model.sites if s.name == h.site)
     name, unit = site.name.replace("_", " "), f" {site.unit}" if site.unit and site.unit != "-" else ""
-    first = next(iter(values.values()))
+    first = _at_its_end(next(iter(values.values())), h)
+    if h.kind == "stuck" and site.role == "sensor":
+        return f"{name} shows {first:.3g}{unit} all the time"
     if h.kind == "stuck":
         return f"{name} stays at {first:.3g}{unit}, whatever is asked"
     if h.kind == "leaks":
@@ -62,6 +64,14 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         more = f"{abs(change):.3g}{unit} {'more' if change > 0 else 'less'}"
         return f"{name} depends on {driver}: {more} at {driver} {high:.3g} than at {low:.3g}"
     return f"{name} depends on {driver}: {_factor(change)} at {driver} {high:.3g} than at {low:.3g}"
+
+
+def _at_its_end(value: float, h: Hypothesis) -> float:
+    """The value, or the end of its range where it lies within a thousandth of that."""
+    for low, high in h.limits.values():
+        near = [end for end in (low, high) if abs(value - end) < 1e-3 * (high - low)]
+        return near[0] if near and len(h.free) == 1 else value
+    return value
 
 
 def _factor(log: float) -> str:

@@ -77,6 +77,25 @@ def held_up(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[
     return result, Judgement("abstain", result.alternatives[0], (), judged.rivals, judged.margin)
 
 
+def first_that_stands(problem: Problem, result: SearchResult) -> SearchResult:
+    """The search with the first named alternative in front that fresh rows confirm, where they contradict the best one.
+
+    It must be as good as the best one: not told apart by evidence that counts effective samples. What fits a little
+    better and makes an output worse on fresh rows is no reason to say nothing.
+    """
+    checked = result.verification
+    if not result.alternatives or checked is None or checked.confirmed or not checked.reduction95[0] > 0:
+        return result
+    best = result.alternatives[0]
+    for a in result.alternatives[1:]:
+        if all(a.known) and problem.whiten and a.near(best, LEAST_MARGIN * result.rows_per_effective_sample):
+            own = verify(problem, result.base, a.fit)
+            if own.confirmed:
+                others = tuple(b for b in result.alternatives if b is not a)
+                return replace(result, alternatives=(a, *others), verification=own)
+    return result
+
+
 def undecided_rivals(result: SearchResult) -> tuple[Alternative, ...]:
     """Rivals that are near the best, where some are so only for what the best leaves unexplained; else none."""
     if not result.alternatives or result.verification is None or not result.verification.confirmed:
