@@ -118,6 +118,8 @@ class BatchFit:
         Covariance of the last state and the fitted parameters together (nx + q, nx + q), where it is known.
     starts, agreed
         Searches of the whole record, each from another start, and how many of them ended at this fit.
+    colour
+        Long-run variance of what is left of each output (m,), over its variance, where it is known; see `Prior`.
     """
 
     record: str
@@ -133,6 +135,7 @@ class BatchFit:
     joint_covariance: FloatArray | None = None
     starts: int = 1
     agreed: int = 1
+    colour: FloatArray | None = None
 
     def values(self) -> FloatArray:
         """Fitted values (q,)."""
@@ -148,7 +151,8 @@ class BatchFit:
 
     def prior(self, time: float) -> Prior:
         """Where a recursive estimator goes on from the last row of the record."""
-        return Prior(time, self.last_state, self.values(), self.covariance, self.noise_std, self.joint_covariance)
+        known = self.covariance, self.noise_std, self.joint_covariance, self.colour
+        return Prior(time, self.last_state, self.values(), *known)
 
 
 class BatchEstimator(Protocol):

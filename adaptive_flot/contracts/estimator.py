@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
 from adaptive_flot.contracts.sample import DelayedValue, Sample
@@ -31,6 +31,8 @@ class Setup(Described):
     truth
         True parameters (N, np), row k for the interval that starts at k dt; None for all estimators but those
         whose class says `needs_truth = True` (the oracle).
+    unmeasured
+        Names of parameters of the model that are disturbances of the plant which nobody measures.
     """
 
     model: Model
@@ -38,6 +40,7 @@ class Setup(Described):
     parameters: tuple[str, ...]
     outputs: tuple[str, ...]
     truth: FloatArray | None = None
+    unmeasured: tuple[str, ...] = ()
 
     def described(self) -> Mapping[str, object]:
         """For what it is; see `Described`."""
@@ -67,6 +70,9 @@ class Prior:
         Standard deviation of the measurement noise of each driving output (m,).
     joint_covariance
         Covariance of state and parameters together (nx + q, nx + q); None: the state is taken as known.
+    colour
+        Long-run variance of what a fit leaves of each driving output (m,), over its variance: about 1 for white noise.
+        Where it is larger the model does not explain the record, and the covariance is too small. None: not known.
     """
 
     time: float
@@ -75,6 +81,7 @@ class Prior:
     covariance: FloatArray
     noise_std: FloatArray
     joint_covariance: FloatArray | None = None
+    colour: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,8 @@ class Estimate:
     discrepancy
         How far each output is off from the model (ny,), in its unit, as the estimator sees it: part of `prediction`.
         None where the prediction is the model's alone.
+    disturbances
+        Values of the unmeasured disturbances that the estimator has found, by parameter name, each in its unit.
     delayed
         Innovations of the delayed values that were used: output, time taken, measured minus predicted then.
     """
@@ -116,6 +125,15 @@ class Estimate:
     status: Status
     delayed: tuple[DelayedValue, ...] = ()
     discrepancy: FloatArray | None = None
+    disturbances: Mapping[str, float] = field(default_factory=dict)
+
+    def shown_with(self, sample: Sample, model: Model) -> Sample:
+        """The sample for a controller, with the disturbances found among its parameters."""
+        if not self.disturbances:
+            return sample
+        p = model.parameter_values if sample.parameters is None else sample.parameters.copy()
+        p[model.indices("parameters", self.disturbances)] = list(self.disturbances.values())
+        return replace(sample, parameters=p)
 
 
 class Estimator(Protocol[State]):

@@ -1,7 +1,8 @@
 """Run and print: `python -m benchmarks.kinds_of_change`, about 25 minutes for 20 seeds.
 
-Writes one Parquet part for each truth and seed into the folder of `--out`. Parts that are there already are not run
-again, so that a run that was stopped goes on; remove the folder after a change. Choices were made on seeds 1 to 3.
+Writes one Parquet part for each truth, seed and estimator into the folder of `--out`. Parts that are there already are
+not run again, so that a run that was stopped goes on; remove the folder after a change. Choices were made on seeds 1 to
+3.
 """
 
 from __future__ import annotations
@@ -34,21 +35,27 @@ def main() -> None:
     parser.add_argument("--truth", action="append", choices=TRUTHS, help="repeatable; default all")
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--seeds", type=int, default=20, help="number of seeds")
+    parser.add_argument("--compile", action="store_true", help="step and estimators as machine code, the same numbers")
+    parser.add_argument("--estimator", action="append", choices=ESTIMATORS, help="repeatable; default all")
     options = parser.parse_args()
+    estimators = tuple(options.estimator or ESTIMATORS)
     options.out.mkdir(parents=True, exist_ok=True)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     jobs = [(key, seed) for seed in seeds for key in options.truth or TRUTHS]
-    parts = {job: options.out / f"{job[0]}-seed{job[1]}.parquet" for job in jobs}
-    for (key, seed), part in track(parts.items(), "kinds of change", console=Console(stderr=True)):
-        if not part.is_file():
-            write_table(figures(TRUTHS[key], key, seed, ESTIMATORS, options.out), part)
+    parts = {(*job, name): options.out / f"{job[0]}-seed{job[1]}-{name}.parquet" for job in jobs for name in estimators}
+    for key, seed in track(jobs, "kinds of change", console=Console(stderr=True)):
+        missing = tuple(name for name in estimators if not parts[key, seed, name].is_file())
+        if missing:
+            found = figures(TRUTHS[key], key, seed, missing, options.out, compiled=options.compile)
+            for name, rows in found.groupby("estimator"):
+                write_table(rows, parts[key, seed, str(name)])
     rows = pd.concat([read_table(part) for part in parts.values()], ignore_index=True)
     title = f"Fits of n / C / grade (medians), share of the time held (mean); seeds {seeds[0]} to {seeds[-1]}"
-    table = Table("truth", *ESTIMATORS, "told: model error", title=title)
+    table = Table("truth", *estimators, "told: model error", title=title)
     for key in dict.fromkeys(rows["truth"]):
         of = rows[rows["truth"] == key]
-        told = float(of[of["estimator"] == ESTIMATORS[-1]]["model_error"].mean())
-        cells = [shown(of[of["estimator"] == name]) for name in ESTIMATORS]
+        told = float(of[of["estimator"] == estimators[-1]]["model_error"].mean())
+        cells = [shown(of[of["estimator"] == name]) for name in estimators]
         table.add_row(TRUTHS[key].words, *cells, f"{told:.0%}")
     Console(width=None if Console().is_terminal else 220).print(table)
 

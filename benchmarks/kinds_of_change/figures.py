@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import normalised_error_squared
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_result import Run
@@ -15,27 +16,39 @@ from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks.kinds_of_change.best_fit import best_fit
 from benchmarks.kinds_of_change.truths import Truth
+from estimators.shared.coordinates import Coordinates
 
 ESTIMATORS = ("rpem", "rpem_full", "ekf", "imm", "adaptive_imm")
 LABELS = ("n", "C")
 
 
-def held(scenario: Scenario, run: Run, wanted: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> float:
-    """Share of the time of the fits in which the region of n and C together holds `wanted` (N, 2)."""
+def held(scenario: Scenario, run: Run, wanted: FloatArray) -> float:
+    """Share of the time of the fits in which the region of n and C together holds `wanted` (N, 2).
+
+    In the coordinates of the filters, n and ln C. The standard deviation of ln C is that of C over C. An ellipse of n
+    and C itself would reach to negative C, and along a straight line where the two compensate along a curve.
+    """
     rows = (run.table["time_s"] > scenario.fits_after + 1e-9).to_numpy()
     table = run.table[rows]
-    std = table[[f"{x}_std" for x in LABELS]].to_numpy()
+    coordinates = Coordinates.of(scenario.model, scenario.setup.parameters)
+    found = table[[f"{x}_estimate" for x in LABELS]].to_numpy()
+    slopes = np.where(coordinates.log, found, 1.0)
+    std = table[[f"{x}_std" for x in LABELS]].to_numpy() / slopes
     if not (std > 0).all():
         return float("nan")
-    error = (table[[f"{x}_estimate" for x in LABELS]].to_numpy() - wanted[rows]) / std
+    values = (np.array([coordinates.from_parameters(row) for row in each]) for each in (found, wanted[rows]))
+    error = np.subtract(*values) / std
     between = np.clip(table["n_C_correlation"].to_numpy(), -1 + 1e-9, 1 - 1e-9)
     correlation = np.array([[np.ones_like(between), between], [between, np.ones_like(between)]]).transpose(2, 0, 1)
     return float(np.mean(normalised_error_squared(error, correlation) <= chi2.ppf(0.95, 2)))
 
 
-def figures(truth: Truth, key: str, seed: int, estimators: tuple[str, ...], folder: Path) -> pd.DataFrame:
+def figures(
+    truth: Truth, key: str, seed: int, estimators: tuple[str, ...], folder: Path, *, compiled: bool
+) -> pd.DataFrame:
     """A row for each estimator: fits in percent, and the share of the time that is held."""
     scenario = truth.scenario(folder, key)
+    scenario = scenario.compiled() if compiled else scenario
     realisation = Realisation(scenario, seed)
     columns = scenario.plant_model.indices("parameters", scenario.setup.parameters)
     wanted = realisation.parameters[:, columns] if truth.has_true_parameters else best_fit(realisation).parameters

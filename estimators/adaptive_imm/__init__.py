@@ -2,12 +2,16 @@
 
 Map
 ---
-estimator.py  `AdaptiveImm`: the estimator.
-modes.py      The modes, and how the process goes from one to another.
-interval.py   Prediction over an interval, linearised at a lagged estimate of the parameters.
-bank.py       Mixing, correction and combination of the filters, as expressions over all modes.
-step.py       One interval of it all as one compiled function.
-noise.py      The noise level, from what the corrected estimate leaves.
+estimator.py     `AdaptiveImm`: the estimator.
+state.py         What one step hands to the next.
+options.py       Checks of the options.
+trust.py         What the first record's fit says of the model, and where the filter starts then.
+disturbances.py  Disturbances that nobody measures, as further parameters.
+modes.py         The modes, and how the process goes from one to another.
+interval.py      Prediction over an interval, linearised at a lagged estimate of the parameters.
+bank.py          Mixing, correction and combination of the filters, as expressions over all modes.
+step.py          One interval of it all as one compiled function.
+noise.py         The noise level, from what the corrected estimate leaves.
 """
 
 from estimators.adaptive_imm.estimator import AdaptiveImm

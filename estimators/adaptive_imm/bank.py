@@ -93,7 +93,7 @@ class Mixing:
         share = ca.sum1(stays)
         fresh = np.zeros(n)
         fresh[self.discrepancies], fresh[self.rates] = 1, 2
-        middle = z @ probability * ca.DM((fresh == 0).astype(float))
+        middle = z @ probability / ca.sum1(probability) * ca.DM((fresh == 0).astype(float))
         away = z - ca.repmat(middle, 1, modes)
         second = P + shape.products(away, away)
         by = [weights, weights * ca.DM(both), stays]  # what every mode hands on, what some do, what only the same does
@@ -209,9 +209,9 @@ def carried(P: ca.MX, F: ca.MX, modes: int) -> ca.MX:
     return shape.of(F @ half, modes)
 
 
-def combined(z: ca.MX, P: ca.MX, probability: ca.MX) -> tuple[ca.MX, ca.MX]:
-    """Mean (n,) and covariance (n, n) of the mixture."""
+def combined(z: ca.MX, P: ca.MX, probability: ca.MX, shown: ca.MX) -> tuple[ca.MX, ca.MX]:
+    """Mean (n,) of the mixture, and covariance (n, n) about it of a mixture with the weights `shown` (M,)."""
     shape = Triangles(z.shape[0])
     mean = z @ probability
     away = z - ca.repmat(mean, 1, z.shape[1])
-    return mean, shape.whole((P + shape.products(away, away)) @ probability)
+    return mean, shape.whole((P + shape.products(away, away)) @ shown)

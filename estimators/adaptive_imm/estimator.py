@@ -3,57 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
-from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles
+from estimators.adaptive_imm.disturbances import extended, with_disturbances
 from estimators.adaptive_imm.modes import KINDS, Changes, Modes, transitions
 from estimators.adaptive_imm.noise import NoiseLevel
+from estimators.adaptive_imm.options import check_modes, check_numbers, check_shares
+from estimators.adaptive_imm.state import AdaptiveImmState
 from estimators.adaptive_imm.step import Step, combination
+from estimators.adaptive_imm.trust import Trust
 from estimators.imm.modes import stationary
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import first_estimate, layout, parameters_of
 from estimators.shared.measured import driving_outputs
 
 
-@dataclass(frozen=True)
-class AdaptiveImmState:
-    """What the next step needs, for M modes of n entries z = (x, c, v, b).
-
-    Attributes
-    ----------
-    time
-        Time of z [s].
-    z, P
-        Mean of each mode (n, M), and lower triangle of its covariance (n (n + 1) / 2, M), in columns.
-    probability
-        Probability of each mode (M,).
-    lagged
-        Parameter coordinates at which the model is linearised (q,).
-    noise
-        Noise of the driving outputs.
-    """
-
-    time: float
-    z: FloatArray
-    P: FloatArray
-    probability: FloatArray
-    lagged: FloatArray
-    noise: NoiseLevel
-
-
 class AdaptiveImm:
     """Joint Kalman filters, one for each kind of change, that share one linearisation and what they know.
 
     The modes are: rest; one parameter drifts; all drift, each at a rate of its own; one jumps; all do a random walk.
-    Beside them stand rest and walk with a *discrepancy*: each driving output is off by an amount that comes and goes,
-    which no parameter explains. Noise has outliers, and its level is estimated. See the modules of this package for the
-    equations, and `interval.py` for why the point of linearisation lags behind the estimate.
+    Beside them stands a walk with a *discrepancy*: each driving output is off by an amount that comes and goes, which
+    no parameter explains. Noise has outliers, and its level is estimated. Disturbances that nobody measures are
+    estimated beside the parameters; they walk and jump. See the modules of this package for the equations, and
+    `interval.py` for why the point of linearisation lags behind the estimate.
+
+    The covariance is wider than that of these modes. Each kind of change claims to know the direction in which the
+    parameters compensate, and is wrong where the process does something else. The *reference*, a fast walk that no
+    likelihood can rule out, has a share in the covariance, not in the estimate.
+
+    Where the first record's fit left errors that are not white, the model is wrong from the start; see `trust.py`.
 
     The status is `Status.MODEL_ERROR` while the modes with a discrepancy are more likely than not, or a parameter is
     farther than `plausible` from its nominal value, by more than two standard deviations. Then the parameters take up
@@ -65,8 +48,11 @@ class AdaptiveImm:
         Model, sampling interval, adapted parameters (q) and driving outputs (m).
     modes
         Kinds of change: of `rest`, `drift`, `joint_drift`, `jump`, `walk`.
-    rate_per_hour, joint_rate_per_hour, rate_change_per_hour, jump, walk_per_hour, background_per_hour, state_noise
-        How far parameters move, see `Changes`.
+    rate_per_hour, joint_rate_per_hour, rate_change_per_hour, jump, disturbance_jump, walk_per_hour, \
+    background_per_hour, reference_per_hour, state_noise
+        How far parameters and disturbances move, see `Changes`.
+    reference_share
+        Share of the reference in the covariance.
     change_s, jump_s, walk_s
         Mean duration of rest and of a drift, of a jump, and of a random walk [s].
     shares
@@ -84,7 +70,8 @@ class AdaptiveImm:
     lag_s
         Time constant with which the point of linearisation follows the estimate [s]; 0 takes the estimate.
     plausible
-        Distance of a parameter from its nominal value, as a share of it, beyond which it explains something else.
+        Distance of a parameter from its nominal value, as a share of it, beyond which it explains something else; and
+        standard deviation with which the nominal value counts at the start.
 
     Raises
     ------
@@ -101,8 +88,11 @@ class AdaptiveImm:
         joint_rate_per_hour: float = 0.5,
         rate_change_per_hour: float = 0.5,
         jump: float = 0.05,
+        disturbance_jump: float = 0.2,
         walk_per_hour: float = 0.1,
         background_per_hour: float = 0.01,
+        reference_per_hour: float = 0.3,
+        reference_share: float = 0.25,
         state_noise: float = 0.0,
         change_s: float = 300.0,
         jump_s: float = 3.0,
@@ -111,7 +101,7 @@ class AdaptiveImm:
         outlier_share: float = 0.01,
         outlier_scale: float = 20.0,
         noise_memory: int = 600,
-        discrepancies: Sequence[float] = (3.0, 20.0),
+        discrepancies: Sequence[float] = (6.0, 20.0),
         discrepancy_s: float = 200.0,
         right_s: float = 24000.0,
         wrong_s: float = 1200.0,
@@ -119,31 +109,26 @@ class AdaptiveImm:
         plausible: float = 0.5,
     ) -> None:
         rates = rate_per_hour, joint_rate_per_hour, rate_change_per_hour
-        changes = Changes(*rates, jump, walk_per_hour, background_per_hour, state_noise)
-        for kind in modes:
-            if kind not in KINDS:
-                raise ModelError(f"adaptive_imm: unknown mode {kind!r}; {near_match(kind, KINDS)}")
-        if not modes:
-            raise ModelError("adaptive_imm: there is no mode; name some, for example rest and walk")
-        _check(
+        walks = walk_per_hour, background_per_hour, reference_per_hour if reference_share else 0.0
+        changes = Changes(*rates, jump, disturbance_jump, *walks, state_noise)
+        check_modes(modes)
+        check_numbers(
             {**vars(changes), "lag_s": lag_s, "noise_memory": noise_memory},
             {"change_s": change_s, "jump_s": jump_s, "walk_s": walk_s, "outlier_scale": outlier_scale}
             | {"discrepancy_s": discrepancy_s, "right_s": right_s, "wrong_s": wrong_s, "plausible": plausible}
             | {f"discrepancies[{i}]": level for i, level in enumerate(discrepancies)},
         )
-        if not (0 <= outlier_share < 1 and len(shares) == 3 and min(shares) >= 0 and sum(shares) <= 1):
-            raise ModelError(
-                "adaptive_imm: outlier_share must lie in [0, 1), and shares be three that add up to 1 at most"
-            )
+        check_shares(outlier_share, reference_share, shares)
         self.setup = setup
-        self.coordinates = Coordinates.of(setup.model, setup.parameters)
-        self.layout = layout(setup, integrated=True)
-        self.modes = Modes.of(setup, self.coordinates, self.layout, modes, changes, discrepancies)
-        joint, jumps, walks = shares
+        whole = with_disturbances(setup)
+        self.coordinates = Coordinates.of(setup.model, whole.parameters)
+        self.layout = layout(whole, integrated=True)
+        self.modes = Modes.of(whole, self.coordinates, self.layout, modes, changes, discrepancies)
+        joint, jumps, walking = shares
         matrix = transitions(
             self.modes,
             {"rest": change_s, "drift": change_s, "joint_drift": change_s, "jump": jump_s, "walk": walk_s},
-            {"drift": 1 - joint - jumps - walks, "joint_drift": joint, "jump": jumps, "walk": walks},
+            {"drift": 1 - joint - jumps - walking, "joint_drift": joint, "jump": jumps, "walk": walking},
             (right_s, wrong_s),
             setup.dt,
         )
@@ -152,21 +137,26 @@ class AdaptiveImm:
         self._b = slice(n, n + len(setup.outputs))
         mixing = Mixing(matrix, self.modes.entry, slice(nx + q, n), self._b, off)
         fading, follow = np.exp(-setup.dt / discrepancy_s), 1.0 if lag_s == 0 else -np.expm1(-setup.dt / lag_s)
-        parts = Step(self.modes, mixing, Contamination(outlier_share, outlier_scale), float(fading), float(follow))
+        contamination = Contamination(outlier_share, outlier_scale)
+        parts = Step(self.modes, mixing, contamination, float(fading), float(follow), reference_share)
+        self._described = parts.described
         self.transitions, self.noise_memory, self.plausible = matrix, noise_memory, plausible
         self._off = off
         self._columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
-        nominal = setup.model.parameter_values[setup.model.indices("parameters", setup.parameters)]
+        nominal = setup.model.parameter_values[setup.model.indices("parameters", whole.parameters)]
         self._nominal = self.coordinates.from_parameters(nominal)
+        self._plausible_std = plausible * self.coordinates.scale
         names = ("z", "P", "z_next", "P_next", "covariance")
         code, mixture = setup.model.compiled, combination(*self.modes.entry.T.shape)
         self._combined = FastCall(mixture, matrices=("z", "P", "covariance"), as_machine_code=code)
-        self._step = FastCall(parts.function(setup, self.layout), matrices=names, as_machine_code=code)
+        self._step = FastCall(parts.function(whole, self.layout), matrices=names, as_machine_code=code)
 
     def init(self, prior: Prior) -> AdaptiveImmState:
         """Start from a prior, every mode alike and with the share of time that the process spends in it."""
-        first, first_P = first_estimate(prior, self.coordinates, self.layout)
+        first, first_P = first_estimate(extended(prior, self.setup), self.coordinates, self.layout)
+        trust = Trust.of(prior.colour, doubts=bool(self._off.any()))
+        first, first_P = trust.start(first, first_P, self.layout.coordinates, self._nominal, self._plausible_std)
         scale = np.array([self.setup.model.outputs[j].scale for j in self._columns])
         noise = NoiseLevel.first(prior.noise_std, scale)
         size, n, count = self._b.stop, self.layout.size, len(self.modes.kinds)
@@ -177,7 +167,10 @@ class AdaptiveImm:
         shape = Triangles(size)
         triangles = P[shape.rows, shape.columns][:, None] + shape.on_diagonal(variances)
         lagged = first[self.layout.coordinates].copy()
-        return AdaptiveImmState(prior.time, z, triangles, stationary(self.transitions), lagged, noise)
+        known = self._described > 0
+        probability = np.ones(count)
+        probability[known] = stationary(self.transitions[np.ix_(known, known)])
+        return AdaptiveImmState(prior.time, z, triangles, probability, lagged, noise, trust)
 
     def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
         """Mix, predict, compare, correct, weigh; see `Estimator.update`."""
@@ -199,17 +192,20 @@ class AdaptiveImm:
             p,
             driving,
             present,
+            state.trust.doubt,
         )
         status = Status.OK if present.any() else Status.MISSING
         if not (np.isfinite(covariance).all() and np.isfinite(z).all() and np.isfinite(P).all()):
             z, P, probability, lagged = state.z, state.P, state.probability, state.lagged
-            (mean, covariance), status = self._combined(z, P, probability), Status.NOT_FINITE
+            (mean, covariance), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
         else:
             if self.noise_memory:
                 noise = NoiseLevel(np.maximum(level, noise.least), count, noise.least)
             if projected[0] > 0:
                 status = Status.PROJECTED
         theta, theta_covariance = parameters_of(mean, covariance, self.coordinates, shape)
+        q = len(self.setup.parameters)
+        theta_covariance = np.sqrt(state.trust.inflation) * theta_covariance[:q, :q]
         if status is Status.OK and self._is_wrong(mean, covariance, probability):
             status = Status.MODEL_ERROR
         off = np.zeros(len(prediction))
@@ -219,26 +215,18 @@ class AdaptiveImm:
             prediction=prediction,
             innovation=measured - prediction,
             innovation_std=std,
-            parameters=theta,
+            parameters=theta[:q],
             covariance=theta_covariance,
             state=mean[: shape.nx].copy(),
             status=status,
             discrepancy=off,
+            disturbances=dict(zip(self.setup.unmeasured, theta[q:].tolist(), strict=True)),
         )
-        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise), estimate
+        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, state.trust), estimate
 
     def _is_wrong(self, mean: FloatArray, covariance: FloatArray, probability: FloatArray) -> bool:
         if probability @ self._off > 0.5:
             return True
         where = self.layout.coordinates
-        far = np.abs(mean[where] - self._nominal) - self.plausible * self.coordinates.scale
-        return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[where])).any())
-
-
-def _check(not_negative: dict[str, float], positive: dict[str, float]) -> None:
-    for name, value in not_negative.items():
-        if not (value >= 0 and np.isfinite(value)):
-            raise ModelError(f"adaptive_imm: {name} = {value:g}; give 0 or a positive number")
-    for name, value in positive.items():
-        if not (value > 0 and np.isfinite(value)):
-            raise ModelError(f"adaptive_imm: {name} = {value:g}; give a positive number")
+        far = (np.abs(mean[where] - self._nominal) - self._plausible_std)[: len(self.setup.parameters)]
+        return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[where][: far.size])).any())

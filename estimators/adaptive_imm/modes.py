@@ -17,8 +17,9 @@ from adaptive_flot.greybox.model import FloatArray
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import HOUR, Layout
 
-Kind = Literal["rest", "drift", "joint_drift", "jump", "walk"]
+Kind = Literal["rest", "drift", "joint_drift", "jump", "walk", "reference"]
 KINDS: tuple[Kind, ...] = ("rest", "drift", "joint_drift", "jump", "walk")
+"""What may be asked for; the reference is no description of the process, see `estimator.py`."""
 STRAIGHT = 0.2
 """Share of the changes that another one follows at once; the others go to rest."""
 
@@ -37,10 +38,14 @@ class Changes:
         Standard deviation by which a rate changes within an hour [1/h].
     jump
         Standard deviation of what a jump adds within a second.
+    disturbance_jump
+        The same for an unmeasured disturbance.
     walk_per_hour
         Standard deviation of a random walk of all parameters after an hour.
     background_per_hour
         The same for the walk that goes on in every other mode.
+    reference_per_hour
+        The same for the walk of the reference; 0 for none.
     state_noise
         As for `ekf`.
     """
@@ -49,8 +54,10 @@ class Changes:
     joint_rate_per_hour: float
     rate_change_per_hour: float
     jump: float
+    disturbance_jump: float
     walk_per_hour: float
     background_per_hour: float
+    reference_per_hour: float
     state_noise: float
 
 
@@ -85,8 +92,9 @@ class Modes:
         changes: Changes,
         levels: Collection[float],
     ) -> Modes:
-        """The kinds asked for with a right model; rest and walk of them with each level of discrepancy."""
+        """The kinds asked for with a right model; walk of them, or else rest, with each level; the reference last."""
         q, size = shape.q, shape.size + len(setup.outputs)
+        own = q - len(setup.unmeasured)
         quiet, none = np.zeros(size), np.zeros(size)
         scales = np.array([state.scale for state in setup.model.states])
         quiet[: shape.nx] = (changes.state_noise * scales) ** 2 * setup.dt
@@ -100,23 +108,29 @@ class Modes:
             entry[rates] = (rate * scale / HOUR) ** 2
             return noise, entry
 
-        walking = quiet.copy()
-        walking[shape.coordinates] = (changes.walk_per_hour * coordinates.scale) ** 2 / HOUR * setup.dt
+        def walking(per_hour: float) -> FloatArray:
+            noise = quiet.copy()
+            noise[shape.coordinates] = (per_hour * coordinates.scale) ** 2 / HOUR * setup.dt
+            return noise
+
+        walk = walking(changes.walk_per_hour)
         if "rest" in kinds:
             found.append(("rest", quiet, none, 0.0))
         if "drift" in kinds:
-            found += [("drift", *drifting([i], changes.rate_per_hour), 0.0) for i in range(q)]
-        if "joint_drift" in kinds and q > 1:
-            found.append(("joint_drift", *drifting(list(range(q)), changes.joint_rate_per_hour), 0.0))
+            found += [("drift", *drifting([i], changes.rate_per_hour), 0.0) for i in range(own)]
+        if "joint_drift" in kinds and own > 1:
+            found.append(("joint_drift", *drifting(list(range(own)), changes.joint_rate_per_hour), 0.0))
         for i in range(q if "jump" in kinds else 0):
             noise = quiet.copy()
-            noise[shape.nx + i] += (changes.jump * coordinates.scale[i]) ** 2 * setup.dt
+            size_of = changes.jump if i < own else changes.disturbance_jump
+            noise[shape.nx + i] += (size_of * coordinates.scale[i]) ** 2 * setup.dt
             found.append(("jump", noise, none, 0.0))
         if "walk" in kinds:
-            found.append(("walk", walking, none, 0.0))
+            found.append(("walk", walk, none, 0.0))
         for level in levels:
-            found += [("rest", quiet, none, level)] if "rest" in kinds else []
-            found += [("walk", walking, none, level)] if "walk" in kinds else []
+            found.append(("walk", walk, none, level) if "walk" in kinds else ("rest", quiet, none, level))
+        if changes.reference_per_hour > 0:
+            found.append(("reference", walking(changes.reference_per_hour), none, 0.0))
         names, noises, entries, sizes = zip(*found, strict=True)
         return cls(names, np.array(noises), np.array(entries), np.array(sizes))
 
@@ -142,6 +156,9 @@ def transitions(
     levels, kinds = modes.discrepancy, np.array(modes.kinds)
     matrix = np.zeros((len(kinds), len(kinds)))
     for i, kind in enumerate(modes.kinds):
+        if kind == "reference":
+            matrix[i, i] = 1.0
+            continue
         beside = levels == levels[i]
         change = np.array([shares.get(k, 0.0) / max(int(np.sum(beside & (kinds == k))), 1) for k in modes.kinds])
         change *= beside & (np.arange(len(kinds)) != i) & (kinds != "rest")

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from adaptive_flot.contracts import Setup
+from adaptive_flot.greybox.model import FloatArray
 from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles, carried, combined, output_variance, widened
 from estimators.adaptive_imm.interval import lagged_interval
 from estimators.adaptive_imm.modes import Modes
@@ -27,6 +29,8 @@ class Step:
         Share of a discrepancy that is left after an interval.
     follow
         Share of the way to the estimate that the point of linearisation goes in an interval.
+    reference_share
+        Share of the reference in the covariance, where there is one: the last mode.
     """
 
     modes: Modes
@@ -34,17 +38,25 @@ class Step:
     contamination: Contamination
     fading: float
     follow: float
+    reference_share: float
+
+    @property
+    def described(self) -> FloatArray:
+        """1 for the modes that describe the process, 0 for the reference (M,)."""
+        return np.array([float(kind != "reference") for kind in self.modes.kinds])
 
     def function(self, setup: Setup, shape: Layout) -> ca.Function:
         """Build the function, for M modes of n entries and m driving outputs.
+
+        `doubt` is how far the modes with a right model are ruled out, from 0 to 1.
 
         Returns
         -------
         casadi.Function
             `(z (n, M), P (n (n + 1) / 2, M), probability (M,), lagged (q,), variance (m,), count (m,), t, u (nu,),
-            p (np,), driving (m,), present (m,)) -> (z, P, probability, lagged, variance, prediction (ny,), std (m,),
-            mean (n,), covariance (n, n), projected)`; `projected` counts the parameters that were set onto their bounds
-            in the most likely mode.
+            p (np,), driving (m,), present (m,), doubt) -> (z, P, probability, lagged, variance, prediction (ny,),
+            std (m,), mean (n,), covariance (n, n), projected)`; `projected` counts the parameters that were set onto
+            their bounds in the most likely mode. The probability of the reference is 1, beside those of the others.
         """
         coordinates, columns = (
             Coordinates.of(setup.model, setup.parameters),
@@ -57,10 +69,12 @@ class Step:
         probability, lagged = ca.MX.sym("probability", modes), ca.MX.sym("lagged", shape.q)
         variance, count = ca.MX.sym("variance", m), ca.MX.sym("count", m)
         t, u, p = (ca.MX.sym(name, interval.size1_in(name)) for name in ("t", "u", "p"))
-        driving, present = ca.MX.sym("driving", m), ca.MX.sym("present", m)
+        driving, present, doubt = ca.MX.sym("driving", m), ca.MX.sym("present", m), ca.MX.sym("doubt")
 
         widths = variance @ ca.DM(self.modes.discrepancy[None, :] ** 2)
         mixed, spread, expected = self.mixing.expressions(z, P, probability, widths)
+        expected *= ca.DM(self.described) * (1 - doubt * ca.DM(self.modes.discrepancy == 0))
+        expected /= ca.sum1(expected)
         spread += ca.DM(triangles.on_diagonal(self.modes.noise.T)) + widened((1 - self.fading**2) * widths, triangles)
         point = mixed @ expected
         followed = lagged + self.follow * (point[where] - lagged)
@@ -72,6 +86,7 @@ class Step:
         after = self.contamination.correct(away, spread, H, driving - base, variance, present)
         weights = expected * ca.exp(after.log_likelihood.T - ca.mmax(after.log_likelihood))
         found = weights / ca.sum1(weights)
+        kept = found + ca.DM(1 - self.described)
         level = matched(variance, count, after, found, H, driving - base, present)
         ends = ca.repmat(ca.vertcat(end, self.fading * point[nz:]), 1, modes) + F @ after.away
         c = ends[where, :]
@@ -80,15 +95,17 @@ class Step:
         ends = ca.vertcat(ends[: shape.nx, :], inside, ends[shape.nx + shape.q :, :])
         projected = ca.sum1(inside != c) @ (found >= ca.mmax(found))
         covariances = carried(after.P, F, modes)
-        mean, covariance = combined(ends, covariances, found)
+        share = self.reference_share * (1 - doubt)
+        shown = (1 - share) * found + share * ca.DM(1 - self.described)
+        mean, covariance = combined(ends, covariances, found, shown)
         prediction = ca.MX(outputs)
         prediction[columns] = base
-        results = [ends, covariances, found, followed, level, prediction, ca.sqrt(expects @ expected + variance)]
+        results = [ends, covariances, kept, followed, level, prediction, ca.sqrt(expects @ expected + variance)]
         return ca.Function(
             "adaptive_imm_step",
-            [z, P, probability, lagged, variance, count, t, u, p, driving, present],
+            [z, P, probability, lagged, variance, count, t, u, p, driving, present, doubt],
             [ca.densify(x) for x in (*results, mean, covariance, projected)],
-            ["z", "P", "probability", "lagged", "variance", "count", "t", "u", "p", "driving", "present"],
+            ["z", "P", "probability", "lagged", "variance", "count", "t", "u", "p", "driving", "present", "doubt"],
             ["z_next", "P_next", "found", "followed", "level", "prediction", "std", "mean", "covariance", "projected"],
             {"cse": True},
         )
@@ -98,5 +115,5 @@ def combination(n: int, modes: int) -> ca.Function:
     """`(z (n, M), P (n (n + 1) / 2, M), probability (M,)) -> (mean (n,), covariance (n, n))` of the mixture."""
     z, P = ca.MX.sym("z", n, modes), ca.MX.sym("P", n * (n + 1) // 2, modes)
     probability = ca.MX.sym("probability", modes)
-    results, names = combined(z, P, probability), (["z", "P", "probability"], ["mean", "covariance"])
+    results, names = combined(z, P, probability, probability), (["z", "P", "probability"], ["mean", "covariance"])
     return ca.Function("combination", [z, P, probability], list(results), *names)

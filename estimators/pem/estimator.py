@@ -22,6 +22,7 @@ from estimators.pem.free_runs import FreeRuns, InitialState
 from estimators.pem.in_step import SearchesInStep, can_go_in_step
 from estimators.pem.problem import Problem, Search
 from estimators.pem.starts import scattered
+from estimators.shared.colour import colour
 
 SHORT_ROWS, SHORT_SHARE = 200, 4
 """Rows, at least, on which starts are screened, and of a long record one part of so many."""
@@ -205,6 +206,7 @@ class Pem:
                 [e.label for e in estimates], scaled[:q, :q], [e.at_bound for e in estimates]
             ),
             joint_covariance=(joint + joint.T) / 2,
+            colour=colour(self._runs.errors(record, problem, unknowns, record.outputs[:, self._runs.columns])),
         )
 
     def _failed(self, record: Dataset, problem: Problem) -> BatchFit:

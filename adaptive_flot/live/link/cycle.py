@@ -193,7 +193,8 @@ class Cycle:
             return _Asked(self._tracked(state.controller, self._acting(reading)))
         before = state.controller if state.on_target else self._tracked(state.controller, self._acting(reading))
         try:
-            returned = self.controller.decide(before, self._known(reading.sample), estimate)
+            shown = estimate.shown_with(self._known(reading.sample), self.model)
+            returned = self.controller.decide(before, shown, estimate)
             after, decision = checked_decision(self.controller, returned, len(reading.sample.inputs))
         except Exception as error:  # a failed controller makes a bad cycle, and sheds if it goes on
             return _Asked(before, problem=f"controller: {type(error).__name__}: {error}")

@@ -156,7 +156,8 @@ class ShadowStepper:
             return None
         if isinstance(self._controller, TracksInputs):
             self._control = self._controller.tracked(self._control, acting)
-        returned = self._controller.decide(self._control, sample, estimate)
+        shown = estimate.shown_with(sample, self._setup.model)
+        returned = self._controller.decide(self._control, shown, estimate)
         self._control, decision = checked_decision(self._controller, returned, len(sample.inputs))
         return decision
 

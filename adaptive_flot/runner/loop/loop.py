@@ -63,6 +63,11 @@ class Running:
             return sample
         return replace(sample, parameters=np.concatenate([sample.parameters, self.further]))
 
+    def shown(self, sample: Sample) -> Sample:
+        """The sample for the controller, with what the estimator found of disturbances that nobody measures."""
+        every = self.with_all_parameters(sample)
+        return every if self.estimate is None else self.estimate.shown_with(every, self.estimator.setup.model)
+
     def estimated(self, sample: Sample, make_prior: Callable[[], Prior]) -> Running:
         """One sample later; the first one starts the estimator."""
         now = self
@@ -119,7 +124,7 @@ def run_loop(
     steps: list[Step] = []
     sample: Sample | None = None
     for k in range(intervals):
-        shown = None if sample is None else now.with_all_parameters(sample)
+        shown = None if sample is None else now.shown(sample)
         returned = now.controller.decide(now.controller_state, shown, now.estimate)
         controller_state, decision = checked_decision(now.controller, returned, inputs)
         plant_state, record = plant.apply(plant_state, decision.inputs)

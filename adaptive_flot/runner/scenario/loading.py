@@ -85,4 +85,7 @@ def _setup(file: ScenarioFile, model: Model) -> Setup:
     unmeasured = [o for o in outputs if o not in file.measurements]
     if unmeasured:
         raise ScenarioError(f"adapt.outputs: {unmeasured[0]!r} is not among the measurements; add it there")
-    return Setup(model, file.sampling_s, parameters, outputs)
+    disturbed = [name for name, part in file.disturbances.items() if not part.measured]
+    of_model = set(model.names("parameters")) - set(parameters)
+    hidden = tuple(name for name in disturbed if name in of_model)
+    return Setup(model, file.sampling_s, parameters, outputs, unmeasured=hidden)

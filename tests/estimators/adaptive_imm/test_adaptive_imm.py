@@ -23,6 +23,7 @@ ONE_MODE: dict[str, Any] = {
     "modes": ("walk",),
     "discrepancies": (),
     "background_per_hour": 0.0,
+    "reference_share": 0.0,
     "outlier_share": 0.0,
     "noise_memory": 0,
     "lag_s": 0.0,
@@ -153,13 +154,17 @@ def test_a_parameter_that_goes_where_it_can_not_be_is_told() -> None:
 
 
 def test_a_direction_that_the_record_does_not_show_stays_open() -> None:
-    """Y = a b u says nothing along a b = 1: linearised at each estimate a filter learns there."""
+    """Y = a b u says nothing along a b = 1: linearised at each estimate a filter learns there.
+
+    The start is not symmetric in a and b, or the direction would not turn.
+    """
     generator, rows = np.random.default_rng(5), 300
     model = toys.product()
     setup = Setup(model, 1.0, ("a", "b"), ("y",))
-    prior = Prior(0.0, np.zeros(1), np.ones(2), 0.01 * np.eye(2), np.array([0.02]))
+    start = np.array([0.7, 1.2])
+    prior = Prior(0.0, np.zeros(1), start, 0.01 * np.eye(2), np.array([0.02]))
     samples = tuple(Sample(k + 1.0, np.ones(1), np.array([1.0 + 0.02 * generator.normal()])) for k in range(rows))
-    along = np.array([1.0, -1.0]) / np.sqrt(2)
+    along = start * np.array([1.0, -1.0]) / np.linalg.norm(start)
     left = {}
     for lag in (0.0, 1e6):
         options = {**ONE_MODE, "lag_s": lag, "walk_per_hour": 0.5}
@@ -178,8 +183,9 @@ def test_a_direction_that_the_record_does_not_show_stays_open() -> None:
         ({"rate_per_hour": -1.0}, "rate_per_hour = -1; give 0 or a positive number"),
         ({"change_s": 0.0}, "change_s = 0; give a positive number"),
         ({"discrepancies": (3.0, 0.0)}, r"discrepancies\[1\] = 0"),
-        ({"outlier_share": 1.0}, "outlier_share must lie in"),
-        ({"shares": (0.6, 0.3, 0.2)}, "shares be three"),
+        ({"outlier_share": 1.0}, "outlier_share = 1; it must lie in"),
+        ({"reference_share": -0.1}, "reference_share = -0.1; it must lie in"),
+        ({"shares": (0.6, 0.3, 0.2)}, "give three that add up to 1"),
         ({"lag_s": float("nan")}, "lag_s = nan"),
     ],
 )

@@ -64,6 +64,7 @@ def test_a_wandering_feed_is_the_plants_and_known_as_the_file_says(write_scenari
     changes: dict[str, Any] = {"plant": {"feed_walk": {FEED: WALK, GRADE: WALK}}}
     plain = Realisation(load_scenario(write_scenario()), 1)
     hidden = load_scenario(write_scenario({**changes, "disturbances": {FEED: {"measured": False}}}))
+    assert hidden.setup.unmeasured == ()  # an input: only parameters of the model can be estimated
     table = run_scenario(hidden, ["fixed"], [1])[0].table
     wandering = Realisation(hidden, 1)
     flow = wandering.schedule[:, 1] / plain.schedule[:, 1]

@@ -182,3 +182,8 @@ def test_times_follow_the_sampling_interval(write_scenario: WriteScenario) -> No
     loaded = load_scenario(write_scenario({"sampling_s": 0.5}))
     assert loaded.starts.tolist() == [0.5 * k for k in range(240)]
     assert loaded.initial_rows == 80 and loaded.setup.dt == 0.5
+
+
+def test_estimators_are_told_which_parameters_nobody_measures() -> None:
+    assert load_scenario("feed_disturbance_unmeasured").setup.unmeasured == ("feed_concentration.chalcopyrite",)
+    assert load_scenario("feed_disturbance").setup.unmeasured == ()
