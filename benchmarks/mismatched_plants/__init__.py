@@ -3,5 +3,6 @@
 Map
 ---
 plants.py    Thirty plants, drawn from seeds that were fixed before anything was tuned on them.
+fastest.py   How soon the limit can be kept at all.
 __main__.py  The command.
 """

@@ -1,11 +1,12 @@
 """Run and print: `python -m benchmarks.mismatched_plants`, some minutes for 30 plants and one seed.
 
-Writes one Parquet part for each plant and seed into the folder of `--out`; parts that are there are not run again.
+Writes one Parquet part for each plant and seed into the folder of `--out`; loops that are there are not run again.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +17,7 @@ from rich.table import Table
 from adaptive_flot.greybox.data.tables import read_table, write_table
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks.mismatched_plants.plants import CHANCE, COUNT, TREE, plant
+from benchmarks.mismatched_plants.plants import CHANCE, COUNT, EARLY, FASTEST, TREE, plant
 
 MPC, ORACLE, PI = "economic_mpc", "oracle", "pi"
 LOOPS = {
@@ -24,8 +25,10 @@ LOOPS = {
     "adaptive_imm": (MPC, "adaptive_imm"),
     "adaptive_imm, limit_probability 0.95": (CHANCE, "adaptive_imm"),
     "adaptive_imm, scenarios 9": (TREE, "adaptive_imm"),
+    "adaptive_imm, scenarios 9, early plans": (EARLY, "adaptive_imm"),
     ORACLE: (MPC, ORACLE),
     PI: (PI, "fixed"),
+    FASTEST: (FASTEST, "fixed"),
 }
 """Controller and estimator of each."""
 MOST_BELOW = 0.01
@@ -34,11 +37,12 @@ LEAST_VALUE = 0.98
 """Share of the oracle's value that is asked."""
 
 
-def figures(scenario: Scenario, seed: int) -> pd.DataFrame:
+def figures(scenario: Scenario, seed: int, loops: Sequence[str]) -> pd.DataFrame:
     """A row for each loop: value, share of the time below the limit, and how often a model error was told."""
     runs = {
         name: run_scenario(scenario, [estimator], [seed], controllers=[controller])[0]
         for name, (controller, estimator) in LOOPS.items()
+        if name in loops
     }
     return pd.DataFrame(
         [
@@ -56,13 +60,17 @@ def figures(scenario: Scenario, seed: int) -> pd.DataFrame:
 
 
 def summary(rows: pd.DataFrame) -> Table:
-    """What is printed: a row for each loop, over plants and seeds."""
+    """What is printed: a row for each loop, over plants and seeds; NaN where oracle or PI were not run."""
+    rows = rows.set_index(["plant", "seed", "loop"])[["value", "below"]].reindex(
+        pd.MultiIndex.from_product([sorted(set(rows["plant"])), sorted(set(rows["seed"])), LOOPS])
+    )
+    rows = rows.rename_axis(["plant", "seed", "loop"]).reset_index()
     by = rows.pivot(index=["plant", "seed"], columns="loop", values=["value", "below"])
     table = Table(
         "loop", "below the limit: mean", "worst", f"<= {MOST_BELOW:.0%}", "value / oracle: median", "least",
         f">= {LEAST_VALUE:.0%}", "beats pi", title=f"{len(by)} closed loops with mismatched plants"
     )  # fmt: skip
-    for loop in LOOPS:
+    for loop in [name for name in LOOPS if by["below", name].notna().any()]:
         below, value = by["below", loop], by["value", loop]
         share = value / by["value", ORACLE]
         table.add_row(
@@ -85,6 +93,7 @@ def main() -> None:
     parser.add_argument("--plants", type=int, default=COUNT)
     parser.add_argument("--first-plant", type=int, default=0, help="number of the first plant")
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, from 1 on")
+    parser.add_argument("--loop", action="append", choices=LOOPS, help="a loop to run, may be repeated; default: all")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     jobs = [
@@ -94,8 +103,11 @@ def main() -> None:
     ]
     parts = {(k, seed): options.out / f"plant{k:02d}-seed{seed}.parquet" for k, seed in jobs}
     for (k, seed), part in track(parts.items(), "mismatched plants", console=Console(stderr=True)):
-        if not part.is_file():
-            write_table(figures(plant(k, options.out), seed), part)
+        done = read_table(part) if part.is_file() else pd.DataFrame({"loop": []})
+        missing = [loop for loop in options.loop or LOOPS if loop not in set(done["loop"])]
+        if missing:
+            new = figures(plant(k, options.out), seed, missing)
+            write_table(pd.concat([done, new], ignore_index=True) if len(done) else new, part)
     rows = pd.concat([read_table(part) for part in parts.values()], ignore_index=True)
     Console(width=None if Console().is_terminal else 150).print(summary(rows))
 

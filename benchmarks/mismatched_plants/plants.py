@@ -24,6 +24,10 @@ CHANCE = "economic_mpc_chance"
 """The controller that backs off from the covariance of the estimate."""
 TREE = "economic_mpc_tree"
 """The controller whose first move keeps the limits in nine scenarios."""
+EARLY = "economic_mpc_early"
+"""The same, with plans before their time where a limit is missed."""
+FASTEST = "fastest"
+"""No controller, but the soonest that the limit can be kept; see `fastest.py`."""
 BASE, COUNT, FIRST_SEED = "closed_loop_drift", 30, 7300
 WIDTHS = {
     "floatability.chalcopyrite": 0.2,
@@ -94,6 +98,9 @@ def _written(number: int, generator: np.random.Generator, folder: Path) -> Path:
     chance = {"solver": "fatrop", "limit_probability": 0.95}
     content["controllers"][CHANCE] = {"use": "economic_mpc", "options": chance}
     content["controllers"][TREE] = {"use": "economic_mpc", "options": {"solver": "fatrop", "scenarios": 9}}
+    early = {"solver": "fatrop", "scenarios": 9, "early_plans": True}
+    content["controllers"][EARLY] = {"use": "economic_mpc", "options": early}
+    content["controllers"][FASTEST] = {"use": "benchmarks.mismatched_plants.fastest:Fastest"}
     content["disturbances"] = {
         "feed_flow_m3_s": {"noise_std": 8.0e-7},
         "feed_concentration.chalcopyrite": {"measured": False},

@@ -25,6 +25,8 @@ tree_programme.py       Its quadratic programme.
 tree_planner.py         Plans whose first move keeps the limits in every scenario.
 chance_constraint.py    Back-off from limits for what the estimate leaves open.
 output_bias.py          Correction of the model by the last measured outputs.
+early.py                Plans before their time.
+dips.py                 A dip in front of a plan.
 probing.py              Dips of an input that tell parameters apart.
 """
 

@@ -13,11 +13,13 @@ from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Es
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.collocation import OptimalControlProblem
+from controllers.economic_mpc.dips import with_dip
+from controllers.economic_mpc.early import Early, counted, narrowed
 from controllers.economic_mpc.layout import Bounds
 from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
 from controllers.economic_mpc.output_bias import OutputBias
-from controllers.economic_mpc.planner import Found, Planner, Uncertainty
-from controllers.economic_mpc.probing import ProbeState, Probing, price
+from controllers.economic_mpc.planner import Planner, Uncertainty
+from controllers.economic_mpc.probing import ProbeState, Probing
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.softening import Softening
 from controllers.economic_mpc.state import MpcState
@@ -31,13 +33,13 @@ OWN = "economic_mpc"
 class EconomicMpc:
     """Moves inputs for the best economic value within the limits of outputs and states.
 
-    It knows nothing of the process: what is earned is the economics' matter (`ControllerSetup.economics`), and what is
-    moved and limited that of `ControllerSetup.limits`.
+    What is earned is the economics' matter (`ControllerSetup.economics`), what is moved and limited that of
+    `ControllerSetup.limits`.
 
-    Every `move_s` seconds an optimal control problem over `horizon` moves is solved from the estimated state with the
-    newest parameter estimate (`collocation.py`). A solution is applied only if it is finite, within its bounds and
-    meets the constraints. Else one cold start is tried, then the plan of the step before goes on. Then the inputs are
-    held, and at last the first planned inputs are applied. `Decision` says which.
+    Every `move_s` seconds an optimal control problem over `horizon` moves is solved from the newest estimate
+    (`collocation.py`). A solution is applied only if it is finite, within its bounds and meets the constraints. Else
+    one cold start is tried, then the plan of the step before goes on. Then the inputs are held, and at last the first
+    planned inputs are applied. `Decision` says which.
 
     Parameters
     ----------
@@ -52,8 +54,8 @@ class EconomicMpc:
     move_cost
         Cost of a move by the whole scale of an input, squared [cu]; default the typical rate of a second.
     limit_penalty
-        Cost of a second at a tenth of its scale beyond the limit of an output [cu]; of a state: its square. Large: the
-        limit is soft, but exact. Default the typical rate of a second.
+        Cost of a second at a tenth of its scale beyond the limit of an output [cu]; of a state: its square. Default the
+        typical rate of a second: large, so the limit is soft, but exact.
     backoff
         Kept from the limits of outputs, in their units: what changes between two moves, and what the estimate is off
         by. Default a hundredth of each output's scale.
@@ -62,7 +64,7 @@ class EconomicMpc:
         off further by what that asks (`chance_constraint.py`). Default no further back-off.
     scenarios
         Number of scenarios, 1, 3, 9 or 27, in which the first move has to keep the limits (`scenarios.py`). The outer
-        ones lie where `limit_probability` (then 0.95 by default) puts them; limits are not backed off for it.
+        ones lie where `limit_probability` (0.95 by default) puts them; limits are not backed off for it.
     branch
         Moves that scenarios look ahead, beside the nominal one; default 5, or the horizon if that is less.
     priority
@@ -72,6 +74,8 @@ class EconomicMpc:
         Time constant of the filters of output biases [s].
     budget_s
         Wall-clock time of a solve; there is no second try when the first took longer.
+    early_plans
+        Plan before the next move is due where an output has left its plan and lies beyond its limit (`early.py`).
     probing
         Options of `Probing`: dips of an input that tell the parameters apart; default none.
 
@@ -97,13 +101,12 @@ class EconomicMpc:
         priority: Sequence[str] | None = None,
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
+        early_plans: bool = False,
         probing: Mapping[str, Any] | None = None,
     ) -> None:
         limits, economics = setup.limits, setup.economics
         if limits is None or economics is None:
-            raise ModelError(
-                "economic_mpc needs limits and economics; give both (in a scenario: the keys of that name)"
-            )
+            raise ModelError("economic_mpc needs limits and economics; give both (in a scenario: keys of that name)")
         if horizon < 1 or not move_s >= setup.dt or not budget_s > 0 or not bias_time_s > 0:
             raise ModelError("economic_mpc: horizon, move_s, bias_time_s and budget_s must be positive, move_s >= dt")
         if not limits.inputs or set(limits.inputs) != set(limits.moves):
@@ -120,14 +123,14 @@ class EconomicMpc:
         self.budget_s = budget_s
         own = [economics.typical_rate if cost is None else cost for cost in (move_cost, limit_penalty)]
         own = [own[0], *[own[1]] * self.layout.slacks_size]
-        self._value_scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
+        self._scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
         self._bounds = Bounds.of(limits, self.layout)
         self.planner = Planner(
             setup,
             self.problem,
             self._bounds,
             limits=self.layout.limit_values(backoff),
-            prices=self._value_scale * np.array([*economics.prices(), *own]),
+            prices=self._scale * np.array([*economics.prices(), *own]),
             softening=Softening(self.problem, self._bounds, priority, budget_s),
             uncertainty=Uncertainty(limit_probability, scenarios, branch),
             solver=solver,
@@ -136,15 +139,14 @@ class EconomicMpc:
         self._biases = [
             OutputBias(name, setup.model.index("outputs", name), setup.dt, bias_time_s) for name in self.layout.outputs
         ]
+        self.early = Early(self.layout, self.planner.limits) if early_plans else None
         self.probing = None if probing is None else Probing(self.layout, limits, **probing)
         self._tell = Teller(self.problem)
 
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
-        unheard = (time,) * len(self._biases)
-        probe = None if self.probing is None else ProbeState(time)
-        unmoved = (0.0,) * len(self._biases)
-        return MpcState(0, time, None, None, None, 0, unmoved, unheard, Misfit.none(len(unmoved)), probe)
+        count, probe = len(self._biases), None if self.probing is None else ProbeState(time)
+        return MpcState(0, time, None, None, None, 0, (0.0,) * count, (time,) * count, Misfit.none(count), probe)
 
     def with_failing_solver(self) -> EconomicMpc:
         """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
@@ -166,7 +168,7 @@ class EconomicMpc:
 
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
         """Inputs of the next interval: the planned ones until there is an estimate, then the optimiser's."""
-        state = self._listen(replace(state, row=state.row + 1), estimate)
+        state, came = self._listen(replace(state, row=state.row + 1), estimate)
         if sample is None or estimate is None:
             row = min(state.row, len(self.setup.schedule)) - 1
             inputs = self.setup.schedule[row].copy()
@@ -174,36 +176,46 @@ class EconomicMpc:
         held = sample.inputs.copy()  # the newest of the disturbances
         if state.inputs is not None:
             held[self.layout.moved] = state.inputs[self.layout.moved]
-        if sample.time < state.due - 1e-9:
+        in_time = sample.time >= state.due - 1e-9
+        if not in_time and not (self.early is not None and self.early.is_due(state, came)):
             return replace(state, inputs=held.copy()), Decision(held.copy(), Status.OK, self._own(state, sample.time))
-        state = replace(state, due=max(state.due, sample.time) + self.layout.move_s)
-        return self._optimise(state, held, sample, estimate)
+        due, bounds, moved = max(state.due, sample.time) if in_time else sample.time, None, held[self.layout.moved]
+        if not in_time and state.moved_from is not None:
+            bounds = narrowed(self.planner.bounds, self.layout, moved, state.moved_from)
+            state = replace(state, misfit=counted(state.misfit, sample.time, came))
+        kept = in_time and self.early is not None and self.early.may_follow(came)
+        state = replace(state, due=due + self.layout.move_s, moved_from=moved if kept else None)
+        return self._optimise(state, held, sample, estimate, bounds)
 
-    def _listen(self, state: MpcState, estimate: Estimate | None) -> MpcState:
+    def _listen(self, state: MpcState, estimate: Estimate | None) -> tuple[MpcState, FloatArray]:
+        """Filtered biases, and limited outputs as they are now (k,), free of most of the noise."""
         if estimate is None:
-            return state
+            return state, np.full(len(self._biases), np.nan)
         filters = zip(self._biases, state.bias, state.heard, strict=True)
         after = [own.after(bias, heard, estimate) for own, bias, heard in filters]
         bias = tuple(bias for bias, _ in after)
-        came = [own.corrected(estimate, value) for own, value in zip(self._biases, bias, strict=True)]
-        misfit = state.misfit.after(estimate.time, np.array(came), self.setup.dt)
-        return replace(state, bias=bias, heard=tuple(heard for _, heard in after), misfit=misfit)
+        came = np.array([own.corrected(estimate, value) for own, value in zip(self._biases, bias, strict=True)])
+        misfit = state.misfit.after(estimate.time, came, self.setup.dt)
+        return replace(state, bias=bias, heard=tuple(heard for _, heard in after), misfit=misfit), came
 
     def _optimise(
-        self, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
+        self,
+        state: MpcState,
+        held: FloatArray,
+        sample: Sample,
+        estimate: Estimate,
+        bounds: dict[str, FloatArray] | None,
     ) -> tuple[MpcState, Decision]:
         moved = self.layout.moved
-        found = self.planner.find(self.solver, state, held, sample, estimate)
+        found = self.planner.find(self.solver, state, held, sample, estimate, bounds)
         if found.solution.validity is Validity.VALID and self.probing is not None and not found.given_up:
-            state, found = self._probe(self.probing, state, held, estimate, found)
+            state, found = with_dip(self.probing, self.solver, self.problem, state, held, estimate, found, self._scale)
         solution = found.solution
         if solution.validity is Validity.VALID:
             told = self._tell(estimate.time, found)
             misfit = state.misfit.planned(told.plan, self.layout.outputs)
-            multipliers = solution.multipliers if found.tree is None else None
-            plan = replace(
-                state, plan=solution.variables, multipliers=multipliers, age=0, misfit=misfit, tree=found.tree
-            )
+            kept = solution.multipliers if found.tree is None else None
+            plan = replace(state, plan=solution.variables, multipliers=kept, age=0, misfit=misfit, tree=found.tree)
             first = self.layout.inputs_of(solution.variables)[0]
             return self._apply(plan, held, first, found.status, solution, told)
         if state.plan is not None and state.age + 1 < self.layout.horizon:
@@ -213,22 +225,6 @@ class EconomicMpc:
         if np.isfinite(held).all():
             return self._apply(state, held, held[moved], Status.HELD, solution)
         return self._apply(state, self.setup.schedule[0], self.setup.schedule[0][moved], Status.SAFE_INPUT, solution)
-
-    def _probe(
-        self, probing: Probing, state: MpcState, held: FloatArray, estimate: Estimate, found: Found
-    ) -> tuple[MpcState, Found]:
-        """Put a dip in front of a valid plan where one is due, has a valid plan itself, and can be paid."""
-        probe, value = state.probe, float(held[self.layout.moved[probing.position]])
-        if probe is None or not probing.is_due(probe, estimate, value):
-            return state, found
-        free, now = found.solution, found.arguments
-        asked = self.solver(now, probing.bounds(value, found.bounds), free.variables, free.multipliers)
-        if asked.validity is not Validity.VALID:
-            return state, found
-        cost = price(self.problem, free.variables, asked.variables, now) / self._value_scale
-        probe, paid = probing.pay(probe, cost, estimate.time)
-        dip = replace(found, solution=replace(asked, seconds=free.seconds + asked.seconds))
-        return replace(state, probe=probe), dip if paid else found
 
     def _apply(
         self,

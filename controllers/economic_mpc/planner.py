@@ -96,8 +96,8 @@ class Planner:
         budget_s: float,
     ) -> None:
         self.setup, self.layout, self.softening, self.budget_s = setup, problem.layout, softening, budget_s
-        self._bounds = self.layout.bounds(bounds)
-        self._limits, self._prices = limits, prices
+        self.bounds = self.layout.bounds(bounds)
+        self.limits, self._prices = limits, prices
         self._chance: ChanceConstraint | None = None
         self.tree: TreePlanner | None = None
         asked = uncertainty.limit_probability
@@ -115,7 +115,15 @@ class Planner:
             self._chance = ChanceConstraint(setup, [e.index for e in self.layout.output_limits], asked)
         self._ode = FastCall(setup.model.ode)
 
-    def find(self, solver: Solver, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate) -> Found:
+    def find(
+        self,
+        solver: Solver,
+        state: MpcState,
+        held: FloatArray,
+        sample: Sample,
+        estimate: Estimate,
+        bounds: dict[str, FloatArray] | None = None,
+    ) -> Found:
         """Solve; a failure is a value.
 
         Parameters
@@ -128,6 +136,8 @@ class Planner:
             Inputs now (nu,), the newest of the disturbances among them.
         sample, estimate
             The newest.
+        bounds
+            Of the problem, where they are not the usual ones.
         """
         model, moved = self.setup.model, self.layout.moved
         theta = full_parameters(model, self.setup.parameters, estimate.parameters, sample.parameters)
@@ -141,7 +151,7 @@ class Planner:
             self._prices,
             estimate.time,
         )
-        bounds, back = self.softening.way_back(self._bounds, held[moved])
+        bounds, back = self.softening.way_back(self.bounds if bounds is None else bounds, held[moved])
         arguments, spent = now.vector(), 0.0
         scenarios = None if self.tree is None else self.tree.scenarios(now, held, estimate, state)
         if self.tree is not None and scenarios is not None and state.tree is not None and state.age == 0:
@@ -185,10 +195,10 @@ class Planner:
     def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
         """Values of the output limits, moved inwards by what the estimate leaves open."""
         if self._chance is None:
-            return self._limits
+            return self.limits
         kept = self._chance.backoff(estimate.time, estimate.state, held, theta, estimate.covariance)
         inwards = np.array([-1.0 if e.is_upper else 1.0 for e in self.layout.output_limits])
-        return self._limits + inwards * kept
+        return self.limits + inwards * kept
 
     def _solve(
         self,

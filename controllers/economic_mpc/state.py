@@ -35,6 +35,8 @@ class MpcState:
         How far plans were off.
     tree
         Solution of the last tree; None without one.
+    moved_from
+        Moved inputs before the last plan (m,), where an early one may follow it; else None.
     probe
         Last dip and what probing has cost; None without probing.
     """
@@ -50,3 +52,4 @@ class MpcState:
     misfit: Misfit
     probe: ProbeState | None = None
     tree: NlpSolution | None = None
+    moved_from: FloatArray | None = None
