@@ -1,5 +1,6 @@
 """Fixtures for all tests: the models, the shared data (skipped where absent) and edited copies of the shipped cell."""
 
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -39,6 +40,16 @@ def shared_file() -> Callable[[str], Path]:
         return file
 
     return find
+
+
+@pytest.fixture(scope="session")
+def libraries(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Cache of compiled functions for all tests of a session, in all its processes; the user's stays as it is.
+
+    A function of the cell takes the compiler up to ten seconds.
+    """
+    base = tmp_path_factory.getbasetemp()  # of one of several workers, in that of all
+    return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "libraries" / "compiled"
 
 
 @pytest.fixture(scope="session")

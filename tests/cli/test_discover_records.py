@@ -23,7 +23,7 @@ def records(tmp_path: Path) -> tuple[Path, Path]:
     return paths
 
 
-def test_what_has_changed_is_said_with_its_size_and_written(
+def test_what_has_changed_is_said_and_written_and_the_written_model_has_nothing_left_to_find(
     call: Call, records: tuple[Path, Path], tmp_path: Path
 ) -> None:
     """The loss is 65 % larger (a factor exp(0.5)): first sentence, verdict, page and extended model say so."""
@@ -36,13 +36,6 @@ def test_what_has_changed_is_said_with_its_size_and_written(
     page = (tmp_path / "r" / "report.html").read_text()
     assert "Heat loss is 65 % larger" in page and "Reference: old" in page and "<svg" not in verdict["reason"]
 
-
-def test_the_model_that_was_written_has_nothing_left_to_find(
-    call: Call, records: tuple[Path, Path], tmp_path: Path
-) -> None:
-    new, old = records
-    arguments = ("--model", MODEL, "--out", "r", "--save-model", "m.yaml", "--no-report")
-    assert call("discover", new, "--reference", old, *arguments).code == 0
     tank.table(tank.record("later", 5, tank.DRAUGHT)).to_csv(tmp_path / "later.csv", index=False)
     later = call("discover", "later.csv", "--reference", new, "--model", "m.yaml", "--out", "r2", "--no-report")
     assert later.code == 0 and later.out.startswith("none: "), later.out + later.err

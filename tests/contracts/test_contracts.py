@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -27,17 +28,28 @@ ESTIMATOR_CASES: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for n
 }
 
 
+@cache
+def estimator_on_the_cell(name: str) -> EstimatorCase:
+    """Built once for all checks: what changes is passed in and handed back, so that none can spoil it for the next."""
+    address, options = ESTIMATOR_CASES[name]
+    return estimator_case(load(address, ESTIMATORS, "estimator"), **options)
+
+
+@cache
+def controller_on_the_cell(name: str) -> ControllerCase:
+    return controller_case(load(name, CONTROLLERS, "controller"))
+
+
 @pytest.mark.parametrize("name", ESTIMATOR_CASES)
 @pytest.mark.parametrize("check", ESTIMATOR_CHECKS, ids=lambda c: str(c.__name__))
 def test_estimator(name: str, check: Callable[[EstimatorCase], None]) -> None:
-    address, options = ESTIMATOR_CASES[name]
-    check(estimator_case(load(address, ESTIMATORS, "estimator"), **options))
+    check(estimator_on_the_cell(name))
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 @pytest.mark.parametrize("check", CONTROLLER_CHECKS, ids=lambda c: str(c.__name__))
 def test_controller(name: str, check: Callable[[ControllerCase], None]) -> None:
-    check(controller_case(load(name, CONTROLLERS, "controller")))
+    check(controller_on_the_cell(name))
 
 
 TANK_ESTIMATORS = {name: case for name, case in ESTIMATOR_CASES.items() if name != "rpem-corrected"}

@@ -176,10 +176,10 @@ def test_compiled_runs_have_the_fits_of_plain_ones_and_do_not_mix_with_them(
 
 @pytest.mark.slow
 def test_results_do_not_depend_on_which_runs_went_side_by_side(
-    write_study: WriteStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    write_study: WriteStudy, tmp_path: Path, libraries: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Groups of any size, and a study that goes on after it was interrupted, give the same file to the byte."""
-    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: libraries)
     problem = machine_code.compiler_problem()
     if problem is not None:
         pytest.skip(problem)
@@ -197,9 +197,9 @@ def test_results_do_not_depend_on_which_runs_went_side_by_side(
 
 @pytest.mark.slow
 def test_a_seed_that_fails_beside_others_becomes_a_row(
-    write_study: WriteStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    write_study: WriteStudy, tmp_path: Path, libraries: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: libraries)
     problem = machine_code.compiler_problem()
     if problem is not None:
         pytest.skip(problem)

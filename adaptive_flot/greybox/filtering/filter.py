@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,9 +78,9 @@ class RecordFilter:
             raise ModelError(f"model '{model.name}': a filter needs a measured output; name at least one")
         self.model, self.dt = model, dt
         self.outputs, self.walking = tuple(outputs), tuple(walking)
-        step = filter_step(model, dt, self.outputs, self.walking, degrees_of_freedom)
-        self._first = FastCall(first_correction(model, self.outputs, self.walking, degrees_of_freedom), ["P", "P_next"])
-        self._many = Recursion(step, {"z": "z_next", "P": "P_next"}, CHUNK)
+        self._first, self._many = model.derived(
+            _calls, dt, self.outputs, self.walking, degrees_of_freedom, threading.get_ident()
+        )
 
     def run(self, record: Dataset, noise: NoiseModel, z0: FloatArray, P0: FloatArray, p: FloatArray) -> Filtered:
         """Filter one record.
@@ -142,3 +143,16 @@ class RecordFilter:
             joined["F"],
             Q,
         )
+
+
+def _calls(
+    model: Model, dt: float, outputs: tuple[int, ...], walking: tuple[str, ...], degrees_of_freedom: float, thread: int
+) -> tuple[FastCall, Recursion]:
+    """The first correction, and the step for `CHUNK` rows, with their working memory: those of one thread.
+
+    A search of the noise makes a filter for each size that it tries.
+    """
+    del thread
+    first = first_correction(model, outputs, walking, degrees_of_freedom)
+    step = filter_step(model, dt, outputs, walking, degrees_of_freedom)
+    return FastCall(first, ["P", "P_next"]), Recursion(step, {"z": "z_next", "P": "P_next"}, CHUNK)

@@ -88,11 +88,11 @@ class Stepper:
         Returns `(x, t, u, p) -> (x_next (nx,), y (ny,), dy_dtheta (ny, q))`; x is held, as in the one-step predictor of
         the paper (Section IV-B).
         """
-        return step_functions.one_step_gradient(self.model, self.interval, tuple(wrt))
+        return self.model.derived(step_functions.one_step_gradient, self.interval, tuple(wrt))
 
     def one_step_jacobians(self, wrt: Sequence[str]) -> ca.Function:
         """Return `(x, t, u, p) -> (x_next, y, dx_dx, dx_dtheta, dy_dx, dy_dtheta)`, exact, in forward mode."""
-        return step_functions.one_step_jacobians(self.model, self.interval, tuple(wrt))
+        return self.model.derived(step_functions.one_step_jacobians, self.interval, tuple(wrt))
 
     def simulate(
         self, x0: FloatArray, inputs: FloatArray, parameters: FloatArray | None = None, t0: float = 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,9 +31,8 @@ needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be
 
 
 @pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    folder = tmp_path_factory.getbasetemp() / "pem-in-step" / "compiled"
-    monkeypatch.setattr(compiled, "cache_folder", lambda: folder)
+def own_cache(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: libraries)
     yield
     compiled._compiler.cache_clear()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,9 +44,8 @@ ESTIMATORS: dict[str, Make] = {
 
 
 @pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path_factory.getbasetemp() / "lanes" / "compiled"
-    monkeypatch.setattr(compiled, "cache_folder", lambda: folder)
+def own_cache(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: libraries)
 
 
 def members() -> tuple[list[Prior], EnsembleRecord]:

@@ -8,13 +8,8 @@ import pytest
 from adaptive_flot.greybox.stepping import compiled
 
 
-@pytest.fixture(scope="package")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cache") / "compiled"
-
-
 @pytest.fixture(autouse=True)
-def own_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(compiled, "cache_folder", lambda: folder)
+def own_cache(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: libraries)
     yield
     compiled._compiler.cache_clear()

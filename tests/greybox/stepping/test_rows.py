@@ -24,10 +24,10 @@ def function() -> ca.Function:
 @pytest.mark.parametrize("count", [1, 3, 101])
 @pytest.mark.parametrize("as_machine_code", [False, True])
 def test_rows_are_those_of_the_function(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, threads: int, count: int, as_machine_code: bool
+    monkeypatch: pytest.MonkeyPatch, libraries: Path, threads: int, count: int, as_machine_code: bool
 ) -> None:
     """Also where the rows can not be shared evenly."""
-    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "cache_folder", lambda: libraries)
     if as_machine_code and compiler_problem() is not None:
         pytest.skip(f"nothing can be compiled here: {compiler_problem()}")
     monkeypatch.setattr(module, "core_count", lambda: threads)

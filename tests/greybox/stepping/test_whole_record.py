@@ -30,12 +30,8 @@ ROWS = 40
 
 
 @pytest.fixture(autouse=True)
-def own_cache(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> Iterator[None]:
-    """The user's cache is neither used nor filled."""
-    folder: Path = tmp_path_factory.getbasetemp() / "record_code" / "compiled"
-    monkeypatch.setattr(compiled, "cache_folder", lambda: folder)
+def own_cache(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: libraries)
     monkeypatch.setattr(stepper, "LEAST_STEPS", 1)
     yield
     compiled._compiler.cache_clear()
