@@ -1,8 +1,13 @@
-"""The test of innovations for whiteness."""
+"""The test of innovations for whiteness.
+
+That of statsmodels gives the same p values, but takes nine times as long, and a second or two to load: a page of many
+runs makes hundreds of tests.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtrc
 
 from adaptive_flot.greybox.model import FloatArray
 
@@ -20,9 +25,10 @@ def ljung_box_p(innovation: FloatArray, lags: int = WHITENESS_LAGS) -> float:
     out, which is exact for the white series that the test supposes. NaN: a constant series, or one of 2 `lags` samples
     or fewer.
     """
-    from statsmodels.stats.diagnostic import acorr_ljungbox
-
     finite = innovation[np.isfinite(innovation)]
     if len(finite) <= 2 * lags or np.ptp(finite) == 0:
         return float("nan")
-    return float(acorr_ljungbox(finite, lags=[lags])["lb_pvalue"].iloc[0])
+    n, moved = len(finite), finite - finite.mean()
+    r = np.array([moved[k:] @ moved[:-k] for k in range(1, lags + 1)]) / (moved @ moved)
+    Q = n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1)))
+    return float(chdtrc(lags, Q))

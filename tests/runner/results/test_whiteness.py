@@ -5,18 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import stats
+from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from adaptive_flot.runner.results.whiteness import ljung_box_p
 
 
 def test_it_is_the_formula_of_ljung_and_box() -> None:
-    """Q = N (N + 2) sum r_k^2 / (N - k) over 20 lags, chi-squared with 20 degrees of freedom."""
+    """Q = N (N + 2) sum r_k^2 / (N - k) over 20 lags, chi-squared with 20 degrees of freedom, as in statsmodels."""
     e = np.random.default_rng(0).normal(size=300)
     e[1:] += 0.1 * e[:-1]
     centred = e - e.mean()
     r = np.array([centred[k:] @ centred[: 300 - k] for k in range(21)]) / (centred @ centred)
     q = 300 * 302 * np.sum(r[1:] ** 2 / (300 - np.arange(1, 21)))
     assert ljung_box_p(e) == pytest.approx(stats.chi2.sf(q, 20), rel=1e-9)
+    assert ljung_box_p(e) == pytest.approx(float(acorr_ljungbox(e, lags=[20])["lb_pvalue"].iloc[0]), rel=1e-9)
 
 
 def test_white_innovations_give_uniform_p_values() -> None:
