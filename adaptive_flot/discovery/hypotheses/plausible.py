@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.rows import Rows, noise_floor
 from adaptive_flot.greybox.model import FloatArray
 
@@ -20,16 +23,27 @@ noise alone has, and over so many of its smallest steps."""
 
 
 def at_edge(tested: Tested) -> bool:
+    """Whether a tested hypothesis rests at the end of what such a fault can be, see `rests_at_edge`."""
+    return tested.hypothesis is not None and rests_at_edge(tested.hypothesis, tested.fit.value)
+
+
+def rests_at_edge(h: Hypothesis, value: Callable[[str], float]) -> bool:
     """Whether a coefficient has come to rest at the end of what such a fault can be.
 
     The record then asks for more than the fault can give. The fault is no explanation, though it may fit best.
+
+    Parameters
+    ----------
+    h
+        The hypothesis.
+    value
+        Gives the fitted value of a parameter by its full name.
     """
-    h = tested.hypothesis
-    if h is None or h.kind not in ERRORS:
+    if h.kind not in ERRORS:
         return False
     for name, (low, high) in h.limits.items():
-        value, near = tested.fit.value(h.effect.parameter(name)), AT_EDGE * (high - low)
-        if (low < 0 and value < low + near) or (high > 0 and value > high - near):
+        at, near = value(h.effect.parameter(name)), AT_EDGE * (high - low)
+        if (low < 0 and at < low + near) or (high > 0 and at > high - near):
             return True
     return False
 

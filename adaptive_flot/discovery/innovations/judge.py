@@ -11,6 +11,7 @@ from scipy.stats import bootstrap
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.greybox.model import FloatArray
@@ -71,7 +72,12 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     What is certain must be in every explanation about as good, and must predict stretches of rows that did not fit its
     coefficients better than the rest of the explanation does without it. Where the rest is one of a few, it is a class.
     """
-    given_up: list[Hypothesis] = []
+    possible = [e for e in found if not _beyond(search, e)]
+    matters = found[0].criterion - base.criterion >= LEAST_GAIN
+    if matters and found[0] not in possible and (not possible or told_apart(search, base, found[0], possible[0])):
+        why = "what fits best would have to be larger than such a fault can be"
+        return Told("abstain", found[0], (), (), (found[0],), why)
+    found, given_up = possible or found, list[Hypothesis]()
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}
@@ -90,6 +96,13 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
         return Told("abstain", base, (), (), (base,), why)
     return Told("abstain", found[0], (), (), _alike(search, base, found), why)
+
+
+def _beyond(search: Search, explanation: Explanation) -> bool:
+    """Whether one of its effects rests at the end of what such a fault can be."""
+    ranged = [h for h in explanation.hypotheses if h.limits]
+    value = {q.name: q.value for q in search.model_of(explanation).parameters} if ranged else {}
+    return any(rests_at_edge(h, value.__getitem__) for h in ranged)
 
 
 def _told(

@@ -1,6 +1,7 @@
 """What is told when an effect does not hold on rows that did not fit it: the search behind is a stand-in."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ class Given:
     criterion: float
     fresh: float
     numbers: int = 0
+    slope: float = 0.0
     fit: Any = field(default_factory=lambda: Rows(np.zeros(ROWS)))
 
 
@@ -35,6 +37,10 @@ class Stand:
     def __init__(self, *known: Given) -> None:
         self.known = {tuple(h.site for h in e.hypotheses): e for e in known}
 
+    def model_of(self, explanation: Given) -> Any:
+        """A model whose only parameter is the slope of a span."""
+        return SimpleNamespace(parameters=[SimpleNamespace(name=SPAN.parameters[0], value=explanation.slope)])
+
     def without(self, explanation: Given, left_out: Hypothesis) -> Given:
         return self.known[tuple(h.site for h in explanation.hypotheses if h is not left_out)]
 
@@ -44,6 +50,10 @@ def lag(site: str) -> Hypothesis:
     return Hypothesis(
         site, "lag", "lag", Effect(site, "lag", "lag", settings={"scale": 1.0}), ("time_constant",), ({},)
     )
+
+
+SPAN = Hypothesis("sensor", "own_value", "span", Effect("sensor", "own_value", "span", settings={"middle": 1.0}),
+                  ("slope",), ({},), {"slope": (-0.3, 0.3)})  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -90,3 +100,15 @@ def test_a_small_effect_beside_a_large_one_is_not_told() -> None:
 
 def test_nothing_is_missing_where_no_explanation_gains() -> None:
     assert told(Given((lag("sensor"),), 5.0, 0.1)).word == "none"
+
+
+@pytest.mark.parametrize(("slope", "word"), [(-0.1, "named"), (-0.2999, "abstain"), (0.3, "abstain")])
+def test_a_fault_at_the_end_of_its_range_is_no_explanation(slope: float, word: str) -> None:
+    """Though it predicts fresh rows and fits best: the record asks for more than such a fault can give."""
+    said = told(Given((SPAN,), 500.0, 0.5, slope=slope), Given((lag("valve"),), 300.0, 0.4))
+    assert said.word == word
+    assert word == "named" or "larger than such a fault can be" in said.why
+
+
+def test_a_fault_at_the_end_of_its_range_that_gains_nothing_is_nothing() -> None:
+    assert told(Given((SPAN,), 1.0, 0.0, slope=0.3)).word == "none"
