@@ -1,4 +1,4 @@
-"""Run and print: `python -m benchmarks.kinds_of_change`, about 25 minutes for 20 seeds.
+"""Run and print: `python -m benchmarks.kinds_of_change`, an hour for 20 seeds on a busy machine.
 
 Writes one Parquet part for each truth, seed and estimator into the folder of `--out`. Parts that are there already are
 not run again, so that a run that was stopped goes on; remove the folder after a change. Choices were made on seeds 1 to
