@@ -16,9 +16,9 @@ import numpy as np
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.hypotheses.known_before import Constants
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
+from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from adaptive_flot.discovery.hypotheses.rows import noise_floor
 from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, is_short

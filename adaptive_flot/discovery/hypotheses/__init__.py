@@ -8,11 +8,8 @@ Map
 procedure.py         The stages: constants, model as it is, hypotheses, judgement.
 calibration.py       Constants, usual sizes of the errors and the ranges of the sites, from the reference records.
 families.py          What can be the matter at a site, by its role.
-rows.py              Records, rows that count, usual sizes of errors, the criterion.
-usual_errors.py      How large errors usually are, by where the plant is.
-known_before.py      Constants with their uncertainty, first guesses of initial states.
-joint_unknowns.py    Everything that a joint fit moves, as one vector with its bounds.
-joint_fit.py         One model fitted to several records, each with an initial state of its own.
+seen.py              What was seen at every site along the runs of a fit.
+joint/               One model fitted to several records, each with an initial state of its own.
 cross_validation.py  A hypothesis fitted to some stretches and judged on the others.
 comparison.py        Which hypotheses stand on fresh rows, and which the records can not tell apart.
 plausible.py         Whether a fitted fault can be what it says.

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.families import seen_values
-from adaptive_flot.discovery.hypotheses.joint_fit import JointFit, JointFitter
-from adaptive_flot.discovery.hypotheses.known_before import Constants, loose_constants, scattered_starts
-from adaptive_flot.discovery.hypotheses.rows import Rows, noise_floor, rows_of, spread
-from adaptive_flot.discovery.hypotheses.usual_errors import UsualErrors, overall_sizes, usual_errors
+from adaptive_flot.discovery.hypotheses.joint.fit import JointFit, JointFitter
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, loose_constants, scattered_starts
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor, rows_of, spread
+from adaptive_flot.discovery.hypotheses.joint.usual_errors import UsualErrors, overall_sizes, usual_errors
+from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset

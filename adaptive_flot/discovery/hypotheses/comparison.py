@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
-from adaptive_flot.discovery.hypotheses.rows import Rows
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.greybox.model import FloatArray
 
 SHORTEST_BLOCK = 10

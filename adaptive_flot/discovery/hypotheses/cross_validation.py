@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.hypotheses.joint_fit import MOST_EVALUATIONS, JointFit, JointFitter
-from adaptive_flot.discovery.hypotheses.known_before import Constants, first_states, stores_at_rest
-from adaptive_flot.discovery.hypotheses.rows import TAIL, BoolArray, Rows
+from adaptive_flot.discovery.hypotheses.joint.fit import MOST_EVALUATIONS, JointFit, JointFitter
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, first_states, stores_at_rest
+from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, BoolArray, Rows
 from adaptive_flot.greybox.model import FloatArray, Model
 
 FOLDS = 5

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.joint_fit import JointFit
-from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
-from adaptive_flot.greybox.stepping.stepper import Stepper
 
 Kind = Literal[
     "switch", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis", "dead zone",
@@ -94,7 +91,7 @@ def hypotheses(
     model
         The model, with sites.
     seen, drivers
-        Values at each site and of each driver (N,), see `seen_values`. They are those of all records, so that a part
+        Values at each site and of each driver (N,), see `seen.py`. They are those of all records, so that a part
         that does not move in one of them has the range of the others.
     dt, duration
         Sampling interval and length of the shortest record [s].
@@ -224,31 +221,3 @@ def _store(site: Site, state: str, moved: float, size: float, dt: float) -> Hypo
     effect = Effect(site.name, state, "store")
     starts = tuple({"exchange": 0.3 * size / moved, "time_constant": n * dt} for n in (20.0, 100.0))
     return Hypothesis(site.name, state, "store", effect, ("exchange", "time_constant"), starts)
-
-
-def seen_values(
-    model: Model, fit: JointFit, records: Sequence[Dataset]
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Values at every site, and of every driver, along the free runs of a fit, the records behind one another."""
-    stepper = Stepper(model, records[0].dt)
-    sites: list[FloatArray] = []
-    drivers: list[FloatArray] = []
-    names = model.drivers or (*model.names("inputs"), *model.names("states"))
-    p = model.with_parameters(fit.values).parameter_values
-    for record, x0 in zip(records, fit.initial, strict=True):
-        run = stepper.simulate(x0, record.inputs[1:], p, float(record.time[0]))
-        states, n = np.vstack([x0, run.states]), len(record)
-        columns = {**dict(zip(model.names("inputs"), record.inputs.T, strict=True)),
-                   **dict(zip(model.names("states"), states.T, strict=True))}  # fmt: skip
-        if model.signals:
-            columns |= {s.name: np.concatenate([[c[0]], c]) for s, c in zip(model.signals, run.signals.T, strict=True)}
-        drivers.append(np.column_stack([columns[d] for d in names if d in columns]))
-        z = model.ode.map(n)(record.time, states.T, record.inputs.T, np.tile(p[:, None], n))[3]
-        at = model.site_values.map(n)(record.time, states.T, record.inputs.T, np.tile(p[:, None], n), z)
-        sites.append(np.array(at).T)
-    together, moved = np.vstack(sites), np.vstack(drivers)
-    known = [d for d in names if d in {*model.names("inputs"), *model.names("states"), *model.names("signals")}]
-    return (
-        {s.name: together[:, i] for i, s in enumerate(model.sites)},
-        {d: moved[:, i] for i, d in enumerate(known)},
-    )

@@ -17,8 +17,8 @@ from adaptive_flot.discovery.hypotheses.comparison import (
     tied,
 )
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.plausible import at_edge, moves_though_stopped
-from adaptive_flot.discovery.hypotheses.rows import Rows
 from adaptive_flot.greybox.model import FloatArray
 
 Word = Literal["none", "named", "class", "abstain", "insufficient"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.hypotheses.rows import Rows, noise_floor
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.greybox.model import FloatArray
 
 AT_EDGE = 0.01

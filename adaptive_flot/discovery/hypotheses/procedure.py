@@ -21,11 +21,12 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
     test_on_stretches,
     worth_testing,
 )
-from adaptive_flot.discovery.hypotheses.families import STRUCTURE, Hypothesis, hypotheses, seen_values
-from adaptive_flot.discovery.hypotheses.joint_fit import JointFit
+from adaptive_flot.discovery.hypotheses.families import STRUCTURE, Hypothesis, hypotheses
+from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
+from adaptive_flot.discovery.hypotheses.joint.known_before import loose_constants, scattered_starts
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows, measured_columns, rows_of
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judge
-from adaptive_flot.discovery.hypotheses.known_before import loose_constants, scattered_starts
-from adaptive_flot.discovery.hypotheses.rows import Rows, measured_columns, rows_of
+from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.discovery.hypotheses.telling import verdict_of
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.errors import ModelError

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.rows import BoolArray
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.known_before import Constants, stores_at_rest
-from adaptive_flot.discovery.hypotheses.rows import BoolArray
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, stores_at_rest
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions
 from adaptive_flot.discovery.innovations.noise_fit import noise_of, search_noise
 from adaptive_flot.greybox.data.dataset import Dataset

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adaptive_flot.discovery.hypotheses.rows import BoolArray
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.greybox.model import FloatArray
 
 IntArray = NDArray[np.int_]

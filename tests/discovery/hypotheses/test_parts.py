@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from adaptive_flot.discovery.hypotheses.comparison import blocks_of, reduction
 from adaptive_flot.discovery.hypotheses.cross_validation import stretches
 from adaptive_flot.discovery.hypotheses.families import hypotheses
-from adaptive_flot.discovery.hypotheses.known_before import loose_constants, scattered_starts
-from adaptive_flot.discovery.hypotheses.rows import TAIL, Rows, noise_floor, rows_of
-from adaptive_flot.discovery.hypotheses.usual_errors import usual_errors
+from adaptive_flot.discovery.hypotheses.joint.known_before import loose_constants, scattered_starts
+from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, Rows, noise_floor, rows_of
+from adaptive_flot.discovery.hypotheses.joint.usual_errors import usual_errors
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from tests.discovery.hypotheses.tank import tank

@@ -9,10 +9,11 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses import cross_validation
 from adaptive_flot.discovery.hypotheses.calibration import calibrate
-from adaptive_flot.discovery.hypotheses.families import hypotheses, seen_values
+from adaptive_flot.discovery.hypotheses.families import hypotheses
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows, rows_of
 from adaptive_flot.discovery.hypotheses.plausible import at_edge, moves_though_stopped
 from adaptive_flot.discovery.hypotheses.procedure import compare
-from adaptive_flot.discovery.hypotheses.rows import Rows, rows_of
+from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.greybox import Dataset, Effect
 from adaptive_flot.greybox.model import FloatArray
 from tests.discovery.hypotheses.tank import DRAUGHT, DT, NOISE, ROWS, record, tank

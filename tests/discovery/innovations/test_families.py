@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.hypotheses.rows import noise_floor
+from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Search

@@ -15,7 +15,7 @@ import pandas as pd
 
 from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit, ParameterEstimate
-from adaptive_flot.discovery.hypotheses.rows import noise_floor
+from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.search import is_short
 from adaptive_flot.greybox.data.dataset import Dataset

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.known_before import Constants
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.greybox.model import FloatArray, Model
 
 STATE_PRIOR = 1.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from adaptive_flot.discovery.hypotheses.rows import Rows
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 

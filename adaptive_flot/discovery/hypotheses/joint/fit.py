@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from adaptive_flot.discovery.hypotheses.joint_unknowns import JointUnknowns
-from adaptive_flot.discovery.hypotheses.known_before import Constants, first_states
-from adaptive_flot.discovery.hypotheses.rows import TAIL, Rows
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, first_states
+from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, Rows
+from adaptive_flot.discovery.hypotheses.joint.unknowns import JointUnknowns
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
