@@ -60,9 +60,14 @@ def runs(solves: list[Solve]) -> Iterator[list[Run]]:
     plain = EconomicMpc._optimise
 
     def recorded(
-        self: EconomicMpc, state: MpcState, held: FloatArray, sample: Sample, estimate: Estimate
+        self: EconomicMpc,
+        state: MpcState,
+        held: FloatArray,
+        sample: Sample,
+        estimate: Estimate,
+        bounds: dict[str, FloatArray] | None,
     ) -> tuple[MpcState, Decision]:
-        after, decision = plain(self, state, held, sample, estimate)
+        after, decision = plain(self, state, held, sample, estimate, bounds)
         solves.append(Solve(self, state, held, sample, estimate, decision))
         return after, decision
 
@@ -121,7 +126,7 @@ def test_after_every_fault_it_decides_as_a_fresh_controller(runs: list[Run], sol
     for solve in valid:
         fresh = EconomicMpc(solve.controller.setup, solver="fatrop")
         state = replace(fresh.init(solve.sample.time), inputs=solve.state.inputs, bias=solve.state.bias)
-        _, expected = fresh._optimise(state, solve.held, solve.sample, solve.estimate)
+        _, expected = fresh._optimise(state, solve.held, solve.sample, solve.estimate, None)
         assert expected.status is Status.OK
         np.testing.assert_allclose(solve.decision.inputs, expected.inputs, rtol=1e-3)
 
