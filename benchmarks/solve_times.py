@@ -28,7 +28,7 @@ from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks.speed import Figure
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.nlp_solvers import SOLVERS
+from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS
 
 MOVES, SHORT, MOVE_S = 80, 40, 30
 TREE, STD = "fatrop, 9 scenarios", 0.02

@@ -12,20 +12,20 @@ import numpy as np
 from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.dips import with_dip
 from controllers.economic_mpc.early import Early, counted, narrowed
-from controllers.economic_mpc.layout import Bounds
-from controllers.economic_mpc.nlp_solvers import FailingSolver, make_solver
 from controllers.economic_mpc.output_bias import OutputBias
 from controllers.economic_mpc.planner import Planner, Uncertainty
 from controllers.economic_mpc.probing import ProbeState, Probing
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.layout import Bounds
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.softening import Softening
+from controllers.economic_mpc.solvers.nlp_solvers import FailingSolver, make_solver
+from controllers.economic_mpc.solvers.verification import NlpSolution, Solver, Validity
 from controllers.economic_mpc.state import MpcState
 from controllers.economic_mpc.taking_over import taken_over
 from controllers.economic_mpc.told import Teller, Told
-from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
 
 OWN = "economic_mpc"
 

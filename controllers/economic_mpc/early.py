@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.layout import StageLayout
+from controllers.economic_mpc.problem.layout import StageLayout
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.state import MpcState
 

@@ -11,13 +11,13 @@ from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status, f
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from controllers.economic_mpc.chance_constraint import ChanceConstraint, quantile_of
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.layout import Bounds
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.layout import Bounds
+from controllers.economic_mpc.problem.stage import Arguments
 from controllers.economic_mpc.softening import GivenUp, Softening
-from controllers.economic_mpc.stage import Arguments
+from controllers.economic_mpc.solvers.verification import NlpSolution, Solver, Validity
 from controllers.economic_mpc.state import MpcState
-from controllers.economic_mpc.tree_planner import TreePlanner
-from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
+from controllers.economic_mpc.tree.tree_planner import TreePlanner
 
 BRANCH, PROBABILITY = 5, 0.95
 """Defaults of the tree: moves that a branch looks ahead, and what places the outer scenarios."""

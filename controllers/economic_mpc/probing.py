@@ -20,8 +20,8 @@ import numpy as np
 from adaptive_flot.contracts import Estimate, Limits
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.layout import StageLayout
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.layout import StageLayout
 
 HOUR = 3600.0
 WITHIN = 0.999

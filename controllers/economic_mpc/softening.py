@@ -24,13 +24,13 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.layout import Bounds
-from controllers.economic_mpc.newton_step import PlanStep
-from controllers.economic_mpc.nlp_solvers import interior_point
-from controllers.economic_mpc.real_time_iteration import RealTimeIteration
-from controllers.economic_mpc.stage import Arguments
-from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.layout import Bounds
+from controllers.economic_mpc.problem.stage import Arguments
+from controllers.economic_mpc.solvers.newton_step import PlanStep
+from controllers.economic_mpc.solvers.nlp_solvers import interior_point
+from controllers.economic_mpc.solvers.real_time_iteration import RealTimeIteration
+from controllers.economic_mpc.solvers.verification import NlpSolution, Solver, Validity
 
 TOLERANCES = 0.01, 0.1
 """An excess up to this counts as none, in units of a slack: that of an output limit, and that of a state's range. The

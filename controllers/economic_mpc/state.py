@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.probing import ProbeState
 from controllers.economic_mpc.scenarios import Misfit
-from controllers.economic_mpc.verification import NlpSolution
+from controllers.economic_mpc.solvers.verification import NlpSolution
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 
 from adaptive_flot.contracts import Estimate
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.layout import DEGREE, StageLayout
 from controllers.economic_mpc.output_bias import OutputBias
+from controllers.economic_mpc.problem.layout import DEGREE, StageLayout
 from controllers.economic_mpc.state import MpcState
 
 

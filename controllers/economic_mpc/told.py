@@ -9,8 +9,8 @@ import numpy as np
 
 from adaptive_flot.contracts import Plan
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.planner import Found
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.softening import by_name, in_words
 
 

@@ -8,11 +8,11 @@ import pytest
 from adaptive_flot.contracts import Limits
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
 from adaptive_flot.processes.flotation.economics import Prices, value_rates
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.layout import Bounds
-from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
-from controllers.economic_mpc.stage import Arguments
-from controllers.economic_mpc.verification import Validity, Verifier
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.layout import Bounds
+from controllers.economic_mpc.problem.stage import Arguments
+from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS, make_solver
+from controllers.economic_mpc.solvers.verification import Validity, Verifier
 
 MOVE_S, HORIZON = 30.0, 8
 PRICES = 1000 * np.array([*Prices().prices(), 1e-3, 1e-3, 1e-3])

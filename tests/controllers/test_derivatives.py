@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from adaptive_flot.greybox import Model
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.derivatives import Assembled
-from controllers.economic_mpc.layout import DEGREE
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.derivatives import Assembled
+from controllers.economic_mpc.problem.layout import DEGREE
 from tests.controllers.test_collocation import arguments, cell_problem, cold
 
 

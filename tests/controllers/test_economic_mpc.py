@@ -13,8 +13,8 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Stepper
 from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc.controller import EconomicMpc
+from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
 from controllers.economic_mpc.state import MpcState
-from controllers.economic_mpc.verification import NlpSolution, Validity
 
 
 @pytest.fixture(scope="module")

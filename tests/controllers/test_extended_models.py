@@ -7,10 +7,10 @@ import pytest
 
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
 from adaptive_flot.greybox.effects import Effect
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
-from controllers.economic_mpc.stage import Arguments
-from controllers.economic_mpc.verification import Validity
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.stage import Arguments
+from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS, make_solver
+from controllers.economic_mpc.solvers.verification import Validity
 from tests.controllers.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES, cell_problem
 
 NOW = 360.0

@@ -12,7 +12,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import FloatArray, Model, Stepper, steady_state
 from adaptive_flot.processes.cascaded_tanks import PumpingEconomics, make_model
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.nlp_solvers import SOLVERS
+from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS
 from controllers.hold import Hold
 from controllers.pi import Pi
 from estimators.fixed import Fixed

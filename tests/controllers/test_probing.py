@@ -20,10 +20,10 @@ from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.testing import ControllerCase, controller_case
 from adaptive_flot.testing.comparing import same
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.layout import StageLayout
 from controllers.economic_mpc.probing import ProbeState, Probing
+from controllers.economic_mpc.problem.layout import StageLayout
+from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
 from controllers.economic_mpc.state import MpcState
-from controllers.economic_mpc.verification import NlpSolution, Validity
 
 START = np.array([1.77e-3, 1.67e-4, 0.33])
 """Close to where the MPC ends up with nominal parameters: at the lowest level and the grade limit."""

@@ -11,11 +11,11 @@ import pytest
 from adaptive_flot.greybox import FloatArray, Model, Stepper
 from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.nlp_solvers import SOLVERS, make_solver
-from controllers.economic_mpc.real_time_iteration import MOST_STEPS
-from controllers.economic_mpc.verification import NlpSolution, Validity
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS, make_solver
+from controllers.economic_mpc.solvers.real_time_iteration import MOST_STEPS
+from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
 from tests.controllers.test_collocation import BOUNDS, HORIZON, arguments, cell_problem, cold
 
 

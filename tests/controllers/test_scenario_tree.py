@@ -13,15 +13,15 @@ from adaptive_flot.contracts import Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import FloatArray, Model, Stepper
 from adaptive_flot.testing import ControllerCase, controller_case
-from controllers.economic_mpc.collocation import OptimalControlProblem
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.nlp_solvers import InteriorPoint, make_solver
-from controllers.economic_mpc.real_time_iteration import MOST_STEPS, RealTimeIteration
-from controllers.economic_mpc.scenario_tree import ScenarioTree
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.scenarios import Misfit, grid
-from controllers.economic_mpc.tree_programme import TreeProgramme
-from controllers.economic_mpc.tree_step import TreeStep
-from controllers.economic_mpc.verification import NlpSolution, Validity
+from controllers.economic_mpc.solvers.nlp_solvers import InteriorPoint, make_solver
+from controllers.economic_mpc.solvers.real_time_iteration import MOST_STEPS, RealTimeIteration
+from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
+from controllers.economic_mpc.tree.scenario_tree import ScenarioTree
+from controllers.economic_mpc.tree.tree_programme import TreeProgramme
+from controllers.economic_mpc.tree.tree_step import TreeStep
 from tests.controllers.test_collocation import BOUNDS, HELD, MOVE_S, arguments, cell_problem, cold
 
 COUNT, BRANCH = 3, 4

@@ -16,11 +16,11 @@ from adaptive_flot.runner.results.timeseries import SOFTENED
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.testing import ControllerCase, controller_case
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.newton_step import PlanStep
-from controllers.economic_mpc.nlp_solvers import interior_point
-from controllers.economic_mpc.real_time_iteration import RealTimeIteration
+from controllers.economic_mpc.solvers.newton_step import PlanStep
+from controllers.economic_mpc.solvers.nlp_solvers import interior_point
+from controllers.economic_mpc.solvers.real_time_iteration import RealTimeIteration
+from controllers.economic_mpc.solvers.verification import Validity
 from controllers.economic_mpc.state import MpcState
-from controllers.economic_mpc.verification import Validity
 
 LOW_GRADE, LOW_LEVEL = -0.06, 0.30
 """Bias of the grade, and a level [m], that no plan can make good within the first move."""

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from adaptive_flot.contracts import DelayedValue, Estimate, Status
 from adaptive_flot.greybox import Model, steady_state
-from controllers.economic_mpc.layout import StageLayout
 from controllers.economic_mpc.output_bias import OutputBias
+from controllers.economic_mpc.problem.layout import StageLayout
 from controllers.economic_mpc.taking_over import with_further_states
 from tests.controllers.test_collocation import HELD, LIMITS
 from tests.controllers.test_extended_models import GROWTH, LATE_FEED

@@ -17,7 +17,7 @@ from adaptive_flot.contracts import Economics, OperatingPoint
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.sensors import without_sensor_effects
-from controllers.economic_mpc.layout import DEGREE, StageLayout
+from controllers.economic_mpc.problem.layout import DEGREE, StageLayout
 
 
 def control_prices(layout: StageLayout) -> int:

@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.economic_mpc.collocation import CSE, OptimalControlProblem
-from controllers.economic_mpc.layout import DEGREE
+from controllers.economic_mpc.problem.collocation import CSE, OptimalControlProblem
+from controllers.economic_mpc.problem.layout import DEGREE
 
 IntArray = NDArray[np.intp]
 T = TypeVar("T", ca.DM, ca.SX, ca.MX)

@@ -13,10 +13,10 @@ from scipy.linalg import eigh
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.condensing import Condensed, LinearisedStages
-from controllers.economic_mpc.derivatives import Derivatives
-from controllers.economic_mpc.layout import Multipliers, StageLayout
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.condensing import Condensed, LinearisedStages
+from controllers.economic_mpc.problem.derivatives import Derivatives
+from controllers.economic_mpc.problem.layout import Multipliers, StageLayout
 
 LEAST_CURVATURE = 1e-3
 """Of the objective by a scaled input, and by a slack that has none: the programme must be strictly convex."""

@@ -14,12 +14,12 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.condensing import Condensed, LinearisedStages
-from controllers.economic_mpc.derivatives import Derivatives
-from controllers.economic_mpc.layout import Multipliers
-from controllers.economic_mpc.newton_step import RESULTS
-from controllers.economic_mpc.scenario_tree import ScenarioTree
-from controllers.economic_mpc.tree_programme import TreeProgramme
+from controllers.economic_mpc.problem.condensing import Condensed, LinearisedStages
+from controllers.economic_mpc.problem.derivatives import Derivatives
+from controllers.economic_mpc.problem.layout import Multipliers
+from controllers.economic_mpc.solvers.newton_step import RESULTS
+from controllers.economic_mpc.tree.scenario_tree import ScenarioTree
+from controllers.economic_mpc.tree.tree_programme import TreeProgramme
 
 
 class TreeStep:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.condensing import Condensed
-from controllers.economic_mpc.newton_step import LEAST_CURVATURE, Programme, reflected
-from controllers.economic_mpc.tree_layout import TreeLayout
+from controllers.economic_mpc.problem.condensing import Condensed
+from controllers.economic_mpc.solvers.newton_step import LEAST_CURVATURE, Programme, reflected
+from controllers.economic_mpc.tree.tree_layout import TreeLayout
 
 TOLERANCE = 1e-7
 """Of rows and prices of a programme."""

@@ -17,12 +17,12 @@ import numpy as np
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.derivatives import Assembled
-from controllers.economic_mpc.layout import Multipliers
-from controllers.economic_mpc.newton_step import PlanStep
-from controllers.economic_mpc.real_time_iteration import RealTimeIteration
-from controllers.economic_mpc.verification import Nlp, NlpSolution, Solver, Verifier, no_solution
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.derivatives import Assembled
+from controllers.economic_mpc.problem.layout import Multipliers
+from controllers.economic_mpc.solvers.newton_step import PlanStep
+from controllers.economic_mpc.solvers.real_time_iteration import RealTimeIteration
+from controllers.economic_mpc.solvers.verification import Nlp, NlpSolution, Solver, Verifier, no_solution
 
 BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
 """Barrier parameter in units of the objective (see `Economics.typical_rate`). A larger one for fatrop would save

@@ -11,7 +11,7 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from controllers.economic_mpc.layout import Multipliers
+from controllers.economic_mpc.problem.layout import Multipliers
 
 LARGEST_VIOLATION = 1e-4
 """Largest scaled violation of a constraint or bound with which a solution may be used."""

@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.layout import Multipliers
-from controllers.economic_mpc.verification import Nlp, NlpSolution, Solver, Validity, Verifier, no_solution
+from controllers.economic_mpc.problem.layout import Multipliers
+from controllers.economic_mpc.solvers.verification import Nlp, NlpSolution, Solver, Validity, Verifier, no_solution
 
 MOST_STEPS, MOST_TO_OPTIMUM = 4, 12
 

@@ -10,15 +10,15 @@ from adaptive_flot.contracts import ControllerSetup, Estimate
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.chance_constraint import SteadyGains
-from controllers.economic_mpc.collocation import OptimalControlProblem
-from controllers.economic_mpc.nlp_solvers import InteriorPoint
-from controllers.economic_mpc.real_time_iteration import RealTimeIteration
-from controllers.economic_mpc.scenario_tree import ScenarioTree
+from controllers.economic_mpc.problem.collocation import OptimalControlProblem
+from controllers.economic_mpc.problem.stage import Arguments
 from controllers.economic_mpc.scenarios import Scenarios, grid
-from controllers.economic_mpc.stage import Arguments
+from controllers.economic_mpc.solvers.nlp_solvers import InteriorPoint
+from controllers.economic_mpc.solvers.real_time_iteration import RealTimeIteration
+from controllers.economic_mpc.solvers.verification import NlpSolution, Solver, Validity
 from controllers.economic_mpc.state import MpcState
-from controllers.economic_mpc.tree_step import TreeStep
-from controllers.economic_mpc.verification import NlpSolution, Solver, Validity
+from controllers.economic_mpc.tree.scenario_tree import ScenarioTree
+from controllers.economic_mpc.tree.tree_step import TreeStep
 
 SIZES = {3: 1, 9: 2, 27: 3}
 """Number of axes by number of scenarios."""

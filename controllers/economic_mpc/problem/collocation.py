@@ -13,8 +13,8 @@ import numpy as np
 
 from adaptive_flot.contracts import Economics, Limits
 from adaptive_flot.greybox.model import FloatArray, Model
-from controllers.economic_mpc.layout import StageLayout
-from controllers.economic_mpc.stage import write_stage
+from controllers.economic_mpc.problem.layout import StageLayout
+from controllers.economic_mpc.problem.stage import write_stage
 
 CSE = {"cse": True}
 """Evaluate common parts of an expression once."""

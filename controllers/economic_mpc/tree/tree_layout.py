@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.derivatives import IntArray
-from controllers.economic_mpc.layout import DEGREE, Multipliers, StageLayout
+from controllers.economic_mpc.problem.derivatives import IntArray
+from controllers.economic_mpc.problem.layout import DEGREE, Multipliers, StageLayout
 
 
 class TreeLayout:

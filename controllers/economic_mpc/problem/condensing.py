@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.derivatives import Derivatives
-from controllers.economic_mpc.layout import StageLayout
+from controllers.economic_mpc.problem.derivatives import Derivatives
+from controllers.economic_mpc.problem.layout import StageLayout
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.collocation import CSE, OptimalControlProblem
-from controllers.economic_mpc.derivatives import Derivatives, sparse
-from controllers.economic_mpc.tree_layout import TreeLayout
+from controllers.economic_mpc.problem.collocation import CSE, OptimalControlProblem
+from controllers.economic_mpc.problem.derivatives import Derivatives, sparse
+from controllers.economic_mpc.tree.tree_layout import TreeLayout
 
 
 class ScenarioTree:
