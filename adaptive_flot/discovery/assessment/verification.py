@@ -33,7 +33,7 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     Confirmed where the 95 % interval of the reduction (see `_reduction`) lies above zero and no output is worse: its
     error grew by more than WORSE, and the interval of its own reduction lies below zero.
     """
-    rows, block = problem.rows("confirm"), _block_rows(problem, before, after)
+    rows, block = problem.rows("confirm"), block_rows(problem, before, after)
     size = problem.weights * after.noise.stationary_std()
     old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
     reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
@@ -105,9 +105,14 @@ def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
     return (before.loss - after.loss) / rows_each > further * float(np.log(samples))
 
 
-def changes(problem: Problem, before: Fit, after: Fit, split: str) -> tuple[OutputChange, ...]:
-    """Free-run error of each measured output on one split of the record, before and after."""
-    rows, block = problem.rows(split), _block_rows(problem, before, after)
+def changes(
+    problem: Problem, before: Fit, after: Fit, split: str, block: int | None = None
+) -> tuple[OutputChange, ...]:
+    """Free-run error of each measured output on one split of the record, before and after.
+
+    `block` is the length of the bootstrap's blocks, by default that of `block_rows`.
+    """
+    rows, block = problem.rows(split), block or block_rows(problem, before, after)
     ones = np.ones_like(problem.weights)
     old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
     noise = after.noise.stationary_std()
@@ -127,7 +132,7 @@ def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> F
     return squares
 
 
-def _block_rows(problem: Problem, before: Fit, after: Fit) -> int:
+def block_rows(problem: Problem, before: Fit, after: Fit) -> int:
     """Rows of a block: more than BLOCK_ROWS where what both fits lack is slower than the noise.
 
     Twice the rows of an effective sample (see `rows_per_effective_sample`): neighbouring blocks are then next to

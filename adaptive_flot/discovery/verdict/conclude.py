@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import changes, whiteness
+from adaptive_flot.discovery.assessment.verification import block_rows, changes, whiteness
 from adaptive_flot.discovery.candidates.direction import against, listed
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
@@ -85,7 +85,8 @@ def report_errors(problem: Problem, before: Fit, after: Fit, report: Dataset | N
     """Free-run errors on the report split, or on a record of its own that reports."""
     if report is None:
         return changes(problem, before, after, "report")
-    return changes(*_on_record(problem, report, before, after), "report")
+    there = _on_record(problem, report, before, after)  # a problem without rows that were fitted
+    return changes(*there, "report", block_rows(problem, before, after))
 
 
 def _on_record(problem: Problem, record: Dataset, before: Fit, after: Fit) -> tuple[Problem, Fit, Fit]:
