@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.greybox import Dataset
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "data"
@@ -48,6 +52,12 @@ def faulted_days(folder: Path) -> Iterator[Judged]:
         yield Judged(f"air handling {day}", f"{part} {fault}".replace("_", " "), verdict, worth)
 
 
+def run_on(fit: Fit, record: Dataset, seen: int) -> float:
+    """Root mean square error of the first output in the rows behind the first `seen`, in a free run over all."""
+    free = RecordSimulator(fit.model, record.dt).outputs(record, fit.initial_state, fit.model.parameter_values)
+    return float(np.sqrt(np.nanmean((record.outputs - free)[seen:, 0] ** 2)))
+
+
 def drives(folder: Path) -> Iterator[Judged]:
     """Five records of one plant together, without a reference."""
     verdict = find_changes(
@@ -61,7 +71,12 @@ def drives(folder: Path) -> Iterator[Judged]:
 def single_records(folder: Path) -> Iterator[Judged]:
     """One record each, without a reference."""
     record = heat_exchanger.record(folder).rows(heat_exchanger.FIRST, heat_exchanger.LAST)
-    verdict = discover(heat_exchanger.make_model(), record, processes=available_processes()).verdict
+    found = discover(heat_exchanger.make_model(), record, processes=available_processes())
+    verdict = found.verdict
+    if found.before is not None and found.after is not None:
+        everything = heat_exchanger.record(folder).rows(heat_exchanger.FIRST, None)
+        plain, extended = (run_on(fit, everything, len(record)) for fit in (found.before, found.after))
+        verdict = replace(verdict, reason=f"{verdict.reason} Run on over the rest: {plain:.3f} -> {extended:.3f} degC.")
     named = {(e.effect.site, e.effect.driver) for e in verdict.effects} if verdict.word == "named" else set()
     right = bool(named) and named <= {("heating", "flow"), ("residence_time", "flow")}
     yield Judged(

@@ -141,7 +141,7 @@ def block_rows(problem: Problem, before: Fit, after: Fit) -> int:
     return max(BLOCK_ROWS, round(2 * rows_per_effective_sample(problem, before, after)))
 
 
-def _reduction(old: FloatArray, new: FloatArray, block: int = BLOCK_ROWS) -> tuple[float, tuple[float, float]]:
+def _reduction(old: FloatArray, new: FloatArray, block: int) -> tuple[float, tuple[float, float]]:
     """Reduction of the root mean square error with a 95 % interval; squared errors old and new (N,), NaN where missing.
 
     With the sums O_b and N_b over blocks of neighbouring rows::

@@ -18,7 +18,7 @@ from adaptive_flot.discovery.hypotheses.comparison import (
 )
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
-from adaptive_flot.discovery.hypotheses.plausible import at_edge, moves_though_stopped
+from adaptive_flot.discovery.hypotheses.plausible import at_edge
 from adaptive_flot.greybox.model import FloatArray
 
 Word = Literal["none", "named", "class", "abstain", "insufficient"]
@@ -137,8 +137,7 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
     if usual is not None:
         if usual.exceeded(null, count, len(blocks.edges)) is None:
             return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
-    possible = (t for t in tested if np.isfinite(t.total) and not moves_though_stopped(rows, t))
-    ranked = sorted(possible, key=lambda t: t.total)
+    ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
     standing = [t for t in ranked if stands(rows, blocks, null, t)]
     if not standing:
         why = "no single hypothesis makes the errors smaller on rows that did not fit it"

@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
-from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.model import FloatArray, Model
 
 AT_EDGE = 0.01
 """A coefficient is at the edge of its range when it is nearer to it than this share of the range."""
@@ -48,12 +48,14 @@ def rests_at_edge(h: Hypothesis, value: Callable[[str], float]) -> bool:
     return False
 
 
-def moves_though_stopped(rows: Rows, tested: Tested) -> bool:
-    """Whether a part that is said to have stopped leaves an output without motion that was seen to move.
+def moves_though_stopped(model: Model, rows: Rows, tested: Tested) -> bool:
+    """Whether a sensor of the model that is said to have stopped leaves an output without motion that was seen to move.
 
-    A sensor that has stopped shows one value and nothing else, however near that value is to all of a record.
+    A sensor that has stopped shows one value and nothing else, however near that value is to all of a record. Behind
+    a valve that is stuck, an output may well move: by a disturbance that the model does not have.
     """
-    if tested.hypothesis is None or tested.hypothesis.kind != "stuck":
+    h = tested.hypothesis
+    if h is None or h.kind != "stuck" or next(s for s in model.sites if s.name == h.site).role != "sensor":
         return False
     for i, (record, errors) in enumerate(zip(rows.records, tested.fit.errors, strict=True)):
         there = rows.counted[i]

@@ -26,6 +26,7 @@ from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
 from adaptive_flot.discovery.hypotheses.joint.known_before import loose_constants, scattered_starts
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, measured_columns, rows_of
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judge
+from adaptive_flot.discovery.hypotheses.plausible import moves_though_stopped
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.discovery.hypotheses.telling import verdict_of
 from adaptive_flot.discovery.results import Verdict
@@ -137,7 +138,8 @@ def compare(
             return test_on_stretches(calibration.model, rows, near, hold_constants=bool(references))
 
     null, *results = parallel_map(test_one, [base, *near], processes, lambda: progress("test"))
-    tested = tuple(sorted(results, key=lambda t: t.total))
+    possible = (t for t in results if not moves_though_stopped(calibration.model, rows, t))
+    tested = tuple(sorted(possible, key=lambda t: t.total))
     usual = _usual_losses(calibration) if references else None
     judged, blocks = judge(rows, null, tested, usual)
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)

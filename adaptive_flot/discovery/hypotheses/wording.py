@@ -68,10 +68,10 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
 
 def _at_its_end(value: float, h: Hypothesis) -> float:
     """The value, or the end of its range where it lies within a thousandth of that."""
-    for low, high in h.limits.values():
-        near = [end for end in (low, high) if abs(value - end) < 1e-3 * (high - low)]
-        return near[0] if near and len(h.free) == 1 else value
-    return value
+    if len(h.free) != 1 or not h.limits:
+        return value
+    low, high = h.limits[h.free[0]]
+    return next((end for end in (low, high) if abs(value - end) < 1e-3 * (high - low)), value)
 
 
 def _factor(log: float) -> str:

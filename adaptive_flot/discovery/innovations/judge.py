@@ -77,7 +77,8 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     if matters and found[0] not in possible and (not possible or told_apart(search, base, found[0], possible[0])):
         why = "what fits best would have to be larger than such a fault can be"
         return Told("abstain", found[0], (), (), (found[0],), why)
-    found, given_up = possible or found, list[Hypothesis]()
+    found = possible or found
+    given_up: list[Hypothesis] = []
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}

@@ -60,10 +60,8 @@ class RealTimeIteration:
         multipliers: Multipliers | None = None,
     ) -> NlpSolution:
         """One step from a start (n,) and its multipliers, more where the equations ask for it; see `Solver`."""
-        if multipliers is None:
-            return self._cold(arguments, bounds, start)
-        if not (np.isfinite(arguments).all() and np.isfinite(start).all()):
-            return no_solution(len(start), len(bounds["lbg"]), "state or estimate is not finite")
+        if multipliers is None or not (np.isfinite(arguments).all() and np.isfinite(start).all()):
+            return self._cold(arguments, bounds, start)  # it says what is not finite
         found, change = self._steps(arguments, bounds, start, multipliers)
         if self._until == np.inf or (found.validity is Validity.VALID and change <= self._until):
             return found

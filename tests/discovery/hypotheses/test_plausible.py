@@ -61,7 +61,15 @@ def test_a_sensor_that_moves_has_not_stopped(outputs: FloatArray | None, moves: 
     """Noise and flicker between two steps of a converter are no motion."""
     new = record("new", 1, DRAUGHT)
     new = new if outputs is None else replace(new, outputs=outputs)
-    assert moves_though_stopped(*one_hypothesis("thermometer stuck", new)) is moves
+    assert moves_though_stopped(tank(), *one_hypothesis("thermometer stuck", new)) is moves
+
+
+def test_behind_a_stuck_valve_an_output_may_move() -> None:
+    """By a disturbance that the model does not have: that is no evidence against the valve."""
+    new = record("new", 1, DRAUGHT)
+    rows, valve = one_hypothesis("heater stuck", new)
+    at_rest = replace(valve.fit, errors=(new.outputs - 303.0,))
+    assert not moves_though_stopped(tank(), rows, replace(valve, fit=at_rest))
 
 
 def test_a_constant_at_its_bound_is_known_there() -> None:
