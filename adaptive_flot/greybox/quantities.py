@@ -14,6 +14,7 @@ from adaptive_flot.errors import ModelError, RangeError
 FloatArray = NDArray[np.float64]
 ParameterRole = Literal["fixed", "estimated"]
 Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
+DIMENSIONLESS = ("-", "")
 ARBITRARY_ZERO = ("K", "degC", "degF")
 """Units of temperature: the same record in any of them says the same."""
 
@@ -118,6 +119,11 @@ class Parameter:
                 f"[{self.lower:g}, {self.upper:g}] {self.unit}; give a value inside it"
             )
         return replace(self, value=float(value))
+
+    @property
+    def varies_by_factor(self) -> bool:
+        """Whether what is unknown of it is a factor: a positive parameter with a dimension, such as a rate constant."""
+        return self.unit not in DIMENSIONLESS and self.lower > 0
 
     @property
     def label(self) -> str:

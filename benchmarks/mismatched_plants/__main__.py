@@ -93,6 +93,7 @@ def main() -> None:
     parser.add_argument("--plants", type=int, default=COUNT)
     parser.add_argument("--first-plant", type=int, default=0, help="number of the first plant")
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, from 1 on")
+    parser.add_argument("--compile", action="store_true", help="step and estimators as machine code: less time")
     parser.add_argument("--loop", action="append", choices=LOOPS, help="a loop to run, may be repeated; default: all")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -106,7 +107,8 @@ def main() -> None:
         done = read_table(part) if part.is_file() else pd.DataFrame({"loop": []})
         missing = [loop for loop in options.loop or LOOPS if loop not in set(done["loop"])]
         if missing:
-            new = figures(plant(k, options.out), seed, missing)
+            scenario = plant(k, options.out)
+            new = figures(scenario.compiled() if options.compile else scenario, seed, missing)
             write_table(pd.concat([done, new], ignore_index=True) if len(done) else new, part)
     rows = pd.concat([read_table(part) for part in parts.values()], ignore_index=True)
     Console(width=None if Console().is_terminal else 150).print(summary(rows))

@@ -5,10 +5,15 @@ output after a move, with the spread that past plans had (`Misfit`). Their joint
 steady-state derivatives G of the limited outputs, the singular value decomposition ``G S = U D V'`` gives the axes
 ``S V``: the first ones move limited outputs most, the others not at all (to first order). Scenarios are a grid of three
 points on the first axes: the estimate, and ``quantile`` standard deviations to both sides.
+
+A positive parameter with a dimension goes by a factor, ``theta exp(d / theta)`` for a change d. Estimators have its
+logarithm as coordinate, and there the line is straight along which such a parameter makes up for another one. A wide
+covariance would else place scenarios at values below zero, or far from that line.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -84,7 +89,13 @@ class Scenarios:
 
 
 def grid(
-    theta: FloatArray, covariance: FloatArray, spread: FloatArray, gains: FloatArray, axes: int, quantile: float
+    theta: FloatArray,
+    covariance: FloatArray,
+    spread: FloatArray,
+    gains: FloatArray,
+    axes: int,
+    quantile: float,
+    by_factor: Sequence[bool] = (),
 ) -> Scenarios:
     """Scenarios on a grid.
 
@@ -100,6 +111,8 @@ def grid(
         Number a of axes; there are 3^a scenarios. Axes beyond q + k have no length.
     quantile
         Distance of the outer points, in standard deviations.
+    by_factor
+        Whether each parameter goes by a factor (q,); default none.
     """
     q, k = len(theta), len(spread)
     values, vectors = np.linalg.eigh(covariance)
@@ -111,7 +124,10 @@ def grid(
     found[:, : min(axes, q + k)] = _axes(effect, root)[:, :axes]
     points = np.array(sorted(product((0.0, -1.0, 1.0), repeat=axes), key=lambda at: sum(map(abs, at))))
     moved = quantile * points @ found.T
-    return Scenarios(theta + moved[:, :q], moved[:, q:])
+    parameters = theta + moved[:, :q]
+    for i in (i for i, goes in enumerate(by_factor) if goes and theta[i] > 0):
+        parameters[:, i] = theta[i] * np.exp(moved[:, i] / theta[i])
+    return Scenarios(parameters, moved[:, q:])
 
 
 def _axes(effect: FloatArray, root: FloatArray) -> FloatArray:

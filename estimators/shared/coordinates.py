@@ -16,8 +16,6 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray, Model
 
-DIMENSIONLESS = ("-", "")
-
 
 @dataclass(frozen=True)
 class Coordinates:
@@ -45,7 +43,7 @@ class Coordinates:
     def of(cls, model: Model, names: Sequence[str]) -> Coordinates:
         """Coordinates of named parameters of a model."""
         parameters = [model.parameters[i] for i in model.indices("parameters", names)]
-        log = tuple(p.unit not in DIMENSIONLESS and p.lower > 0 for p in parameters)
+        log = tuple(p.varies_by_factor for p in parameters)
         limits = np.array([[p.lower, p.upper] for p in parameters], dtype=float)
         bounds = limits.copy()
         bounds[list(log)] = np.log(bounds[list(log)])

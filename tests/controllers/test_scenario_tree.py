@@ -223,6 +223,32 @@ def test_three_axes_of_three_quantities_have_their_whole_covariance() -> None:
     np.testing.assert_allclose(axes.T @ axes, expected, atol=1e-12)
 
 
+def test_a_factor_agrees_with_a_change_where_it_is_small_and_stays_positive_where_it_is_not() -> None:
+    theta, gains, spread = np.array([1.0, 2e-4]), np.array([[0.5, -1e3]]), np.array([1e-3])
+    std = np.diag([0.15, 0.8 * 2e-4])
+    covariance = std @ np.array([[1.0, -0.99], [-0.99, 1.0]]) @ std
+    for share, tolerance in ((1e-4, 1e-6), (1.0, 1e9)):
+        linear, factor = (
+            grid(theta, share**2 * covariance, spread, gains, 2, 1.645, which) for which in ((), (False, True))
+        )
+        np.testing.assert_array_equal(factor.parameters[0], theta)
+        np.testing.assert_array_equal(factor.parameters[:, 0], linear.parameters[:, 0])
+        np.testing.assert_allclose(factor.parameters[:, 1], linear.parameters[:, 1], rtol=tolerance)
+    assert linear.parameters[:, 1].min() < 0 < factor.parameters[:, 1].min()
+
+
+def test_a_wide_covariance_along_the_ridge_has_a_plan_for_every_scenario() -> None:
+    """As `adaptive_imm` has it where the model is wrong; scenarios along a straight line in C would be unsolvable."""
+    case = controller_case(EconomicMpc, horizon=6, solver="fatrop", scenarios=9)
+    controller = case.controller
+    assert isinstance(controller, EconomicMpc)
+    std = np.diag(case.estimates[0].parameters * [0.16, 0.82])
+    wide = replace(case.estimates[0], covariance=std @ np.array([[1.0, -0.9996], [-0.9996, 1.0]]) @ std)
+    state, _ = controller.decide(controller.init(0.0), None, None)
+    state, decision = controller.decide(state, case.samples[0], wide)
+    assert decision.status is Status.OK and state.tree is not None
+
+
 def test_a_misfit_is_the_mean_square_of_what_came_less_what_was_planned() -> None:
     misfit = Misfit.none(1)
     errors = [0.002, -0.001, 0.004]

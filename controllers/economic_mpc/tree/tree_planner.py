@@ -77,6 +77,7 @@ class TreePlanner:
         self._axes, self._quantile = SIZES[scenarios], quantile
         adapted = [setup.model.parameters[i] for i in setup.model.indices("parameters", setup.parameters)]
         self._lowest, self._highest = np.array([[p.lower, p.upper] for p in adapted]).reshape(-1, 2).T
+        self._by_factor = [p.varies_by_factor for p in adapted]
         self._adapted = setup.model.indices("parameters", setup.parameters)
         self._gains = SteadyGains(setup, setup.model.indices("outputs", self.layout.outputs))
 
@@ -86,7 +87,7 @@ class TreePlanner:
         theta, spread = estimate.parameters, np.sqrt(np.array(state.misfit.variance))
         if not (np.isfinite(estimate.covariance).all() and np.isfinite(theta).all()):
             return None
-        found = grid(theta, estimate.covariance, spread, gains, self._axes, self._quantile)
+        found = grid(theta, estimate.covariance, spread, gains, self._axes, self._quantile, self._by_factor)
         inside = np.clip(found.parameters, np.minimum(self._lowest, theta), np.maximum(self._highest, theta))
         scenarios = Scenarios(inside, found.biases)
         return None if scenarios.are_alike else scenarios
