@@ -12,18 +12,17 @@ import numpy as np
 from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.dips import with_dip
 from controllers.economic_mpc.early import Early, counted, narrowed
 from controllers.economic_mpc.output_bias import OutputBias
 from controllers.economic_mpc.planner import Planner, Uncertainty
-from controllers.economic_mpc.probing import ProbeState, Probing
+from controllers.economic_mpc.probing.choice import make_probing, probed
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.layout import Bounds
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.softening import Softening
 from controllers.economic_mpc.solvers.nlp_solvers import FailingSolver, make_solver
 from controllers.economic_mpc.solvers.verification import NlpSolution, Solver, Validity
-from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.state import MpcState, ProbeState
 from controllers.economic_mpc.taking_over import taken_over
 from controllers.economic_mpc.told import Teller, Told
 
@@ -77,7 +76,8 @@ class EconomicMpc:
     early_plans
         Plan before the next move is due where an output has left its plan and lies beyond its limit (`early.py`).
     probing
-        Options of `Probing`: dips of an input that tell the parameters apart; default none.
+        Moves that tell the parameters apart: options of `Probing` (dips within a budget), or `by: value` and options of
+        `Knowledge` (what a detour teaches is worth more than it costs); default none.
 
     Raises
     ------
@@ -140,7 +140,7 @@ class EconomicMpc:
             OutputBias(name, setup.model.index("outputs", name), setup.dt, bias_time_s) for name in self.layout.outputs
         ]
         self.early = Early(self.layout, self.planner.limits) if early_plans else None
-        self.probing = None if probing is None else Probing(self.layout, limits, **probing)
+        self.probing = None if probing is None else make_probing(setup, self.problem, limits, economics, probing)
         self._tell = Teller(self.problem)
 
     def init(self, time: float) -> MpcState:
@@ -209,7 +209,7 @@ class EconomicMpc:
         moved = self.layout.moved
         found = self.planner.find(self.solver, state, held, sample, estimate, bounds)
         if found.solution.validity is Validity.VALID and self.probing is not None and not found.given_up:
-            state, found = with_dip(self.probing, self.solver, self.problem, state, held, estimate, found, self._scale)
+            state, found = probed(self.probing, self.solver, self.problem, state, held, estimate, found, self._scale)
         solution = found.solution
         if solution.validity is Validity.VALID:
             told = self._tell(estimate.time, found)

@@ -4,10 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adaptive_flot.greybox.model import FloatArray
-from controllers.economic_mpc.probing import ProbeState
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.solvers.verification import NlpSolution
+
+
+@dataclass(frozen=True)
+class ProbeState:
+    """What the next decision needs.
+
+    Attributes
+    ----------
+    start
+        Since when the budget grows [s].
+    spent
+        Predicted price of the dips so far [cu].
+    asked
+        Predicted price of the last dip that was considered [cu].
+    until
+        End of the last dip [s].
+    """
+
+    start: float
+    spent: float = 0.0
+    asked: float = 0.0
+    until: float = -np.inf
 
 
 @dataclass(frozen=True)

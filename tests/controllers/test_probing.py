@@ -20,10 +20,10 @@ from adaptive_flot.processes.flotation.economics import value_rates
 from adaptive_flot.testing import ControllerCase, controller_case
 from adaptive_flot.testing.comparing import same
 from controllers.economic_mpc.controller import EconomicMpc
-from controllers.economic_mpc.probing import ProbeState, Probing
+from controllers.economic_mpc.probing.budget import Probing
 from controllers.economic_mpc.problem.layout import StageLayout
 from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
-from controllers.economic_mpc.state import MpcState
+from controllers.economic_mpc.state import MpcState, ProbeState
 
 START = np.array([1.77e-3, 1.67e-4, 0.33])
 """Close to where the MPC ends up with nominal parameters: at the lowest level and the grade limit."""
@@ -157,7 +157,7 @@ def test_without_room_or_without_a_valid_plan_there_is_no_dip(monkeypatch: pytes
     """The lowest air flow is kept, and a dip that the solver can not plan is left: the free plan is applied."""
     case = make(most_cu_h=100.0, needed_std=0.0)
     controller = case.controller
-    assert isinstance(controller, EconomicMpc) and controller.probing is not None
+    assert isinstance(controller, EconomicMpc) and isinstance(controller.probing, Probing)
     limits, estimate = make_limits(), replace(case.estimates[0], time=100.0)
     low = limits.inputs["air_flow"][0]
     assert not controller.probing.is_due(ProbeState(0.0), estimate, low + 1e-4)

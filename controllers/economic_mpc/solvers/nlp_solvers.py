@@ -26,7 +26,7 @@ from controllers.economic_mpc.solvers.verification import Nlp, NlpSolution, Solv
 
 BARRIER = {"ipopt": 2e-5, "fatrop": 2e-4}
 """Barrier parameter in units of the objective (see `Economics.typical_rate`). A larger one for fatrop would save
-an iteration, but then plans are not exact enough to tell what a dip of an input costs (`probing.py`)."""
+an iteration, but then plans are not exact enough to tell what a dip of an input costs (`probing/`)."""
 SOLVERS = ("ipopt", "fatrop", "rti")
 
 

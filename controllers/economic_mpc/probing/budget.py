@@ -13,7 +13,7 @@ So the predicted price of probing is bounded, whatever the estimator says.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,32 +22,11 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.layout import StageLayout
+from controllers.economic_mpc.state import ProbeState
 
 HOUR = 3600.0
 WITHIN = 0.999
 """Share of the largest move that a dip asks for at most: the solver is never at the edge of what it may do."""
-
-
-@dataclass(frozen=True)
-class ProbeState:
-    """What the next decision needs.
-
-    Attributes
-    ----------
-    start
-        Since when the budget grows [s].
-    spent
-        Predicted price of the dips so far [cu].
-    asked
-        Predicted price of the last dip that was considered [cu].
-    until
-        End of the last dip [s].
-    """
-
-    start: float
-    spent: float = 0.0
-    asked: float = 0.0
-    until: float = -np.inf
 
 
 class Probing:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from adaptive_flot.contracts import Estimate
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.planner import Found
-from controllers.economic_mpc.probing import Probing, price
+from controllers.economic_mpc.probing.budget import Probing, price
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.solvers.verification import Solver, Validity
 from controllers.economic_mpc.state import MpcState
