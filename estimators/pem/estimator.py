@@ -30,6 +30,8 @@ FURTHER = 3
 """Screened starts that are searched on all rows."""
 FIRST_STEPS, SECOND_STEPS = 10, 40
 """Simulations of each start on the first rows, and on all."""
+HALF = 0.5
+"""Belief below which an error is an outlier, and not asked for its colour."""
 SAME = 2.0
 """Difference in minus two log-likelihood below which two searches have ended at the same fit."""
 
@@ -132,7 +134,8 @@ class Pem:
         if not np.isfinite(best.criterion):
             return self._failed(record, problem)
         agreed = sum(s.criterion - best.criterion < SAME for s in searches)
-        fit = self._result(record, problem, best.unknowns, best.noise, present, evaluations)
+        best, believed = self._runs.weighed(record, problem, best)
+        fit = self._result(record, problem, best, believed, present, evaluations)
         fit = replace(fit, starts=len(searches), agreed=agreed)
         return fit if best.converged else replace(fit, status=Status.NOT_CONVERGED)
 
@@ -168,18 +171,20 @@ class Pem:
         self,
         record: Dataset,
         problem: Problem,
-        unknowns: FloatArray,
-        noise: FloatArray,
+        best: Search,
+        believed: FloatArray,
         present: FloatArray,
         evaluations: int,
     ) -> BatchFit:
-        model, q = self.setup.model, len(self.setup.parameters)
-        scaled = _covariance(self._runs.rows(record, problem, unknowns, noise, present))
+        model, q, unknowns = self.setup.model, len(self.setup.parameters), best.unknowns
+        each = best.noise / np.sqrt(believed)
+        scaled = _covariance(self._runs.rows(record, problem, unknowns, each, present))
         covariance = (scaled * np.outer(problem.scale, problem.scale))[:q, :q]
         by_unknowns = np.vstack([self._runs.gradients(record, problem, unknowns)[1], np.diag(problem.scale)[:q]])
         joint = by_unknowns @ scaled @ by_unknowns.T
         p, x0 = self._runs.start_of(record, problem, unknowns)
         values = problem.centre[:q] + problem.scale[:q] * unknowns[:q]
+        errors = self._runs.errors(record, problem, unknowns, record.outputs[:, self._runs.columns])
         at_bound = np.minimum(unknowns - problem.lower, problem.upper - unknowns)[:q] < 1e-6
         estimates = tuple(
             ParameterEstimate(name, model.parameters[i].label, model.parameters[i].unit, float(v), float(s), bool(b))
@@ -196,7 +201,7 @@ class Pem:
             record=record.name,
             estimates=estimates,
             covariance=covariance,
-            noise_std=noise,
+            noise_std=best.noise,
             parameters=p,
             initial_state=x0,
             last_state=self._runs.last_state(record, problem, unknowns),
@@ -206,7 +211,7 @@ class Pem:
                 [e.label for e in estimates], scaled[:q, :q], [e.at_bound for e in estimates]
             ),
             joint_covariance=(joint + joint.T) / 2,
-            colour=colour(self._runs.errors(record, problem, unknowns, record.outputs[:, self._runs.columns])),
+            colour=colour(np.where(believed > HALF, errors, np.nan)),
         )
 
     def _failed(self, record: Dataset, problem: Problem) -> BatchFit:

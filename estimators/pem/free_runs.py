@@ -16,11 +16,14 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from estimators.pem.problem import Problem, Search
+from estimators.shared.outliers import belief
 
 InitialState = Literal["steady", "estimated", "given"]
 WEIGHT_PASSES = 5
 """Fits in turn, each weighted with the noise levels that the last one left, until these stand still."""
 NOISE_CONVERGED = 0.01
+BELIEF_PASSES, BELIEF_CONVERGED = 5, 0.05
+"""Fits in turn with outliers, each weighted by the beliefs that the last one left, until these stand still."""
 MOST_EVALUATIONS = 1000
 """Simulations of the record in one search."""
 AT_NOISE = 1.5
@@ -50,32 +53,60 @@ class FreeRuns:
         self.starts_steady = initial_state == "steady" or (initial_state == "estimated" and setup.model.starts_steady)
         self.least_noise = 1e-12 * np.array([setup.model.outputs[c].scale for c in self.columns])
 
-    def search(self, record: Dataset, problem: Problem, start: FloatArray, most: int | None = None) -> Search:
-        """The search from one start (unknowns,), weighted anew until the noise levels stand still."""
+    def search(
+        self,
+        record: Dataset,
+        problem: Problem,
+        start: FloatArray,
+        most: int | None = None,
+        belief: FloatArray | None = None,
+    ) -> Search:
+        """The search from one start (unknowns,), weighted anew until the noise levels stand still.
+
+        Each measurement counts by the `belief` in it (N, m), default 1.
+        """
         measured = record.outputs[:, self.columns]
         present = np.isfinite(measured)
-        samples = int(present.sum())
+        weight = np.ones_like(measured) if belief is None else belief
+        samples = float(weight[present].sum())
         freedom = np.sqrt(samples / max(samples - len(problem.centre), 1))
         noise, unknowns, evaluations, converged = self.first_noise(measured), start, 0, False
         for _ in range(WEIGHT_PASSES):
-            solution = self.solve(record, problem, unknowns, noise, measured, present, most)
+            each = noise if belief is None else noise / np.sqrt(weight)
+            solution = self.solve(record, problem, unknowns, each, measured, present, most)
             if solution is None:
                 return Search(unknowns, noise, evaluations, False, float("inf"))
             unknowns, used = cast(FloatArray, solution.x), noise
             evaluations += int(solution.nfev)
-            noise = freedom * self._noise(self.errors(record, problem, unknowns, measured))
+            noise = freedom * self._noise(self.errors(record, problem, unknowns, measured), weight)
             converged = bool(solution.status > 0)
             if not converged or np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
                 break
         prior = np.sum((unknowns / problem.prior_std) ** 2)
         return Search(unknowns, noise, evaluations, converged, float(2 * present.sum(axis=0) @ np.log(noise) + prior))
 
+    def weighed(self, record: Dataset, problem: Problem, search: Search) -> tuple[Search, FloatArray]:
+        """The search again, each measurement weighted by the belief in it (N, m), until these beliefs stand still.
+
+        Without outliers the search itself; see `estimators/shared/outliers.py`.
+        """
+        measured = record.outputs[:, self.columns]
+        believed = belief(self.errors(record, problem, search.unknowns, measured))
+        for _ in range(BELIEF_PASSES):
+            if (believed == 1).all():
+                break
+            search = self.search(record, problem, search.unknowns, belief=believed)
+            before, believed = believed, belief(self.errors(record, problem, search.unknowns, measured))
+            if np.allclose(believed, before, atol=BELIEF_CONVERGED):
+                break
+        return search, believed
+
     def leaves_noise_alone(self, record: Dataset, problem: Problem, search: Search) -> bool:
         """Whether a search ended at the level of the noise, so that no other start could do better."""
         measured = record.outputs[:, self.columns]
         errors = self.errors(record, problem, search.unknowns, measured)
         quiet = 1.4826 * np.nanmedian(np.abs(np.diff(errors, axis=0)), axis=0) / np.sqrt(2)
-        return bool(np.all(self._noise(errors) < AT_NOISE * quiet))
+        return bool(np.all(self._noise(errors, np.ones_like(errors)) < AT_NOISE * quiet))
 
     def problem(self, record: Dataset, steady: FloatArray | None = None) -> Problem:
         """Centre, scale and range of what is unknown of a record, whose steady start (nx,) may be known.
@@ -125,13 +156,14 @@ class FreeRuns:
     def rows(
         self, record: Dataset, problem: Problem, unknowns: FloatArray, noise: FloatArray, present: FloatArray
     ) -> FloatArray:
-        """Rows of the least-squares Jacobian: measurements over their noise, then priors."""
-        rows = (-self._jacobian(record, problem, unknowns) / noise[:, None])[present]
+        """Rows of the least-squares Jacobian: measurements over their noise, (m,) or (N, m), then priors."""
+        rows = (-self._jacobian(record, problem, unknowns) / noise[..., None])[present]
         return np.vstack([rows, np.diag(1 / problem.prior_std)[np.isfinite(problem.prior_std)]])
 
-    def _noise(self, errors: FloatArray) -> FloatArray:
-        """Root mean square of each output's error (m,), kept off zero."""
-        rms = np.array([np.sqrt(np.nanmean(e**2)) for e in errors.T])
+    def _noise(self, errors: FloatArray, weight: FloatArray) -> FloatArray:
+        """Root mean square of each output's weighted errors (m,), kept off zero."""
+        pairs = zip(errors.T, weight.T, strict=True)
+        rms = np.array([np.sqrt(np.nansum(w * e**2) / w[np.isfinite(e)].sum()) for e, w in pairs])
         return cast(FloatArray, np.maximum(rms, self.least_noise))
 
     def errors(self, record: Dataset, problem: Problem, unknowns: FloatArray, measured: FloatArray) -> FloatArray:
@@ -185,7 +217,7 @@ class FreeRuns:
         present: FloatArray,
         most: int | None,
     ) -> OptimizeResult | None:
-        """Least squares from a start at fixed noise (m,), with `most` simulations; None where no run is finite."""
+        """Least squares from a start at fixed noise (m,) or (N, m), in `most` runs; None without a finite one."""
         with_prior = np.isfinite(problem.prior_std)
 
         def residuals(unknowns: FloatArray) -> FloatArray:
