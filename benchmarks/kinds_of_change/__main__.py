@@ -20,6 +20,9 @@ from adaptive_flot.greybox.data.tables import read_table, write_table
 from benchmarks.kinds_of_change.figures import ESTIMATORS, figures
 from benchmarks.kinds_of_change.truths import TRUTHS
 
+AT_ONCE = 5
+"""Seeds of a truth that are run in turn: what they have in common is built once."""
+
 
 def shown(rows: pd.DataFrame) -> str:
     """Median fits of n / C / grade, and the mean share of the time that is held."""
@@ -41,14 +44,21 @@ def main() -> None:
     estimators = tuple(options.estimator or ESTIMATORS)
     options.out.mkdir(parents=True, exist_ok=True)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
-    jobs = [(key, seed) for seed in seeds for key in options.truth or TRUTHS]
-    parts = {(*job, name): options.out / f"{job[0]}-seed{job[1]}-{name}.parquet" for job in jobs for name in estimators}
-    for key, seed in track(jobs, "kinds of change", console=Console(stderr=True)):
-        missing = tuple(name for name in estimators if not parts[key, seed, name].is_file())
-        if missing:
-            found = figures(TRUTHS[key], key, seed, missing, options.out, compiled=options.compile)
-            for name, rows in found.groupby("estimator"):
-                write_table(rows, parts[key, seed, str(name)])
+    truths = options.truth or TRUTHS
+    parts = {
+        (key, seed, name): options.out / f"{key}-seed{seed}-{name}.parquet"
+        for seed in seeds
+        for key in truths
+        for name in estimators
+    }
+    jobs = [(key, seeds[i : i + AT_ONCE]) for i in range(0, len(seeds), AT_ONCE) for key in truths]
+    for key, some in track(jobs, "kinds of change", console=Console(stderr=True)):
+        for name in estimators:
+            missing = [seed for seed in some if not parts[key, seed, name].is_file()]
+            if missing:
+                found = figures(TRUTHS[key], key, missing, [name], options.out, compiled=options.compile)
+                for seed, row in found.groupby("seed"):
+                    write_table(row, parts[key, int(str(seed)), name])
     rows = pd.concat([read_table(part) for part in parts.values()], ignore_index=True)
     title = f"Fits of n / C / grade (medians), share of the time held (mean); seeds {seeds[0]} to {seeds[-1]}"
     table = Table("truth", *estimators, "told: model error", title=title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -44,18 +45,25 @@ def held(scenario: Scenario, run: Run, wanted: FloatArray) -> float:
 
 
 def figures(
-    truth: Truth, key: str, seed: int, estimators: tuple[str, ...], folder: Path, *, compiled: bool
+    truth: Truth, key: str, seeds: Sequence[int], estimators: Sequence[str], folder: Path, *, compiled: bool
 ) -> pd.DataFrame:
-    """A row for each estimator: fits in percent, and the share of the time that is held."""
+    """A row for each seed and estimator: fits in percent, and the share of the time that is held."""
     scenario = truth.scenario(folder, key)
     scenario = scenario.compiled() if compiled else scenario
-    realisation = Realisation(scenario, seed)
-    columns = scenario.plant_model.indices("parameters", scenario.setup.parameters)
-    wanted = realisation.parameters[:, columns] if truth.has_true_parameters else best_fit(realisation).parameters
+    wanted = {seed: to_hold(truth, Realisation(scenario, seed)) for seed in seeds}
     return pd.DataFrame(
         [
-            {"truth": key, "seed": seed, "estimator": run.estimator, **run.fit, "held": held(scenario, run, wanted)}
+            {"truth": key, "seed": run.seed, "estimator": run.estimator, **run.fit}
+            | {"held": held(scenario, run, wanted[run.seed])}
             | {"model_error": run.status_counts.get("model_error", 0) / len(run.table)}
-            for run in run_scenario(scenario, estimators, seeds=[seed])
+            for run in run_scenario(scenario, estimators, seeds=seeds)
         ]
     )
+
+
+def to_hold(truth: Truth, realisation: Realisation) -> FloatArray:
+    """Parameters (N, q) that the region should hold: the true ones, or the best-fitting ones where none are true."""
+    if not truth.has_true_parameters:
+        return best_fit(realisation).parameters
+    s = realisation.scenario
+    return realisation.parameters[:, s.plant_model.indices("parameters", s.setup.parameters)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
@@ -23,7 +24,7 @@ def fit(record: Dataset) -> BatchFit:
     return Pem(Setup(MODEL, 1.0, MODEL.names("parameters"), MODEL.names("outputs"))).fit(record)
 
 
-def contaminated(record: Dataset, seed: int, slow: FloatArray | float = 0.0) -> tuple[Dataset, FloatArray]:
+def contaminated(record: Dataset, seed: int, slow: FloatArray | float = 0.0) -> tuple[Dataset, NDArray[np.bool_]]:
     """The record with one value in twenty off by 6, up or down, and which."""
     wrong = np.arange(ROWS) % 20 == 7
     added = wrong * np.random.default_rng(1000 + seed).choice([-6.0, 6.0], ROWS) + slow
