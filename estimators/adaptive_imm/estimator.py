@@ -22,6 +22,9 @@ from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import first_estimate, layout, parameters_of
 from estimators.shared.measured import driving_outputs
 
+LAST, MORE_LIKELY = 10.0, 0.5
+"""Samples over which the modes with a discrepancy must be the likely ones: outliers beside each other are none."""
+
 
 class AdaptiveImm:
     """Joint Kalman filters, one for each kind of change, that share one linearisation and what they know.
@@ -38,9 +41,9 @@ class AdaptiveImm:
 
     Where the first record's fit left errors that are not white, the model is wrong from the start; see `trust.py`.
 
-    The status is `Status.MODEL_ERROR` while the modes with a discrepancy are more likely than not, or a parameter is
-    farther than `plausible` from its nominal value, by more than two standard deviations. Then the parameters take up
-    what the model lacks; `discover` looks for it.
+    The status is `Status.MODEL_ERROR` in two cases. The modes with a discrepancy are more likely than not, on the
+    average of the last ten samples or so. Or a parameter is farther than `plausible` from its nominal value, by more
+    than two standard deviations. Then the parameters take up what the model lacks; `discover` looks for it.
 
     Parameters
     ----------
@@ -170,7 +173,7 @@ class AdaptiveImm:
         known = self._described > 0
         probability = np.ones(count)
         probability[known] = stationary(self.transitions[np.ix_(known, known)])
-        return AdaptiveImmState(prior.time, z, triangles, probability, lagged, noise, trust)
+        return AdaptiveImmState(prior.time, z, triangles, probability, lagged, noise, trust, trust.doubt)
 
     def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
         """Mix, predict, compare, correct, weigh; see `Estimator.update`."""
@@ -206,7 +209,8 @@ class AdaptiveImm:
         theta, theta_covariance = parameters_of(mean, covariance, self.coordinates, shape)
         q = len(self.setup.parameters)
         theta_covariance = np.sqrt(state.trust.inflation) * theta_covariance[:q, :q]
-        if status is Status.OK and self._is_wrong(mean, covariance, probability):
+        wrong = state.wrong + (float(probability @ self._off) - state.wrong) / LAST
+        if status is Status.OK and (wrong > MORE_LIKELY or self._is_far(mean, covariance)):
             status = Status.MODEL_ERROR
         off = np.zeros(len(prediction))
         off[self._columns] = mean[self._b]
@@ -222,11 +226,9 @@ class AdaptiveImm:
             discrepancy=off,
             disturbances=dict(zip(self.setup.unmeasured, theta[q:].tolist(), strict=True)),
         )
-        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, state.trust), estimate
+        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, state.trust, wrong), estimate
 
-    def _is_wrong(self, mean: FloatArray, covariance: FloatArray, probability: FloatArray) -> bool:
-        if probability @ self._off > 0.5:
-            return True
+    def _is_far(self, mean: FloatArray, covariance: FloatArray) -> bool:
         where = self.layout.coordinates
         far = (np.abs(mean[where] - self._nominal) - self._plausible_std)[: len(self.setup.parameters)]
         return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[where][: far.size])).any())

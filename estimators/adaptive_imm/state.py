@@ -27,6 +27,8 @@ class AdaptiveImmState:
         Noise of the driving outputs.
     trust
         What the first record said of the model.
+    wrong
+        Probability of the modes with a discrepancy, averaged over the last samples.
     """
 
     time: float
@@ -36,3 +38,4 @@ class AdaptiveImmState:
     lagged: FloatArray
     noise: NoiseLevel
     trust: Trust
+    wrong: float

@@ -110,3 +110,14 @@ def test_a_disturbance_that_nobody_measures_is_kept_from_the_parameters() -> Non
     shown = last.shown_with(samples[-1], model)
     assert shown.parameters is not None and shown.parameters[1] == last.disturbances["th1"]
     assert samples[-1].parameters is None
+
+
+def test_outliers_beside_each_other_are_no_error_of_the_model(cell_case: CellCase) -> None:
+    """Three values in turn off by 20 standard deviations, as happens where one in twenty is."""
+    estimator, samples = AdaptiveImm(cell_case.setup), list(cell_case.samples[:60])
+    column = cell_case.setup.model.index("outputs", cell_case.setup.outputs[0])
+    for k in (30, 31, 32):
+        outputs = samples[k].outputs.copy()
+        outputs[column] += 20 * cell_case.prior.noise_std[0]
+        samples[k] = replace(samples[k], outputs=outputs)
+    assert {e.status for e in replay(estimator, cell_case.prior, samples)} == {Status.OK}
