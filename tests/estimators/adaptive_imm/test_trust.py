@@ -120,4 +120,4 @@ def test_outliers_beside_each_other_are_no_error_of_the_model(cell_case: CellCas
         outputs = samples[k].outputs.copy()
         outputs[column] += 20 * cell_case.prior.noise_std[0]
         samples[k] = replace(samples[k], outputs=outputs)
-    assert {e.status for e in replay(estimator, cell_case.prior, samples)} == {Status.OK}
+    assert {e.status for e in replay(estimator, cell_case.prior, tuple(samples))} == {Status.OK}
