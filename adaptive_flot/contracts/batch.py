@@ -120,6 +120,8 @@ class BatchFit:
         Searches of the whole record, each from another start, and how many of them ended at this fit.
     colour
         Long-run variance of what is left of each output (m,), over its variance, where it is known; see `Prior`.
+    core_noise_std
+        Standard deviation of what is left without the outliers (m,), where there are some.
     """
 
     record: str
@@ -136,6 +138,7 @@ class BatchFit:
     starts: int = 1
     agreed: int = 1
     colour: FloatArray | None = None
+    core_noise_std: FloatArray | None = None
 
     def values(self) -> FloatArray:
         """Fitted values (q,)."""
@@ -151,7 +154,7 @@ class BatchFit:
 
     def prior(self, time: float) -> Prior:
         """Where a recursive estimator goes on from the last row of the record."""
-        known = self.covariance, self.noise_std, self.joint_covariance, self.colour
+        known = self.covariance, self.noise_std, self.joint_covariance, self.colour, self.core_noise_std
         return Prior(time, self.last_state, self.values(), *known)
 
 

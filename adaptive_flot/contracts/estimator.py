@@ -73,6 +73,9 @@ class Prior:
     colour
         Long-run variance of what a fit leaves of each driving output (m,), over its variance: about 1 for white noise.
         Where it is larger the model does not explain the record, and the covariance is too small. None: not known.
+    core_noise_std
+        Standard deviation of the noise without its outliers (m,), for an estimator that knows of outliers. None: that
+        of all noise.
     """
 
     time: float
@@ -82,6 +85,12 @@ class Prior:
     noise_std: FloatArray
     joint_covariance: FloatArray | None = None
     colour: FloatArray | None = None
+    core_noise_std: FloatArray | None = None
+
+    @property
+    def core_noise(self) -> FloatArray:
+        """Standard deviation of the noise (m,), without outliers where that is known: what the covariance rests on."""
+        return self.noise_std if self.core_noise_std is None else self.core_noise_std
 
 
 @dataclass(frozen=True)

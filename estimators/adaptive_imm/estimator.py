@@ -161,7 +161,7 @@ class AdaptiveImm:
         trust = Trust.of(prior.colour, doubts=bool(self._off.any()))
         first, first_P = trust.start(first, first_P, self.layout.coordinates, self._nominal, self._plausible_std)
         scale = np.array([self.setup.model.outputs[j].scale for j in self._columns])
-        noise = NoiseLevel.first(prior.noise_std, scale)
+        noise = NoiseLevel.first(prior.core_noise, scale)
         size, n, count = self._b.stop, self.layout.size, len(self.modes.kinds)
         z, P = np.zeros((size, count)), np.zeros((size, size))
         z[:n], P[:n, :n] = first[:, None], first_P

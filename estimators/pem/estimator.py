@@ -177,7 +177,7 @@ class Pem:
         evaluations: int,
     ) -> BatchFit:
         model, q, unknowns = self.setup.model, len(self.setup.parameters), best.unknowns
-        each = best.noise / np.sqrt(believed)
+        each, outliers = best.noise / np.sqrt(believed), bool((believed < 1).any())
         scaled = _covariance(self._runs.rows(record, problem, unknowns, each, present))
         covariance = (scaled * np.outer(problem.scale, problem.scale))[:q, :q]
         by_unknowns = np.vstack([self._runs.gradients(record, problem, unknowns)[1], np.diag(problem.scale)[:q]])
@@ -185,6 +185,7 @@ class Pem:
         p, x0 = self._runs.start_of(record, problem, unknowns)
         values = problem.centre[:q] + problem.scale[:q] * unknowns[:q]
         errors = self._runs.errors(record, problem, unknowns, record.outputs[:, self._runs.columns])
+        freedom = np.sqrt(present.sum() / (present.sum() - unknowns.size))
         at_bound = np.minimum(unknowns - problem.lower, problem.upper - unknowns)[:q] < 1e-6
         estimates = tuple(
             ParameterEstimate(name, model.parameters[i].label, model.parameters[i].unit, float(v), float(s), bool(b))
@@ -201,7 +202,7 @@ class Pem:
             record=record.name,
             estimates=estimates,
             covariance=covariance,
-            noise_std=best.noise,
+            noise_std=freedom * self._runs.noise(errors, np.ones_like(errors)) if outliers else best.noise,
             parameters=p,
             initial_state=x0,
             last_state=self._runs.last_state(record, problem, unknowns),
@@ -212,6 +213,7 @@ class Pem:
             ),
             joint_covariance=(joint + joint.T) / 2,
             colour=colour(np.where(believed > HALF, errors, np.nan)),
+            core_noise_std=best.noise if outliers else None,
         )
 
     def _failed(self, record: Dataset, problem: Problem) -> BatchFit:

@@ -78,7 +78,7 @@ class FreeRuns:
                 return Search(unknowns, noise, evaluations, False, float("inf"))
             unknowns, used = cast(FloatArray, solution.x), noise
             evaluations += int(solution.nfev)
-            noise = freedom * self._noise(self.errors(record, problem, unknowns, measured), weight)
+            noise = freedom * self.noise(self.errors(record, problem, unknowns, measured), weight)
             converged = bool(solution.status > 0)
             if not converged or np.allclose(noise, used, rtol=NOISE_CONVERGED, atol=0):
                 break
@@ -106,7 +106,7 @@ class FreeRuns:
         measured = record.outputs[:, self.columns]
         errors = self.errors(record, problem, search.unknowns, measured)
         quiet = 1.4826 * np.nanmedian(np.abs(np.diff(errors, axis=0)), axis=0) / np.sqrt(2)
-        return bool(np.all(self._noise(errors, np.ones_like(errors)) < AT_NOISE * quiet))
+        return bool(np.all(self.noise(errors, np.ones_like(errors)) < AT_NOISE * quiet))
 
     def problem(self, record: Dataset, steady: FloatArray | None = None) -> Problem:
         """Centre, scale and range of what is unknown of a record, whose steady start (nx,) may be known.
@@ -160,7 +160,7 @@ class FreeRuns:
         rows = (-self._jacobian(record, problem, unknowns) / noise[..., None])[present]
         return np.vstack([rows, np.diag(1 / problem.prior_std)[np.isfinite(problem.prior_std)]])
 
-    def _noise(self, errors: FloatArray, weight: FloatArray) -> FloatArray:
+    def noise(self, errors: FloatArray, weight: FloatArray) -> FloatArray:
         """Root mean square of each output's weighted errors (m,), kept off zero."""
         pairs = zip(errors.T, weight.T, strict=True)
         rms = np.array([np.sqrt(np.nansum(w * e**2) / w[np.isfinite(e)].sum()) for e, w in pairs])

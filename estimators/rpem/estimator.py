@@ -125,7 +125,7 @@ class Rpem:
             prior.state.copy(),
             prior.parameters.copy(),
             self.l0_scale * prior.covariance,
-            prior.noise_std.copy(),
+            prior.core_noise.copy(),
             sensitivity,
             np.zeros((q, q)) if self._information is None else self._information.start(prior.covariance),
             None,

@@ -38,7 +38,8 @@ def test_the_fit_is_that_of_least_squares_without_the_outliers(seed: int) -> Non
     found = fit(record)
     np.testing.assert_allclose(found.values(), theta, atol=0.7 * float(np.sqrt(covariance[0, 0])))
     np.testing.assert_allclose(found.covariance, covariance, rtol=0.1, atol=0.02 * covariance[0, 0])
-    assert found.noise_std[0] == pytest.approx(noise, rel=0.05)
+    assert found.core_noise_std is not None and found.core_noise_std[0] == pytest.approx(noise, rel=0.05)
+    assert found.noise_std[0] == pytest.approx(np.hypot(noise, 6.0 * np.sqrt(0.05)), rel=0.05)
     assert found.colour is not None and found.colour[0] < NOT_WHITE
 
 
@@ -46,3 +47,10 @@ def test_outliers_do_not_hide_that_the_model_is_wrong() -> None:
     record, _ = contaminated(make_record(2, 2, rows=ROWS, noise=(NOISE,)), 2, np.sin(np.arange(ROWS) / 20))
     found = fit(record)
     assert found.colour is not None and found.colour[0] > 2 * NOT_WHITE
+
+
+def test_without_outliers_there_is_one_noise_level() -> None:
+    record = make_record(2, 2, rows=ROWS, noise=(NOISE,))
+    found = fit(record)
+    np.testing.assert_allclose(found.noise_std, least_squares(record.inputs, record.outputs[:, 0])[2], rtol=1e-8)
+    assert found.core_noise_std is None
