@@ -24,6 +24,7 @@ from adaptive_flot.discovery.search.joint_search import search_jointly, wants_jo
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
+from adaptive_flot.discovery.verdict.certain_part import with_certain_part
 from adaptive_flot.discovery.verdict.conclude import insufficient, report_errors
 from adaptive_flot.discovery.verdict.judge import first_that_stands, held_up, judge, least_separation, undecided_rivals
 from adaptive_flot.discovery.verdict.outputs import certain_words
@@ -126,6 +127,7 @@ def judge_alternatives(state: State) -> State:
     problem, result = state.searched
     result = first_that_stands(problem, result)
     result, judgement = held_up(problem, result, judge(result))
+    judgement = with_certain_part(problem, result, judgement)
     said = state.screening.notes
     if problem.time_is_up:
         said = (*said, "the budget ended the search: further effects and freer forms were not all tried")
@@ -164,7 +166,7 @@ def heed_report(state: State) -> State:
             judgement, at_the_end, noise_from_row_to_row(record.outputs, before.model, at_the_end)
         )
     if against:
-        judgement = replace(judgement, word="abstain", members=())
+        judgement = replace(judgement, word="abstain", members=(), part=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
     if judgement.word == "none" and (left := unexplained(error, noise)):
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left

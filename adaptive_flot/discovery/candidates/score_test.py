@@ -175,6 +175,28 @@ class Scorer:
         """Scores of all candidates, best first."""
         return _ranked([self.variant_scores(candidate)[0] for candidate in self.candidates])
 
+    def scores_in_output(self, j: int) -> list[Score]:
+        """Scores by what a fit of each candidate to all outputs would gain in the j-th alone, best first.
+
+        With the rows X_j of the projected responses, e_j of the residual, b fitted to all outputs, and the penalty of
+        `penalised`, the order is that of::
+
+            S_j - k log(number of measurements),   S_j = 2 b'X_j'e_j - b'X_j'X_j b
+
+        Left out is what gains less than its penalty; `gain` and `penalised` stay those over all outputs.
+        """
+        own = np.nonzero(self._present)[1] == j
+        columns, residual = self._columns[own], self.residual[own]
+        gained: list[tuple[float, Score]] = []
+        for score in self.scores():
+            place = next(p for v, p in self._variants[score.candidate.name] if v is score.variant)
+            A = self._grams[place.start]
+            beta = np.linalg.solve(A + (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A)), self._along[place])
+            explained = columns[:, place] @ beta
+            own_gain = float(explained @ (2 * residual - explained))
+            gained.append((own_gain + score.penalised - score.gain, score))
+        return [score for gain, score in sorted(gained, key=lambda g: -g[0]) if gain > 0]
+
     def variant_scores(self, candidate: Candidate) -> list[Score]:
         """Scores of all variants of one candidate, best first."""
         return _ranked([self._score(candidate, v, columns) for v, columns in self._variants[candidate.name]])

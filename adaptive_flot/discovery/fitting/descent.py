@@ -21,6 +21,7 @@ from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.graded_nodes import GradedNodes
 from adaptive_flot.greybox.stepping.nodes import Nodes, Substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
@@ -50,8 +51,10 @@ def nodes_for(problem: Problem, model: Model) -> Nodes | None:
 
     An effect that is abrupt would be lost between nodes that leave rows out, but not between steps within a row.
     """
-    abrupt = any(e.family.abrupt for e in model.effects)
-    return None if abrupt and not isinstance(problem.nodes, Substeps) else problem.nodes
+    nodes = problem.nodes
+    if not any(e.family.abrupt for e in model.effects) or isinstance(nodes, Substeps):
+        return nodes
+    return (nodes.every_row or nodes) if isinstance(nodes, GradedNodes) else None
 
 
 class Descent:

@@ -15,16 +15,17 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, rows_after_moves, substeps
+from adaptive_flot.greybox.stepping.graded_nodes import graded_nodes
+from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
 LONGEST = (6, 4, 3, 2)
 """Most rows from node to node, or steps at every row in one, that are tried."""
-RESTING = (1, 2)
-"""Steps in a row of a coarsely sampled record where no input has moved much for a while."""
-FRESH_MOVE, FRESH_ROWS = 0.02, 3
-"""Share of an input's range that is a move in such a record, and the rows for which it counts."""
+FIRST_STEPS = (4, 6, 8, 12)
+"""Steps in the interval after a move of a coarsely sampled record, where a row asks for many."""
+RESTING = ((1, 0.0), (2, 0.2), (3, 0.2), (4, 0.2), (6, 0.2), (6, 0.1))
+"""Most rows of a step at rest in such a record, and by how many rows a row steps grow."""
 GROWTHS = (1.0, 0.5, 0.35, 0.25)
 """Rows that nodes may be further apart for each row since the last move of an input: what a move sets off dies away."""
 UNNOTICED = 2.0
@@ -57,8 +58,7 @@ def placements(record: Dataset, model: Model) -> list[Nodes]:
     steps = Stepper(model, record.dt).substeps
     if steps > MOST_UNROLLED:
         even = sorted({math.ceil(steps / longest) for longest in LONGEST})
-        fresh = rows_after_moves(record, FRESH_MOVE, FRESH_ROWS)
-        uneven = [substeps(record, np.where(fresh, fine, rest)) for rest in RESTING for fine in (even[-1], steps)]
+        uneven = [graded_nodes(record, first, *rest) for first in FIRST_STEPS for rest in RESTING]
         return sorted([*uneven, *(substeps(record, count) for count in even)], key=lambda nodes: len(nodes.rows))
     placed: list[Nodes] = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
     fewest_first = sorted(placed, key=lambda nodes: len(nodes.rows))

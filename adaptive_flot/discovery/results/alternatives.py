@@ -127,13 +127,30 @@ class SearchResult:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the alternatives of a search amount to, before the words."""
+    """What the alternatives of a search amount to, before the words.
+
+    Attributes
+    ----------
+    word
+        One of six.
+    best
+        The alternative that is told, or the best of those that are not told apart.
+    members
+        (site, driver) of each member of a class.
+    rivals
+        The next best alternatives.
+    margin
+        How much worse a criterion must be to tell an alternative from the best (see `judge`).
+    part
+        (site, driver) of the effects of `best` that are told, where the others are not; empty where all are.
+    """
 
     word: Word
     best: Alternative | None
     members: tuple[tuple[str, str], ...]
     rivals: tuple[Alternative, ...]
     margin: float
+    part: tuple[tuple[str, str], ...] = ()
 
     def near(self, a: Alternative) -> bool:
         """Whether the record does not tell an alternative from the best."""

@@ -5,7 +5,7 @@ A name is (site, driver); its forms compete inside it, so that no name wins or l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +30,8 @@ MOST_CHANGE = float(np.log(10))
 """A physical effect changes a quantity by a factor of ten at most; beyond it is another model, or none with a grip."""
 WORTH_A_RESTART = 10.0
 """Gain of another start of a free time profile, which has most places to rest in, that is worth yet another."""
+EACH_OUTPUT = 2
+"""Candidates for each output that is still wrong: over all outputs they may rank low."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
@@ -58,6 +60,27 @@ def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
         if sum(k.candidate.site.name == c.site.name for k in kept) < SHORTLIST_EACH:
             kept.append(score)
     return _spread(kept, count)
+
+
+def with_each_output(scorer: Scorer, wanted: list[Score], outputs: Sequence[int]) -> list[Score]:
+    """The wanted candidates, and those that explain most of each of some outputs (their places).
+
+    These need no name: what explains an output that all the rest leaves wrong can not explain just anything.
+    """
+    names = {s.candidate.name for s in wanted}
+    for j in outputs:
+        best = _without_twins(scorer, scorer.scores_in_output(j))[:EACH_OUTPUT]
+        wanted = [*wanted, *(s for s in best if s.candidate.name not in names)]
+        names |= {s.candidate.name for s in best}
+    return wanted
+
+
+def _without_twins(scorer: Scorer, ranked: list[Score]) -> list[Score]:
+    kept: list[Score] = []
+    for score in ranked:
+        if not any(_twins(k, score, scorer.drivers) for k in kept):
+            kept.append(score)
+    return kept
 
 
 def _spread(ranked: list[Score], count: int) -> list[Score]:

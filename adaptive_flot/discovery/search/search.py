@@ -16,9 +16,10 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Round, SearchResult
-from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist
+from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist, with_each_output
 from adaptive_flot.discovery.search.fit_jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.simplify import simpler
+from adaptive_flot.discovery.search.substance import better, excess, still_wrong, worth_extending
 from adaptive_flot.discovery.search.successive_halving import refit
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 from adaptive_flot.greybox.model import Model
@@ -30,8 +31,6 @@ NULL_DRAWS = 200
 NULL_QUANTILE = 0.99
 LEAST_EVIDENCE = 10.0
 """Drop of the information criterion that an effect must bring."""
-SUBSTANCE = 0.1
-"""A further effect must remove at least this share of the excess error of the base model."""
 FLAT = 0.02
 """A dependence must remove at least this share of the excess error beyond what the constant at its site removes."""
 SHORTLIST_NEAR, SHORTLIST_FURTHER = 9, 5
@@ -79,7 +78,7 @@ def search(
         progress("what is left")
         scorer, _ = scorer_of(problem, best.fit)
         left = what_is_left(scorer, threshold_of(scorer))
-        if len(best.names) == MOST_EFFECTS or not _worth_extending(problem, base, best, left) or problem.time_is_up:
+        if len(best.names) == MOST_EFFECTS or not worth_extending(problem, base, best, left) or problem.time_is_up:
             break
         beam = _beam(rounds[-1], best, BEAM)
         rounds.append(_round(problem, fitter, base, [scorer], beam, processes, progress))
@@ -168,8 +167,11 @@ def _round(
         most = SHORTLIST_FURTHER if before else SHORTLIST if len(scorers) == 1 else SHORTLIST_NEAR
         for scorer in scorers:
             wanted = shortlist(scorer, most)
-            # a further effect must have a name: a pair of curves without one would explain anything
-            wanted = [s for s in wanted if s.penalised > threshold and (before is None or s.candidate.known)]
+            if before is not None:
+                # a further effect must have a name: a pair of curves without one would explain anything
+                wanted = [s for s in wanted if s.candidate.known]
+                wanted = with_each_output(scorer, wanted, still_wrong(problem, base, before.fit))
+            wanted = [s for s in wanted if s.penalised > threshold]
             linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")
         fitted, all_of_them = refit(fitter, base, linearisations, before, processes, lambda s: progress(f"fit {s}"))
@@ -192,7 +194,7 @@ def _without_flat(problem: Problem, base: Fit, alternatives: list[Alternative]) 
             constant = by_names.get(frozenset((*a.names[:k], (site, "constant"), *a.names[k + 1 :])))
             if driver in DYNAMIC_DRIVERS or driver == "constant" or constant is None:
                 continue
-            if _excess(problem, constant.fit, a.fit) < FLAT * _excess(problem, base, a.fit):
+            if excess(problem, constant.fit, a.fit) < FLAT * excess(problem, base, a.fit):
                 return True
         return False
 
@@ -202,43 +204,3 @@ def _without_flat(problem: Problem, base: Fit, alternatives: list[Alternative]) 
 def _beam(last: Round, best: Alternative, width: int) -> list[Alternative | None]:
     others = [a for a in last.alternatives if a is not best and all(a.known)]
     return [best, *others[: width - 1]]
-
-
-def better(problem: Problem, base: Fit, before: Alternative | None, latest: Round) -> bool:
-    """Whether the best alternative of a round brings evidence and, as a further effect, substance.
-
-    Evidence: its BIC is lower by the round's threshold. Substance: it removes more than SUBSTANCE of the excess error
-    (see `_excess`) of the model as it is.
-    """
-    if not latest.alternatives:
-        return False
-    best, reference = latest.alternatives[0], before.fit if before else base
-    if not best.fit.bic <= reference.bic - latest.threshold:
-        return False
-    return before is None or _excess(problem, reference, best.fit) > SUBSTANCE * _excess(problem, base, best.fit)
-
-
-def _excess(problem: Problem, fit: Fit, better: Fit) -> float:
-    """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit.
-
-    ::
-
-        mean of (r / s)^2 - mean of (r_better / s)^2
-
-    with residuals r, and the standard deviation s of the better fit's noise.
-    """
-    rows = problem.rows("estimate")
-    size = problem.weights * better.noise.stationary_std()
-    old, new = (np.nanmean((f.residual(problem) / size)[rows] ** 2) for f in (fit, better))
-    return float(old - new)
-
-
-def _worth_extending(problem: Problem, base: Fit, best: Alternative, left: tuple[float, float]) -> bool:
-    """Whether what is left is a substantial share of what there was, judged by first-order gains on one noise."""
-    gain, threshold = left
-    if gain < threshold:
-        return False
-    size = problem.weights * best.fit.noise.std
-    rows = problem.rows("estimate")
-    removed = np.nansum(((base.residual(problem) / size) ** 2 - (best.fit.residual(problem) / size) ** 2)[rows])
-    return gain > SUBSTANCE / 2 * float(removed)

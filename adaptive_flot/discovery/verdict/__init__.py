@@ -3,6 +3,7 @@
 Map
 ---
 judge.py        One of six words, from the ranked alternatives.
+certain_part.py A part that is certain, where the whole is not told.
 report_veto.py  What held-out rows contradict is not told as a name.
 outputs.py      What is certain output by output where the record is not told.
 conclude.py     The verdict: that word with errors, tests, intervals and reasons.

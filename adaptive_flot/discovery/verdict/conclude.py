@@ -110,13 +110,15 @@ def _common_nuisance_note(result: SearchResult) -> tuple[str, ...]:
 
 
 def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
-    """Each effect of the best alternative, with Wald intervals c -+ 1.96 sd(c) and the names that could replace it."""
+    """Each effect that is told, with Wald intervals c -+ 1.96 sd(c) and the names that could replace it."""
     assert judgement.best is not None  # a verdict that names has an alternative
     model, best = after.model, judgement.best
     std = dict(zip(after.names, after.std(), strict=True))
     named = []
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]
+        if judgement.part and own not in judgement.part:
+            continue
         others = tuple(
             (*instead[0], a.worse_than(best), a.loglik_difference_sd)
             for a in judgement.rivals

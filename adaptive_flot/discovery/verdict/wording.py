@@ -63,11 +63,11 @@ def reason_words(
         f"{e.effect.site} depends on {e.effect.driver}" + (f" ({e.meaning})" if e.meaning else "") for e in effects
     )
     if judgement.word == "named":
-        return f"The model lacks this: {said}. {evidence}."
+        return f"The model lacks this: {said}. {_beside(judgement)}{evidence}."
     if judgement.word == "class":
         return f"{_class_words(judgement)} {evidence}."
     if judgement.word == "unnamed":
-        return f"The model lacks something that has no name: {said}. {evidence}."
+        return f"The model lacks something that has no name: {said}. {_beside(judgement)}{evidence}."
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
@@ -78,12 +78,23 @@ def reason_words(
 def _class_words(judgement: Judgement) -> str:
     assert judgement.best is not None  # a class has a best member
     sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
-    if all(len(a.names) == 1 for a in sets):
+    if judgement.part or all(len(a.names) == 1 for a in sets):
         members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
-        return f"The model lacks one of these, which this record can not tell apart: {members}."
+        said = f"The model lacks one of these, which this record can not tell apart: {members}."
+        return f"{said} {_beside(judgement)}".rstrip()
     sure = [n for n in judgement.best.names if all(n in a.names for a in sets)]
     rest = "; ".join(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in sure) for a in sets)
     first = "The model lacks several effects. "
     if sure:
         first += f"Certain: {', '.join(f'{s} by {d}' for s, d in sure)}. "
     return f"{first}This record can not tell these apart, of which the first is kept: {rest}."
+
+
+def _beside(judgement: Judgement) -> str:
+    """What stands beside a part that is certain, in a sentence; empty where the whole is told."""
+    if judgement.best is None or not judgement.part:
+        return ""
+    told = {*judgement.part, *judgement.members}
+    sets = [judgement.best, *(a for a in judgement.rivals if judgement.near(a))]
+    rests = dict.fromkeys(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in told) for a in sets)
+    return f"Something else is off beside it, which this record does not tell: {'; or '.join(r for r in rests if r)}. "

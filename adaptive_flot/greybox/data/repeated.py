@@ -22,7 +22,8 @@ def repeated_rows(table: pd.DataFrame, time: str) -> BoolArray:
 
     A run repeats either the row before it (values that were held) or as many rows from elsewhere, in their order. This
     can only be told where a signal is noisy: one without noise may come to rest. One noisy signal that is held is a
-    sensor that has stopped, and nothing is wrong with the others.
+    sensor that has stopped, and nothing is wrong with the others. A row in which no noisy signal has a value repeats
+    nothing: it is a hole in the measurements, and the record goes on behind it.
     """
     none = np.zeros(len(table), dtype=bool)
     numbers = table.drop(columns=time, errors="ignore").select_dtypes("number")
@@ -30,7 +31,7 @@ def repeated_rows(table: pd.DataFrame, time: str) -> BoolArray:
     if not noisy or len(table) < 2 * LONGEST_BY_CHANCE:
         return none
     codes = np.asarray(numbers.groupby(list(numbers.columns), dropna=False, sort=False).ngroup(), dtype=np.int64)
-    before = _last_place(codes)
+    before = np.where(numbers[noisy].notna().any(axis=1), _last_place(codes), -1)
     goes_on = (before[1:] >= 0) & (before[:-1] >= 0) & (np.diff(before) == 1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], goes_on.astype(int), [0]])))
     for start, end in zip(edges[::2], edges[1::2] + 1, strict=True):

@@ -11,6 +11,7 @@ safe_folder.py Whether a file is this user's own, before it is loaded as code.
 fastcall.py   Calls of a compiled function without copies.
 recursion.py  Many intervals in one call.
 nodes.py      A densely sampled record in longer intervals.
+graded_nodes.py  A coarsely sampled one in short steps after a move, and long ones at rest.
 rows.py       Rows of a record in blocks.
 row_jacobians.py Jacobians of the step in every row of a run.
 linear_run.py Responses of a linearised run to many profiles at once.

@@ -69,10 +69,10 @@ class Substeps(Nodes):
         return held
 
 
-def substeps(record: Dataset, counts: int | IntArray) -> Substeps:
-    """Nodes that part each interval between two rows into equal ones: as many in each, or `counts` (N - 1,)."""
+def substeps(record: Dataset, count: int) -> Substeps:
+    """Nodes that part each interval between two rows into `count` equal ones."""
     n = len(record)
-    each = np.broadcast_to(np.asarray(counts, dtype=np.intp), (n - 1,))
+    each = np.full(n - 1, count, dtype=np.intp)
     ends = np.concatenate([[0], np.cumsum(each)])
     rows = np.append(np.repeat(np.arange(n - 1), each), n - 1)
     fraction = (np.arange(ends[-1] + 1) - ends[rows]) / np.append(each, 1)[rows]
@@ -80,15 +80,6 @@ def substeps(record: Dataset, counts: int | IntArray) -> Substeps:
     inputs = np.column_stack([np.repeat(record.inputs[1:], each, axis=0), np.repeat(record.dt / each, each)])
     weights = csr_array((np.ones(n), (np.arange(n), ends)), shape=(n, len(rows)))
     return Substeps(rows, times, inputs, weights)
-
-
-def rows_after_moves(record: Dataset, share: float, rows: int) -> NDArray[np.bool_]:
-    """Intervals (N - 1,) in which an input has moved by more than a share of its range, and `rows` intervals after."""
-    u = record.inputs
-    moved = (np.abs(np.diff(u, axis=0)) > share * np.ptp(u, axis=0)).any(axis=1)
-    moved[0] = True  # a record may start anywhere
-    reach = np.convolve(moved, np.ones(rows + 1))[: len(moved)]
-    return np.asarray(reach > 0.5)
 
 
 def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
@@ -101,7 +92,7 @@ def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
     parts = [_segment(int(a), int(b), longest, growth) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
     rows = np.concatenate(parts)
     offsets = np.cumsum([0, *map(len, parts[:-1])])
-    triplets = [_interpolation(part, offset) for part, offset in zip(parts, offsets, strict=True)]
+    triplets = [interpolation(part, offset) for part, offset in zip(parts, offsets, strict=True)]
     weight, row, node = (np.concatenate(c) for c in zip(*triplets, strict=True))
     weights = csr_array((weight, (row, node)), shape=(len(u), len(rows)))
     nodes = Nodes(rows, record.time[rows], np.empty(0), weights)
@@ -117,7 +108,7 @@ def _segment(start: int, stop: int, longest: int, growth: float) -> IntArray:
     return np.array(rows if len(rows) >= STENCIL else range(start, stop), dtype=np.intp)
 
 
-def _interpolation(nodes: IntArray, offset: int) -> tuple[FloatArray, IntArray, IntArray]:
+def interpolation(nodes: IntArray, offset: int) -> tuple[FloatArray, IntArray, IntArray]:
     """Weights of the nodes in the rows from the first to the last node of a segment: Lagrange's polynomials.
 
     As weight, row and node of each entry; the first node of the segment is the one numbered `offset`.

@@ -55,6 +55,19 @@ def test_one_sensor_that_stops_is_no_repeated_row() -> None:
     assert not repeated_rows(table, "time_s").any()
 
 
+def test_a_hole_in_the_measurements_repeats_nothing() -> None:
+    """Rows without any measurement, while the inputs rest: the inputs are known, so the record goes on."""
+    table = record()
+    table["inflow_m3_s"] = np.repeat([0.1, 0.2, 0.15], 100)
+    table["outflow_m3_s"] = table["level_m"] ** 0.5
+    whole = table.copy()
+    table.loc[110:169, ["level_m", "outflow_m3_s"]] = np.nan
+    assert not repeated_rows(table, "time_s").any()
+    held = ["level_m", "outflow_m3_s"]
+    whole.loc[110:169, held] = whole.loc[109, held].to_numpy()  # the same rows, held instead of empty
+    assert repeated_rows(whole, "time_s").sum() == 60
+
+
 def test_the_record_is_split_there_and_the_note_names_the_lines() -> None:
     table = record()
     table.loc[100:119, ["inflow_m3_s", "level_m"]] = table.loc[99, ["inflow_m3_s", "level_m"]].to_numpy()

@@ -8,7 +8,7 @@ from math import factorial
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -17,7 +17,8 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.fast_step import closed_phi
-from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, rows_after_moves, substeps
+from adaptive_flot.greybox.stepping.graded_nodes import graded_nodes
+from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import flotation
 from tests.discovery.heated import heated_tank, tank_record
@@ -130,20 +131,31 @@ def test_a_run_over_the_parts_of_coarse_rows_is_that_of_the_rows() -> None:
     np.testing.assert_array_equal(held, nodes.inputs[:, :-1])
 
 
+@settings(max_examples=15)
+@given(st.integers(2, 12), st.integers(1, 6), st.sampled_from([0.0, 0.1, 0.3, 1.0]), st.integers(0, 50))
+def test_graded_nodes_cover_the_record_and_cross_no_move(first: int, longest: int, growth: float, seed: int) -> None:
+    """Steps add up to the record, every row is there or between two nodes of one rest, and straight lines stay so."""
+    record = tank_record(rows=80, seed=seed)
+    nodes = graded_nodes(record, first, longest, growth)
+    assert nodes.inputs[:, -1].sum() == pytest.approx(79 * record.dt)
+    np.testing.assert_allclose(nodes.spread(nodes.times), record.time, rtol=1e-12)
+    np.testing.assert_allclose(nodes.means(record.inputs), nodes.inputs[:, :-1])
+    for a, b in zip(nodes.rows[:-1], nodes.ends, strict=True):
+        assert (record.inputs[a + 1 : b + 1] == record.inputs[b]).all()
+    if nodes.every_row is not None:
+        assert set(nodes.every_row.rows.tolist()) == set(range(80))
+
+
 def test_steps_are_short_after_a_move_and_long_at_rest() -> None:
-    """Uneven parts give the run of the finest, row by row, where nothing has moved for a while."""
+    """Graded steps give the run of the finest, row by row, with fewer steps."""
     record, model = tank_record(rows=60), replace(heated_tank(), max_step_s=10.0)
-    fresh = rows_after_moves(record, 0.02, 3)
+    nodes = graded_nodes(record, 6, 3, 0.3)
     moved = np.flatnonzero((np.diff(record.inputs, axis=0) != 0).any(axis=1))
-    assert fresh[0] and fresh[moved].all() and not fresh.all()
-    assert not fresh[np.setdiff1d(np.arange(59), [k + i for k in (0, *moved) for i in range(4)])].any()
-    counts = np.where(fresh, 6, 1)
-    nodes = substeps(record, counts)
-    assert len(nodes.rows) == counts.sum() + 1
-    assert nodes.inputs[:, -1].sum() == pytest.approx(59 * record.dt)
-    np.testing.assert_array_equal(nodes.spread(nodes.times), record.time)
-    np.testing.assert_array_equal(nodes.means(record.inputs), nodes.inputs[:, :-1])
+    for k in moved:
+        assert (nodes.rows == k).sum() == 6
+    assert np.max(nodes.inputs[:, -1]) == 3 * record.dt
     x0, p = np.array([305.0]), model.parameter_values
     run = RecordSimulator(model, record.dt, nodes).outputs(record, x0, p)
     finest = RecordSimulator(model, record.dt, substeps(record, 6)).outputs(record, x0, p)
     np.testing.assert_allclose(run, finest, rtol=1e-5)
+    assert len(nodes.rows) < 0.4 * (6 * 59)

@@ -1,0 +1,102 @@
+"""Whether a further effect brings enough: evidence, and a good part of the error, over all or in one output.
+
+A wrong constant may put one output twenty standard deviations off. Beside it a sensor that is three off is next to
+nothing over all outputs, though it is all that is wrong with its own. So each output counts by itself, too.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.results import Alternative, Round
+from adaptive_flot.greybox.model import FloatArray
+
+SUBSTANCE = 0.1
+"""A further effect must remove at least this share of the excess error of the base model."""
+MOST_OF_AN_OUTPUT = 0.5
+"""Or more than this share of that of one output,"""
+VISIBLE = 1.0
+"""where it removes more than so many variances of its noise: an error as large as the noise."""
+
+
+def better(problem: Problem, base: Fit, before: Alternative | None, latest: Round) -> bool:
+    """Whether the best alternative of a round brings evidence and, as a further effect, substance.
+
+    Evidence: its BIC is lower by the round's threshold. Substance: it removes more than SUBSTANCE of the excess error
+    (see `excess`) of the model as it is, or most of that of one output.
+    """
+    if not latest.alternatives:
+        return False
+    best, reference = latest.alternatives[0], before.fit if before else base
+    if not best.fit.bic <= reference.bic - latest.threshold:
+        return False
+    return before is None or _has_substance(problem, base, reference, best.fit)
+
+
+def _has_substance(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
+    if excess(problem, before, after) > SUBSTANCE * excess(problem, base, after):
+        return True
+    removed, wrong = excess_by_output(problem, before, after), excess_by_output(problem, base, after)
+    return bool(np.any((removed > VISIBLE) & (removed > MOST_OF_AN_OUTPUT * wrong)))
+
+
+def excess(problem: Problem, fit: Fit, better_fit: Fit) -> float:
+    """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit.
+
+    ::
+
+        mean of (r / s)^2 - mean of (r_better / s)^2
+
+    with residuals r, and the standard deviation s of the better fit's noise.
+    """
+    old, new = (np.nanmean(s) for s in _squares(problem, better_fit, fit, better_fit))
+    return float(old - new)
+
+
+def excess_by_output(problem: Problem, fit: Fit, better_fit: Fit) -> FloatArray:
+    """The same of each output by itself (m,); zero of one without a measurement."""
+    old, new = (_means(s) for s in _squares(problem, better_fit, fit, better_fit))
+    return old - new
+
+
+def worth_extending(problem: Problem, base: Fit, best: Alternative, left: tuple[float, float]) -> bool:
+    """Whether what is left is a substantial share of what there was, over all or in one output.
+
+    Over all by first-order gains on one noise. In one output where its error is still more than `VISIBLE` above the
+    noise, and most of what it was.
+    """
+    gain, threshold = left
+    if gain < threshold:
+        return False
+    size = problem.weights * best.fit.noise.std
+    rows = problem.rows("estimate")
+    removed = np.nansum(((base.residual(problem) / size) ** 2 - (best.fit.residual(problem) / size) ** 2)[rows])
+    if gain > SUBSTANCE / 2 * float(removed):
+        return True
+    return bool(still_wrong(problem, base, best.fit))
+
+
+def still_wrong(problem: Problem, base: Fit, best: Fit) -> list[int]:
+    """Places among the measured outputs of those that `best` leaves wrong.
+
+    Its squared error is more than VISIBLE above the noise, and most of what the base left.
+    """
+    was, still = (_means(s) - 1.0 for s in _squares(problem, best, base, best))
+    return np.flatnonzero((still > VISIBLE) & (still > MOST_OF_AN_OUTPUT * was)).tolist()
+
+
+def _squares(problem: Problem, scale: Fit, *fits: Fit) -> list[FloatArray]:
+    """Squared errors (N, m) of the rows fitted, of each fit, in variances of the noise of `scale`."""
+    size, rows = problem.weights * scale.noise.stationary_std(), problem.rows("estimate")
+    return [((fit.residual(problem) / size) ** 2)[rows] for fit in fits]
+
+
+def _means(squares: FloatArray) -> FloatArray:
+    """Mean of each column (m,) over the rows with a value; zero of a column without any."""
+    seen = np.isfinite(squares)
+    total = np.where(seen, squares, 0.0).sum(axis=0)
+    return cast(FloatArray, total / np.maximum(seen.sum(axis=0), 1))
