@@ -1,0 +1,119 @@
+"""A part that is certain is told where the whole is not: made by hand, and from a record with two things wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, Round, SearchResult, Verification
+from adaptive_flot.discovery.search.substance import excess_by_output, still_wrong
+from adaptive_flot.discovery.verdict.certain_part import with_certain_part
+from adaptive_flot.discovery.verdict.wording import reason_words
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
+from tests.discovery.heated import CAPACITY, DT, ROOM, moves
+
+LOSS, HEATER, SENSOR = ("heat_loss", "fan_speed"), ("heating", "fan_speed"), ("flow_meter", "constant")
+CONFIRMED = Verification(0.5, (0.4, 0.6), (), True)
+
+
+def _equations(m: Scope) -> None:
+    temperature = m.state("temperature")
+    heating = m.site("heating", m.parameter("efficiency") * m.input("power"), "actuator", unit="W")
+    loss = m.site("heat_loss", m.parameter("loss") * (temperature - ROOM), unit="W")
+    m.derivative("temperature", (heating - loss) / CAPACITY)
+    m.output("temperature", m.site("thermometer", temperature, "sensor", "offset", unit="K"))
+    m.output("air", m.site("flow_meter", 0.1 * m.input("fan_speed"), "sensor", unit="m3/s"))
+
+
+def tank_with_meter() -> Model:
+    """A heated tank whose fan has a flow meter, with its loss known wrongly."""
+    return Model(
+        name="metered-tank",
+        states=(Quantity("temperature", "K", "", 273.0, 373.0, 10.0),),
+        inputs=(Quantity("power", "W", "", 0.0, 1e4, 1e3), Quantity("fan_speed", "1/s", "", 0.0, 100.0, 5.0)),
+        parameters=(
+            Parameter("efficiency", 0.9, "-", "data sheet", None, 0.5, 1.0, 0.05),
+            Parameter("loss", 80.0, "W/K", "first guess", None, 1.0, 1000.0, 10.0, role="estimated"),
+        ),
+        outputs=(Quantity("temperature", "K", "", 273.0, 373.0, 1.0), Quantity("air", "m3/s", "", 0.0, 10.0, 0.1)),
+        equations=_equations,
+        max_step_s=60.0,
+        initial_guess={"temperature": 310.0},
+        starts_steady=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def two_things() -> Discovery:
+    """The heat loss follows the fan, twenty noise deviations, and the flow meter shows 6 % too much, three of its."""
+    rng = np.random.default_rng(3)
+    inputs = np.column_stack([moves(600, 500, 3000, 40, 100), moves(600, 5, 20, 25, 200)])
+    temperature, seen = 305.0, []
+    for power, fan in inputs:
+        loss = 60.0 * (fan / 10) ** 0.6
+        for _ in range(10):
+            temperature += DT / 10 * (0.9 * power - loss * (temperature - ROOM)) / CAPACITY
+        seen.append((temperature, 0.106 * fan))
+    y = np.array(seen) + rng.standard_normal((600, 2)) * [0.05, 0.02]
+    return discover(tank_with_meter(), Dataset("tank", DT * np.arange(1.0, 601), DT, inputs, y))
+
+
+def test_an_output_that_is_slightly_wrong_counts_beside_one_that_is_far_off(two_things: Discovery) -> None:
+    """The meter is next to nothing over all outputs, and all that is wrong with its own."""
+    assert two_things.search is not None and two_things.problem is not None
+    first = two_things.search.rounds[0].alternatives[0]
+    base, best = two_things.search.base, two_things.search.alternatives[0].fit
+    assert still_wrong(two_things.problem, base, first.fit)
+    removed = excess_by_output(two_things.problem, base, best)
+    assert removed.min() > 1.0 and removed.max() > 5 * removed.min()
+    assert {e.effect.site for e in two_things.verdict.effects} == {"heat_loss", "flow_meter"}
+
+
+def _search(found: Discovery, *sets: tuple[tuple[tuple[str, str], ...], float]) -> SearchResult:
+    """Sets of effects by how much worse they are than the first, all with its fit; the first round is the record's."""
+    assert found.search is not None
+    own = found.search.alternatives[0]
+    last = tuple(
+        Alternative(names, (True,) * len(names), replace(own.fit, bic=own.fit.bic + worse), 0.0, -1e3 + worse)
+        for names, worse in sets
+    )
+    without = tuple(a for a in found.search.rounds[0].alternatives if SENSOR not in a.names)
+    rounds = (replace(found.search.rounds[0], alternatives=without), Round((), 10.0, last))
+    return replace(found.search, rounds=rounds, alternatives=last, verification=CONFIRMED, left=0.0)
+
+
+def _judged(result: SearchResult) -> Judgement:
+    return Judgement("abstain", result.alternatives[0], (), result.alternatives[1:], 10.0)
+
+
+def test_what_all_sets_share_is_named_where_the_rest_is_open(two_things: Discovery) -> None:
+    result = _search(two_things, ((LOSS, SENSOR), 0.0), ((HEATER, SENSOR), 5.0))
+    assert two_things.problem is not None
+    judged = with_certain_part(two_things.problem, result, _judged(result))
+    assert judged.word == "named" and judged.part == (SENSOR,)
+    said = reason_words(judged, result, (), ())
+    assert "Something else is off beside it" in said and "heating by fan_speed" in said
+
+
+def test_nothing_is_told_of_sets_that_share_nothing_or_where_rows_contradict(two_things: Discovery) -> None:
+    assert two_things.problem is not None
+    apart = _search(two_things, ((LOSS, SENSOR), 0.0), ((LOSS, HEATER), 5.0), ((HEATER, ("flow_meter", "lag")), 6.0))
+    assert with_certain_part(two_things.problem, apart, _judged(apart)).word == "abstain"
+    shared = _search(two_things, ((LOSS, SENSOR), 0.0), ((HEATER, SENSOR), 5.0))
+    refuted = replace(shared, verification=replace(CONFIRMED, confirmed=False))
+    assert with_certain_part(two_things.problem, refuted, _judged(refuted)).word == "abstain"
+
+
+def test_a_part_that_no_output_needs_is_not_told(two_things: Discovery) -> None:
+    """All sets share it, but the best set without it repairs the same outputs."""
+    assert two_things.problem is not None
+    result = _search(two_things, ((LOSS, SENSOR), 0.0), ((HEATER, SENSOR), 5.0))
+    best = result.alternatives[0]
+    alike = replace(best, names=(LOSS, ("flow_meter", "fan_speed")), fit=replace(best.fit, bic=best.fit.bic + 100))
+    rounds = (*result.rounds, Round((), 10.0, (alike,)))
+    result = replace(result, rounds=rounds)
+    assert with_certain_part(two_things.problem, result, _judged(result)).word == "abstain"
