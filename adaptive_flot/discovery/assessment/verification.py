@@ -35,7 +35,7 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     """
     rows, block = problem.rows("confirm"), block_rows(problem, before, after)
     size = problem.weights * after.noise.stationary_std()
-    old, new = _squares(problem, before, size, rows), _squares(problem, after, size, rows)
+    old, new = squared_errors(problem, before, size, rows), squared_errors(problem, after, size, rows)
     reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
     worse = []
     for j, c in enumerate(problem.columns):
@@ -82,7 +82,7 @@ def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> floa
     """
     rows = problem.rows("estimate")
     size = problem.weights * after.noise.stationary_std()
-    old, new = (np.nanmean(_squares(problem, fit, size, rows), axis=0) for fit in (before, after))
+    old, new = (np.nanmean(squared_errors(problem, fit, size, rows), axis=0) for fit in (before, after))
     gained = np.maximum(np.nan_to_num(old - new), 0.0)
     if not gained.sum() > 0:
         return 1.0
@@ -114,7 +114,7 @@ def changes(
     """
     rows, block = problem.rows(split), block or block_rows(problem, before, after)
     ones = np.ones_like(problem.weights)
-    old, new = _squares(problem, before, ones, rows), _squares(problem, after, ones, rows)
+    old, new = squared_errors(problem, before, ones, rows), squared_errors(problem, after, ones, rows)
     noise = after.noise.stationary_std()
     errors = []
     for j, c in enumerate(problem.columns):
@@ -127,7 +127,8 @@ def changes(
     return tuple(errors)
 
 
-def _squares(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> FloatArray:
+def squared_errors(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> FloatArray:
+    """Squared errors of a fit on some rows (rows, m), in units of a size (m,) or (N, m)."""
     squares: FloatArray = ((fit.residual(problem) / size) ** 2)[rows]
     return squares
 

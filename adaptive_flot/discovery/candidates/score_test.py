@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import cast
 
 import numpy as np
 
@@ -88,6 +89,7 @@ class Scorer:
         e = self.noise.whiten(residual)
         present = np.isfinite(e) & self.rows[:, None]
         self._present = present[self._reached]
+        self._output = np.nonzero(self._present)[1]  # of each value that is present
         base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
         self._base = base
         columns = self._whitened(weighted)
@@ -185,27 +187,29 @@ class Scorer:
 
         Left out is what gains less than its penalty; `gain` and `penalised` stay those over all outputs.
         """
-        own = np.nonzero(self._present)[1] == j
-        columns, residual = self._columns[own], self.residual[own]
-        gained: list[tuple[float, Score]] = []
-        for score in self.scores():
-            place = next(p for v, p in self._variants[score.candidate.name] if v is score.variant)
-            A = self._grams[place.start]
-            beta = np.linalg.solve(A + (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A)), self._along[place])
-            explained = columns[:, place] @ beta
-            own_gain = float(explained @ (2 * residual - explained))
-            gained.append((own_gain + score.penalised - score.gain, score))
+        gained = [(self.gain_in_output(score, j) + score.penalised - score.gain, score) for score in self.scores()]
         return [score for gain, score in sorted(gained, key=lambda g: -g[0]) if gain > 0]
+
+    def gain_in_output(self, score: Score, j: int) -> float:
+        """S_j of a score (see `scores_in_output`); over all outputs they add up to its gain."""
+        columns = next(p for v, p in self._variants[score.candidate.name] if v is score.variant)
+        own = self._output == j
+        explained = self._columns[own, columns] @ self._fitted(columns)
+        return float(explained @ (2 * self.residual[own] - explained))
+
+    def _fitted(self, columns: slice) -> FloatArray:
+        """Coefficients b of a variant, in standard deviations of the prior."""
+        A = self._grams[columns.start]
+        ridge = (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A))
+        return cast(FloatArray, np.linalg.solve(A + ridge, self._along[columns]))
 
     def variant_scores(self, candidate: Candidate) -> list[Score]:
         """Scores of all variants of one candidate, best first."""
         return _ranked([self._score(candidate, v, columns) for v, columns in self._variants[candidate.name]])
 
     def _score(self, candidate: Candidate, variant: Variant, columns: slice) -> Score:
-        A, b = self._grams[columns.start], self._along[columns]
-        A = A + (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A))
-        beta = np.linalg.solve(A, b)
-        gain = float(b @ beta)
+        beta = self._fitted(columns)
+        gain = float(self._along[columns] @ beta)
         shapes = len(variant.start)
         penalty = (len(variant.profiles) + shapes) * float(np.log(self._count))
         values = beta * self._size[columns]

@@ -24,7 +24,7 @@ LONGEST = (6, 4, 3, 2)
 """Most rows from node to node, or steps at every row in one, that are tried."""
 FIRST_STEPS = (4, 6, 8, 12)
 """Steps in the interval after a move of a coarsely sampled record, where a row asks for many."""
-RESTING = ((1, 0.0), (2, 0.2), (3, 0.2), (4, 0.2), (6, 0.2), (6, 0.1))
+AT_REST = ((2, 0.2), (4, 0.2), (6, 0.1))
 """Most rows of a step at rest in such a record, and by how many rows a row steps grow."""
 GROWTHS = (1.0, 0.5, 0.35, 0.25)
 """Rows that nodes may be further apart for each row since the last move of an input: what a move sets off dies away."""
@@ -57,9 +57,12 @@ def placements(record: Dataset, model: Model) -> list[Nodes]:
     """Nodes that are tried, the fewest first; of a coarsely sampled record longer steps, where a row asks for many."""
     steps = Stepper(model, record.dt).substeps
     if steps > MOST_UNROLLED:
-        even = sorted({math.ceil(steps / longest) for longest in LONGEST})
-        uneven = [graded_nodes(record, first, *rest) for first in FIRST_STEPS for rest in RESTING]
-        return sorted([*uneven, *(substeps(record, count) for count in even)], key=lambda nodes: len(nodes.rows))
+        parted: list[Nodes] = [substeps(record, count) for count in {math.ceil(steps / longest) for longest in LONGEST}]
+        for first in FIRST_STEPS:
+            every = graded_nodes(record, first)
+            parted += [every, graded_nodes(record, first, least=2)]
+            parted += [graded_nodes(record, first, 1, *rest, every_row=every) for rest in AT_REST]
+        return sorted(parted, key=lambda nodes: len(nodes.rows))
     placed: list[Nodes] = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
     fewest_first = sorted(placed, key=lambda nodes: len(nodes.rows))
     return [nodes for nodes in fewest_first if len(nodes.rows) <= WORTHWHILE * len(record)]

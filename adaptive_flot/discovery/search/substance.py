@@ -10,6 +10,7 @@ from typing import cast
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.verification import squared_errors
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Round
@@ -53,14 +54,14 @@ def excess(problem: Problem, fit: Fit, better_fit: Fit) -> float:
 
     with residuals r, and the standard deviation s of the better fit's noise.
     """
-    old, new = (np.nanmean(s) for s in _squares(problem, better_fit, fit, better_fit))
+    size, rows = problem.weights * better_fit.noise.stationary_std(), problem.rows("estimate")
+    old, new = (np.nanmean(squared_errors(problem, f, size, rows)) for f in (fit, better_fit))
     return float(old - new)
 
 
 def excess_by_output(problem: Problem, fit: Fit, better_fit: Fit) -> FloatArray:
-    """The same of each output by itself (m,); zero of one without a measurement."""
-    old, new = (_means(s) for s in _squares(problem, better_fit, fit, better_fit))
-    return old - new
+    """The same of each output by itself (m,)."""
+    return _means(problem, better_fit, fit) - _means(problem, better_fit, better_fit)
 
 
 def worth_extending(problem: Problem, base: Fit, best: Alternative, left: tuple[float, float]) -> bool:
@@ -85,18 +86,11 @@ def still_wrong(problem: Problem, base: Fit, best: Fit) -> list[int]:
 
     Its squared error is more than VISIBLE above the noise, and most of what the base left.
     """
-    was, still = (_means(s) - 1.0 for s in _squares(problem, best, base, best))
+    was, still = (_means(problem, best, fit) - 1.0 for fit in (base, best))
     return np.flatnonzero((still > VISIBLE) & (still > MOST_OF_AN_OUTPUT * was)).tolist()
 
 
-def _squares(problem: Problem, scale: Fit, *fits: Fit) -> list[FloatArray]:
-    """Squared errors (N, m) of the rows fitted, of each fit, in variances of the noise of `scale`."""
-    size, rows = problem.weights * scale.noise.stationary_std(), problem.rows("estimate")
-    return [((fit.residual(problem) / size) ** 2)[rows] for fit in fits]
-
-
-def _means(squares: FloatArray) -> FloatArray:
-    """Mean of each column (m,) over the rows with a value; zero of a column without any."""
-    seen = np.isfinite(squares)
-    total = np.where(seen, squares, 0.0).sum(axis=0)
-    return cast(FloatArray, total / np.maximum(seen.sum(axis=0), 1))
+def _means(problem: Problem, scale: Fit, fit: Fit) -> FloatArray:
+    """Mean squared error (m,) of a fit on the rows fitted, in variances of the noise of `scale`."""
+    size = problem.weights * scale.noise.stationary_std()
+    return cast(FloatArray, np.nanmean(squared_errors(problem, fit, size, problem.rows("estimate")), axis=0))

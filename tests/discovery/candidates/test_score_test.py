@@ -206,3 +206,11 @@ def test_splines_pass_through_their_knots_and_a_finer_one_draws_the_same_curve(
     assert fine is not None
     coarse, dense = (np.atleast_1d(np.asarray(v.effect.settings["knots"])) for v in (curve, fine[0]))
     np.testing.assert_allclose(list(fine[1].values()), spline_values(dense, tuple(coarse)) @ list(start.values()))
+
+
+def test_what_a_candidate_explains_adds_up_over_the_outputs(weak: tuple[Problem, Fit, Scorer]) -> None:
+    """The gains of single outputs are parts of the gain."""
+    problem, _, scorer = weak
+    for score in scorer.scores():
+        parts = [scorer.gain_in_output(score, j) for j in range(len(problem.columns))]
+        assert sum(parts) == pytest.approx(score.gain, rel=1e-3)  # columns nearly alike: the ridge
