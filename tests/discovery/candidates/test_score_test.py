@@ -213,4 +213,4 @@ def test_what_a_candidate_explains_adds_up_over_the_outputs(weak: tuple[Problem,
     problem, _, scorer = weak
     for score in scorer.scores():
         parts = [scorer.gain_in_output(score, j) for j in range(len(problem.columns))]
-        assert sum(parts) == pytest.approx(score.gain, rel=1e-3)  # columns nearly alike: the ridge
+        assert sum(parts) == pytest.approx(score.gain, rel=0.02)  # columns nearly alike: the ridge
