@@ -25,7 +25,11 @@ ESTIMATORS: Mapping[str, str] = {
     "rpem": "estimators.rpem:Rpem",
     "rpem_full": "estimators.rpem:rpem_full",
 }
+DEFAULT_ESTIMATOR = "adaptive_imm"
+"""The estimator that runs where a person names none."""
 BATCH_ESTIMATORS: Mapping[str, str] = {"pem": "estimators.pem:Pem"}
+OF_A_RECORD = ("fixed", DEFAULT_ESTIMATOR, "pem")
+"""What replays a measured record where a person names none: nothing adapted, each sample, and one fit of all."""
 CONTROLLERS: Mapping[str, str] = {
     "economic_mpc": "controllers.economic_mpc:EconomicMpc",
     "hold": "controllers.hold:Hold",

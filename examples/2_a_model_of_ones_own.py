@@ -74,7 +74,7 @@ simulation.plot().savefig(OUT / "simulation.png")
 truth = af.simulate(model.with_parameters({"loss": 65.0}), inputs).table
 noise = np.random.default_rng(1).normal(0.0, 0.05, ROWS)
 record = truth.assign(temperature_K=truth["temperature_K"] + noise)
-fit = af.estimate(model, record, estimators=["fixed", "rpem", "pem"])
+fit = af.estimate(model, record)  # nominal parameters, followed ones (adaptive_imm), fitted ones
 print(fit)
 fit.plot("outputs").savefig(OUT / "outputs.png")
 fit.plot("parameters").savefig(OUT / "parameters.png")

@@ -18,6 +18,7 @@ from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.plugins import OF_A_RECORD
 from adaptive_flot.processes.registry import find_cell
 from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record, shipped_plugin
 from adaptive_flot.runner.commands.estimate_files import save_fitted_cell
@@ -184,7 +185,7 @@ def estimate(
     model: AnyModel,
     data: AnyRecord,
     *,
-    estimators: Choices = ("fixed", "rpem", "pem"),
+    estimators: Choices = OF_A_RECORD,
     parameters: Sequence[str] = (),
     outputs: Sequence[str] = (),
     fit_share: float = 0.6,
@@ -202,8 +203,8 @@ def estimate(
     data
         CSV or Parquet file, a DataFrame, or what `read_dataset` returned.
     estimators
-        Names ("pem" is the batch fit held fixed), classes, or (name or class, options). "fixed" starts with the nominal
-        parameters, all others with those of the batch fit.
+        Names ("pem" is the batch fit held fixed), classes, or (name or class, options); default "fixed", "adaptive_imm"
+        and "pem". "fixed" starts with the nominal parameters, all others with those of the batch fit.
     parameters
         Names of the parameters to estimate; default those with the role "estimated".
     outputs

@@ -20,6 +20,7 @@ from adaptive_flot.cli.options import (
     once,
     results_folder,
 )
+from adaptive_flot.plugins import OF_A_RECORD
 from adaptive_flot.targets import check_targets, in_folder, model_inputs
 
 
@@ -29,7 +30,7 @@ def estimate(
     cell: CellOption = None,
     map_: MapOption = None,
     estimator: Annotated[
-        list[str] | None, typer.Option(help="Estimator (repeatable); default fixed, rpem and pem.")
+        list[str] | None, typer.Option(help=f"Estimator (repeatable); default {', '.join(OF_A_RECORD)}.")
     ] = None,
     fit: Annotated[
         list[str] | None, typer.Option(help="Parameter to estimate (repeatable), or a group of them.")
@@ -67,7 +68,7 @@ def estimate(
 
     if save_cell is not None and model != "flotation":
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
-    names = once(estimator) or ["fixed", "rpem", "pem"]
+    names = once(estimator) or list(OF_A_RECORD)
     folder = results_folder(out, data.stem, "estimate")
     files = [*map(replay_file, names), SMOOTHED, "summary.json", "report.html"]
     check_targets(

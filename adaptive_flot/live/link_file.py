@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -23,6 +24,8 @@ from adaptive_flot.live.link_keys import (
 )
 from adaptive_flot.live.map_tags import with_map
 from adaptive_flot.live.safety.modes import ModeRules
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
+from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.scenario import Scenario
 from adaptive_flot.yaml_files import read_yaml
@@ -38,7 +41,8 @@ class LinkFile(Part):
 
     scenario: str
     """Scenario file, or shipped name: model, estimators, controllers, limits, prices; never its plant."""
-    estimator: str
+    estimator: str = DEFAULT_ESTIMATOR
+    """One of the scenario's; the default one also where the scenario does not have it, then with its own defaults."""
     controller: str
     highest_mode: Literal["monitor", "advisory", "closed"] = "advisory"
     database: str = "sqlite:///live.sqlite"
@@ -100,8 +104,15 @@ def load_link(path: Path) -> Link:
         raise LinkError(f"{path}: {first_problem(error, LinkFile)}") from error
     beside = path.parent / file.scenario
     scenario = load_scenario(file.scenario if file.scenario in shipped_scenarios() else beside)
+    if file.estimator == DEFAULT_ESTIMATOR:
+        scenario = _with_default_estimator(scenario)
     _check(path, file, scenario)
     return Link(path=path, file=file, scenario=scenario)
+
+
+def _with_default_estimator(scenario: Scenario) -> Scenario:
+    known = {DEFAULT_ESTIMATOR: Plugin(use=DEFAULT_ESTIMATOR), **scenario.file.estimators}
+    return replace(scenario, file=scenario.file.model_copy(update={"estimators": known}))
 
 
 def _check(path: Path, file: LinkFile, scenario: Scenario) -> None:

@@ -42,7 +42,7 @@ def test_an_hour_at_once_equals_its_minutes(model: Model, inputs: FloatArray) ->
     np.testing.assert_allclose(by_hour.gradient[0], by_minute.gradient[-1], rtol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["fixed", "rpem", "ekf", "mhe"])
+@pytest.mark.parametrize("name", ["fixed", "rpem", "ekf", "mhe", "adaptive_imm"])
 def test_estimator_refuses_an_interval_of_too_many_steps(model: Model, name: str) -> None:
     setup = Setup(model, 3600.0, (model.parameters[0].name,), (model.outputs[0].name,))
     with pytest.raises(ModelError) as caught:

@@ -24,7 +24,7 @@ def test_it_writes_summary_tables_and_report(call: Call, table: WriteTable, tmp_
     result = call("estimate", table(), "--out", "r", "--json", "copy.json")
     assert result.code == 0, result.err
     names = {f.name for f in (tmp_path / "r").iterdir()}
-    assert {"summary.json", "report.html", "fixed.csv", "rpem.csv", "pem.csv"} <= names
+    assert {"summary.json", "report.html", "fixed.csv", "adaptive_imm.csv", "pem.csv"} <= names
     assert not any(n.startswith(".") for n in names)
     text = (tmp_path / "r" / "summary.json").read_text()
     assert text == (tmp_path / "copy.json").read_text()

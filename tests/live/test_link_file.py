@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+import yaml
 
 from adaptive_flot.errors import AdaptiveFlotError
+from adaptive_flot.live.link.cycle import Cycle
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.link_keys import LiveTag, Scale
+from adaptive_flot.live.plant.link_text import link_text
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
+from adaptive_flot.runner.scenario.keys import Plugin
+from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 
@@ -43,6 +49,28 @@ def test_a_bad_code_is_found_in_the_tags_unit(write_link: Callable[..., Link], s
     link = write_link(scenario, {"tags.air_flow": {"tag": "air_flow", "unit": "L/min", "bad": [-9999]}})
     scale = Scale.of("L/min", "m3/s")
     assert scale.model(-9999.0) in link.file.tags["air_flow"].rules(scale, 0.0, 1.0).bad
+
+
+def test_a_link_that_names_no_estimator_has_the_default_one(
+    write_link: Callable[..., Link], write_live_scenario: Callable[[Mapping[str, object]], Scenario], scenario: Scenario
+) -> None:
+    """Also where the scenario does not have it; with the scenario's options where it does. A name given is kept."""
+    link = write_link(scenario, {"estimator": ..., "controller": "pi"})
+    assert link.file.estimator == DEFAULT_ESTIMATOR
+    assert link.scenario.file.estimators[DEFAULT_ESTIMATOR] == Plugin(use=DEFAULT_ESTIMATOR)
+    assert type(Cycle(link).estimation.estimator).__name__ == "AdaptiveImm"
+    mine = Plugin(use=DEFAULT_ESTIMATOR, options={"plausible": 0.3})
+    own = write_live_scenario({f"estimators.{DEFAULT_ESTIMATOR}": mine.model_dump()})
+    assert write_link(own, {"estimator": ...}).scenario.file.estimators[DEFAULT_ESTIMATOR] == mine
+    named = write_link(own, {"estimator": "rpem"})
+    assert named.file.estimator == "rpem" and named.scenario.file == own.file
+
+
+def test_a_written_link_names_the_default_estimator_where_a_case_has_it(tmp_path: Path) -> None:
+    """In `undeclared_effect` it is not in the first case."""
+    for name in ("undeclared_effect", "closed_loop_drift"):
+        text = link_text(load_scenario(name), "opc.tcp://127.0.0.1:4840/", tmp_path)
+        assert yaml.safe_load(text)["estimator"] == DEFAULT_ESTIMATOR
 
 
 MAP = """\

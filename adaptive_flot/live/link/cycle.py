@@ -97,7 +97,7 @@ class Cycle:
         if effects:
             extended = replace(scenario.setup, model=scenario.model.with_effects(effects))
             estimator = prepared.new_estimator(file.estimator, extended)
-        start = scenario.file.estimators[file.estimator].start
+        start = prepared.estimators[file.estimator].start
         self.estimation = Estimation(prepared, estimator, start, file.cycle.longest_gap_s)
         self.controller: AnyController = prepared.controller(file.controller, realisation, estimator.setup)
         self.model = estimator.setup.model

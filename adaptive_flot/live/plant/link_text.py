@@ -19,6 +19,7 @@ from adaptive_flot.live.plant.tags import (
     PLANT_HEARTBEAT,
     SWITCH,
 )
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 HEAD = """\
@@ -57,11 +58,12 @@ def link_text(
     page
         Port of the page of the control room; None for no page.
     case
-        Controller and estimator; default the scenario's first case.
+        Controller and estimator; default the scenario's first case with the default estimator, or the first of all.
     shadows
         Estimator and controller of each that runs in shadow, by its name.
     """
-    case = case or scenario.combinations()[0]
+    cases = scenario.combinations()
+    case = case or next((known for known in cases if known[1] == DEFAULT_ESTIMATOR), cases[0])
     me, plant = identity(certificates, LINK), identity(certificates, PLANT)
     content: dict[str, Any] = {
         "scenario": scenario.name,

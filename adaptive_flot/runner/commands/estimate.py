@@ -16,7 +16,7 @@ from adaptive_flot.errors import DataError, ModelError, PluginError, located, ne
 from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.step_functions import check_interval
-from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, construct, load
+from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, OF_A_RECORD, construct, load
 from adaptive_flot.runner.commands.innovations.estimate import (
     InnovationsEstimate,
     asks_for_process_noise,
@@ -52,7 +52,7 @@ def estimate_record(
     blocks: Blocks,
     model: Model,
     *,
-    estimators: Sequence[str] | Mapping[str, Plugin] = ("fixed", "rpem", "pem"),
+    estimators: Sequence[str] | Mapping[str, Plugin] = OF_A_RECORD,
     fit: Sequence[str] = (),
     outputs: Sequence[str] = (),
     folder: Path | None = None,
@@ -68,7 +68,8 @@ def estimate_record(
     model
         The model; its parameter values are the nominal ones.
     estimators
-        Shipped names, `pem` for the batch fit held fixed, or `my_file:MyEstimator`; or plug-ins by the name to show.
+        Shipped names, `pem` for the batch fit held fixed, or `my_file:MyEstimator`; or plug-ins by the name to show;
+        default `OF_A_RECORD`.
         All start at the fitted initial state: `fixed` with the nominal parameters, the others with the batch fit of
         the fit block.
     fit

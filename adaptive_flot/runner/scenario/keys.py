@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr
 
-from adaptive_flot.plugins import ESTIMATORS, construct, load
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR, ESTIMATORS, construct, load
 from adaptive_flot.processes.effect_entry import EffectEntry
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
@@ -185,7 +185,10 @@ class ScenarioFile(Part):
     plant: PlantPart = PlantPart()
     adapt: Adapt
     initial_estimate: InitialEstimate
-    estimators: dict[str, Plugin] = Field(min_length=1)
+    estimators: dict[str, Plugin] = Field(
+        default_factory=lambda: {DEFAULT_ESTIMATOR: Plugin(use=DEFAULT_ESTIMATOR)}, min_length=1
+    )
+    """Default that of `adaptive_flot.plugins.DEFAULT_ESTIMATOR` alone."""
     controllers: dict[str, Plugin] = Field(default_factory=lambda: {"schedule": Plugin(use="schedule")})
     cases: list[CaseEntry] = Field(default_factory=list)
     """Combinations of estimator and controller; default all."""

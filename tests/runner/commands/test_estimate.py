@@ -15,6 +15,7 @@ from adaptive_flot.contracts import full_parameters
 from adaptive_flot.errors import DataError, ModelError, PluginError
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR, OF_A_RECORD
 from adaptive_flot.processes.flotation import make_model as make_cell
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.registry import make_model
@@ -58,7 +59,7 @@ def test_nominal_parameters_leave_more_than_noise_in_the_grade(result: RecordEst
     for block in ("fit", "test"):
         assert found["fixed", block, "concentrate_grade"].free_run > 3 * NOISE["concentrate_grade"]
         assert found["fixed", block, "concentrate_grade"].ljung_box_p < 1e-6
-        assert found["rpem", block, "concentrate_grade"].one_step < 1.3 * NOISE["concentrate_grade"]
+        assert found[DEFAULT_ESTIMATOR, block, "concentrate_grade"].one_step < 1.3 * NOISE["concentrate_grade"]
 
 
 def test_parameters_are_those_of_the_record_within_their_spread(result: RecordEstimate) -> None:
@@ -194,7 +195,7 @@ def test_summary_is_strict_json_with_the_fit_and_every_error(result: RecordEstim
     assert fit["covariance"] == result.batch.covariance.tolist()
     assert list(fit["noise_std"]) == list(NOISE) and fit["status"] == "ok"
     assert fit["identifiability"]["verdict"] == result.batch.identifiability.verdict
-    assert [e["estimator"] for e in summary["estimators"]] == ["fixed", "rpem", "pem"]
+    assert [e["estimator"] for e in summary["estimators"]] == list(OF_A_RECORD)
     for entry in summary["estimators"]:
         assert {(e["block"], e["output"]) for e in entry["errors"]} == {(b, o) for b in ("fit", "test") for o in NOISE}
 
@@ -214,8 +215,8 @@ def test_a_fit_that_fails_is_summarised_without_nan(model: Model, plant: PlantRe
 
 def test_replays_are_written_by_estimator(result: RecordEstimate, tmp_path: Path) -> None:
     write_replays(result, tmp_path)
-    assert sorted(f.name for f in tmp_path.iterdir()) == ["fixed.csv", "pem.csv", "rpem.csv"]
-    back = pd.read_csv(tmp_path / "rpem.csv")
+    assert sorted(f.name for f in tmp_path.iterdir()) == sorted(f"{name}.csv" for name in OF_A_RECORD)
+    back = pd.read_csv(tmp_path / "adaptive_imm.csv")
     assert list(back.columns) == list(result.replays[1].table.columns) and len(back) == 240
 
 

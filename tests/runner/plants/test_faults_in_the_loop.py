@@ -74,7 +74,9 @@ def runs(solves: list[Solve]) -> Iterator[list[Run]]:
     scenario = load_scenario("faults")
     faults = [f.model_copy(update=WINDOWS[f.fault]) for f in scenario.file.faults]
     cases = [
-        c for c in scenario.file.cases if (c.controller, c.estimator) in (("economic_mpc", "rpem"), ("pi", "fixed"))
+        c
+        for c in scenario.file.cases
+        if (c.controller, c.estimator) in (("economic_mpc", "adaptive_imm"), ("pi", "fixed"))
     ]
     file = scenario.file.model_copy(update={"duration_s": 520.0, "faults": faults, "cases": cases})
     with pytest.MonkeyPatch.context() as patch:

@@ -10,7 +10,9 @@ import pytest
 
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.measurement_noise import noise_std
 from adaptive_flot.runner.scenario.realisation import Realisation
@@ -187,3 +189,21 @@ def test_times_follow_the_sampling_interval(write_scenario: WriteScenario) -> No
 def test_estimators_are_told_which_parameters_nobody_measures() -> None:
     assert load_scenario("feed_disturbance_unmeasured").setup.unmeasured == ("feed_concentration.chalcopyrite",)
     assert load_scenario("feed_disturbance").setup.unmeasured == ()
+
+
+def test_without_estimators_the_default_one_runs(write_scenario: WriteScenario) -> None:
+    """With its own defaults; estimators that a person names stay alone."""
+    scenario = load_scenario(write_scenario({"estimators": ...}))
+    assert scenario.file.estimators == {DEFAULT_ESTIMATOR: Plugin(use=DEFAULT_ESTIMATOR)}
+    (run,) = run_scenario(scenario, seeds=[1])
+    assert run.estimator == DEFAULT_ESTIMATOR
+    assert np.isfinite(run.table[["n_estimate", "C_estimate"]].iloc[-1].to_numpy(dtype=float)).all()
+    assert set(load_scenario(write_scenario()).file.estimators) == {"fixed", "rpem"}
+
+
+@pytest.mark.parametrize("name", [n for n in shipped_scenarios() if load_scenario(n).file.limits is not None])
+def test_every_shipped_closed_loop_has_the_default_estimator(name: str) -> None:
+    """Beside the economic MPC: that is what a person gets who copies the scenario."""
+    scenario = load_scenario(name)
+    assert ("economic_mpc", DEFAULT_ESTIMATOR) in scenario.combinations()
+    assert scenario.file.estimators[DEFAULT_ESTIMATOR] == Plugin(use=DEFAULT_ESTIMATOR)
