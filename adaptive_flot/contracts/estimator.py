@@ -76,6 +76,8 @@ class Prior:
     core_noise_std
         Standard deviation of the noise without its outliers (m,), for an estimator that knows of outliers. None: that
         of all noise.
+    ongoing
+        Whether this is the estimate of an estimator that ran, and no fit: its covariance allows for the colour already.
     """
 
     time: float
@@ -86,6 +88,19 @@ class Prior:
     joint_covariance: FloatArray | None = None
     colour: FloatArray | None = None
     core_noise_std: FloatArray | None = None
+    ongoing: bool = False
+
+    def at(self, estimate: Estimate) -> Prior:
+        """Where an estimator that began here starts again: at its estimate, with what was known of the errors."""
+        return replace(
+            self,
+            time=estimate.time,
+            state=estimate.state,
+            parameters=estimate.parameters,
+            covariance=estimate.covariance,
+            joint_covariance=None,
+            ongoing=True,
+        )
 
     @property
     def core_noise(self) -> FloatArray:

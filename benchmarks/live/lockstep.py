@@ -131,7 +131,7 @@ class Lockstep:
         snapshot = self.direct.snapshot(alive=not cut_off, in_time=self._in_time, written=self._well)
         begin, used = time.perf_counter(), time.thread_time()
         self.state, outcome = self.cycle.step(self.state, snapshot)
-        self.memory.store(snapshot, outcome, self.state.estimation.noise_std, {})
+        self.memory.store(snapshot, outcome, self.state.estimation.began, {})
         seconds = time.perf_counter() - begin, time.thread_time() - used
         self.stepped[self.memory.session] = outcome.number
         self.estimates += outcome.estimate is not None

@@ -62,9 +62,9 @@ def soak_figures(
             begin, before = time.perf_counter(), time.thread_time()
             answered = desk.answer(inbox.take())
             state, outcome = use.cycle.step(state, replace(snapshot, allowed=desk.allowed))
-            desk.after(outcome, state.estimation.noise_std, None)
+            desk.after(outcome, state.estimation.began, None)
             beside = Beside(answered, desk.said(), desk.results())
-            memory.store(snapshot, outcome, state.estimation.noise_std, {}, beside=beside)
+            memory.store(snapshot, outcome, state.estimation.began, {}, beside=beside)
             took[k], used[k] = time.perf_counter() - begin, time.thread_time() - before
             direct.take(outcome)
             if state.estimation.estimate is not None:

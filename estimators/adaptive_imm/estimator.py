@@ -159,7 +159,10 @@ class AdaptiveImm:
         """Start from a prior, every mode alike and with the share of time that the process spends in it."""
         first, first_P = first_estimate(extended(prior, self.setup), self.coordinates, self.layout)
         trust = Trust.of(prior.colour, doubts=bool(self._off.any()))
-        first, first_P = trust.start(first, first_P, self.layout.coordinates, self._nominal, self._plausible_std)
+        if prior.ongoing:
+            first_P = trust.undone(first_P)
+        else:
+            first, first_P = trust.start(first, first_P, self.layout.coordinates, self._nominal, self._plausible_std)
         scale = np.array([self.setup.model.outputs[j].scale for j in self._columns])
         noise = NoiseLevel.first(prior.core_noise, scale)
         size, n, count = self._b.stop, self.layout.size, len(self.modes.kinds)
@@ -208,7 +211,7 @@ class AdaptiveImm:
                 status = Status.PROJECTED
         theta, theta_covariance = parameters_of(mean, covariance, self.coordinates, shape)
         q = len(self.setup.parameters)
-        theta_covariance = np.sqrt(state.trust.inflation) * theta_covariance[:q, :q]
+        theta_covariance = state.trust.shown(theta_covariance[:q, :q])
         wrong = state.wrong + (float(probability @ self._off) - state.wrong) / LAST
         if status is Status.OK and (wrong > MORE_LIKELY or self._is_far(mean, covariance)):
             status = Status.MODEL_ERROR

@@ -43,6 +43,17 @@ class Trust:
         found = float(known.max(initial=1.0))
         return cls(found, float(doubts)) if found > NOT_WHITE else cls(1.0, 0.0)
 
+    def shown(self, covariance: FloatArray) -> FloatArray:
+        """Covariance of the parameters (q, q) as an estimate has it, from that of the filter."""
+        return float(np.sqrt(self.inflation)) * covariance
+
+    def undone(self, P: FloatArray) -> FloatArray:
+        """Covariance of the filter (n, n) from that of an estimate: the other way round than `shown`.
+
+        The first record and the nominal values are in the estimate already, and do not count again.
+        """
+        return P / float(np.sqrt(self.inflation))
+
     def start(
         self, z: FloatArray, P: FloatArray, where: slice, nominal: FloatArray, plausible: FloatArray
     ) -> tuple[FloatArray, FloatArray]:

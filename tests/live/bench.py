@@ -42,7 +42,7 @@ class Bench:
     def step(self, snapshot: Snapshot) -> Outcome:
         self.state, outcome = self.cycle.step(self.state, snapshot)
         if self.memory:
-            self.memory.store(snapshot, outcome, self.state.estimation.noise_std, {})
+            self.memory.store(snapshot, outcome, self.state.estimation.began, {})
         return outcome
 
     def run(self, intervals: int, before: Callable[[int], None] = lambda k: None) -> list[Outcome]:

@@ -45,11 +45,11 @@ class DeskBench:
         told = changed or self.direct.snapshot(written=self.well)
         snapshot = Snapshot(**{**vars(told), "allowed": self.desk.allowed})
         self.state, outcome = self.use.cycle.step(self.state, snapshot)
-        noise = self.state.estimation.noise_std
-        self.desk.after(outcome, noise, self.finding, self.conditions())
+        began = self.state.estimation.began
+        self.desk.after(outcome, began, self.finding, self.conditions())
         beside = Beside(answered, self.desk.said(), self.desk.results(), change)
         if self.memory is not None:
-            self.memory.store(snapshot, outcome, noise, {}, beside=beside)
+            self.memory.store(snapshot, outcome, began, {}, beside=beside)
         results = self.direct.take(outcome)
         self.well = not any(w.problem for w in results.values())
         desk, state = self.desk, self.state

@@ -200,9 +200,9 @@ def test_the_same_cycle_can_not_be_stored_twice(cycle: Cycle, link: Link, memory
     bench.direct.interval()
     snapshot = bench.direct.snapshot()
     outcome = bench.step(snapshot)
-    memory.store(snapshot, outcome, (), {})
+    memory.store(snapshot, outcome, None, {})
     with pytest.raises(LinkError, match="database: can not be written"):
-        memory.store(snapshot, outcome, (), {})
+        memory.store(snapshot, outcome, None, {})
     engine = open_database("sqlite:///memory.sqlite", tmp_path)
     with engine.connect() as connection:
         counts = [

@@ -115,7 +115,7 @@ class Cycle:
     def go_on(self, state: CycleState, prior: Prior) -> CycleState:
         """Where a cycle with another model stood: the estimator starts anew, the controller from what acts."""
         inner = self.estimation.estimator.init(prior)
-        estimation = EstimationState(inner=inner, noise_std=tuple(prior.noise_std), last=state.sample)
+        estimation = EstimationState(inner=inner, began=prior, last=state.sample)
         controller = None if state.sample is None else self.controller.init(state.sample.time)
         return replace(state, estimation=estimation, controller=controller, on_target=False)
 

@@ -26,8 +26,8 @@ class EstimationState:
         State of the estimator; None before it starts.
     estimate
         The newest estimate.
-    noise_std
-        Standard deviation of the noise that it was started with (m,).
+    began
+        What it was started with; None before.
     collected
         Samples for the initial estimate, until it starts.
     last
@@ -38,7 +38,7 @@ class EstimationState:
 
     inner: Any = None
     estimate: Estimate | None = None
-    noise_std: tuple[float, ...] = ()
+    began: Prior | None = None
     collected: tuple[Sample, ...] = ()
     last: Sample | None = None
     resumes: Prior | None = None
@@ -93,12 +93,12 @@ class Estimation:
     def _begin(self, state: EstimationState, sample: Sample) -> EstimationState:
         if state.resumes is not None:
             prior = self._steady(state.resumes, sample)
-            return replace(state, inner=self.estimator.init(prior), resumes=None, noise_std=tuple(prior.noise_std))
+            return replace(state, inner=self.estimator.init(prior), resumes=None, began=prior)
         collected = (*state.collected, sample)
         if len(collected) <= self._prepared.scenario.initial_rows:
             return replace(state, collected=collected)
         prior = self._initial(state.collected)
-        return replace(state, inner=self.estimator.init(prior), collected=(), noise_std=tuple(prior.noise_std))
+        return replace(state, inner=self.estimator.init(prior), collected=(), began=prior)
 
     def _initial(self, samples: Sequence[Sample]) -> Prior:
         scenario = self._prepared.scenario
@@ -110,10 +110,9 @@ class Estimation:
         return nominal_start(scenario, self.estimator.setup, record, fitted)
 
     def _restarted(self, state: EstimationState, sample: Sample) -> EstimationState:
-        if state.estimate is None:
+        if state.estimate is None or state.began is None:
             return EstimationState(resumes=state.resumes)
-        known, noise = state.estimate, np.array(state.noise_std)
-        prior = self._steady(Prior(known.time, known.state, known.parameters, known.covariance, noise), sample)
+        prior = self._steady(state.began.at(state.estimate), sample)
         return replace(state, inner=self.estimator.init(prior))
 
     def _steady(self, prior: Prior, sample: Sample) -> Prior:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from adaptive_flot.contracts import Prior
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.alarms import Alarms, acknowledged, after_cycle, conditions, lasting, watched_limits
 from adaptive_flot.live.finding import Finding
@@ -136,16 +137,19 @@ class Desk:
     def after(
         self,
         outcome: Outcome,
-        noise_std: Sequence[float],
+        began: Prior | None,
         finding: Finding | None,
         further: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        """Look at a cycle, and at what else is wrong: feed the shadows, set alarms, take up what discovery found."""
-        if outcome.estimate is not None and outcome.sample is not None:
+        """Look at a cycle, and at what else is wrong: feed the shadows, set alarms, take up what discovery found.
+
+        `began` is what the acting estimator was started with.
+        """
+        if outcome.estimate is not None and outcome.sample is not None and began is not None:
             for name, part in self._link.file.shadows.items():
                 if name not in self._shadows:
                     self._start(ShadowPlan(name, part.estimator, part.controller))
-            task = task_of(outcome, noise_std, self._link.scenario.model.names("inputs"))
+            task = task_of(outcome, began, self._link.scenario.model.names("inputs"))
             for shadow in self._shadows.values():
                 shadow.feed(task, outcome.estimate)
         time = float("nan") if outcome.sample is None else outcome.sample.time

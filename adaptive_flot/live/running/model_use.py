@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass
 
-import numpy as np
-
 from adaptive_flot.contracts import Estimate, Prior
 from adaptive_flot.errors import AdaptiveFlotError, LinkError
 from adaptive_flot.greybox.effects import Effect
@@ -105,6 +103,16 @@ class ModelUse:
     def _go_on(
         cycle: Cycle, state: CycleState, x: FloatArray, parameters: FloatArray, covariance: FloatArray, person: str
     ) -> tuple[CycleState, ModelChange]:
-        assert state.sample is not None
-        prior = Prior(state.sample.time, x, parameters, covariance, np.array(state.estimation.noise_std))
+        """Start anew with another model, of whose errors only the noise is known: their colour was another model's."""
+        began = state.estimation.began
+        assert state.sample is not None and began is not None
+        prior = Prior(
+            state.sample.time,
+            x,
+            parameters,
+            covariance,
+            began.noise_std,
+            core_noise_std=began.core_noise_std,
+            ongoing=True,
+        )
         return cycle.go_on(state, prior), ModelChange(cycle.effects, prior, person)

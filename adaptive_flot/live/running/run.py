@@ -126,10 +126,10 @@ class LinkRun:
         snapshot = replace(snapshot, allowed=self.desk.allowed)
         self.state, outcome = await self._ended(client, asyncio.to_thread(self.use.cycle.step, self.state, snapshot))
         found = self.discovery.look(outcome)
-        noise = self.state.estimation.noise_std
-        self.desk.after(outcome, noise, self.discovery.finding, self._conditions())
+        began = self.state.estimation.began
+        self.desk.after(outcome, began, self.discovery.finding, self._conditions())
         beside = Beside(answered, self.desk.said(), self.desk.results(), change)
-        stored = asyncio.to_thread(self.memory.store, snapshot, outcome, noise, before, found, beside)
+        stored = asyncio.to_thread(self.memory.store, snapshot, outcome, began, before, found, beside)
         await self._ended(client, stored)
         seconds = loop.time() - begin
         in_time = seconds <= self.link.file.cycle.deadline * self._interval

@@ -10,8 +10,6 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-import numpy as np
-
 from adaptive_flot.contracts import Estimate, Prior
 from adaptive_flot.live.outcome import Outcome
 from adaptive_flot.live.shadow.comparison import Compared, Comparison
@@ -155,12 +153,15 @@ class Shadow:
         self._status = f"{ENDED}: {words or f'its process ended with {code}'}"
 
 
-def task_of(outcome: Outcome, noise_std: Sequence[float], inputs: Sequence[str]) -> Task:
-    """The task of a cycle that has a sample and an estimate; `inputs` are the names of the model's inputs."""
+def task_of(outcome: Outcome, began: Prior, inputs: Sequence[str]) -> Task:
+    """The task of a cycle that has a sample and an estimate; `inputs` are the names of the model's inputs.
+
+    `began` is what the acting estimator was started with.
+    """
     sample, e = outcome.sample, outcome.estimate
     assert sample is not None and e is not None
     acting = sample.inputs.copy()
     for name, value in outcome.acting.items():
         if math.isfinite(value):
             acting[inputs.index(name)] = value
-    return Task(outcome.number, sample, acting, Prior(e.time, e.state, e.parameters, e.covariance, np.array(noise_std)))
+    return Task(outcome.number, sample, acting, began.at(e))

@@ -103,9 +103,9 @@ class ShadowStepper:
         """Take a sample; the first one only says where to start."""
         begin = time.perf_counter()
         if self._state is None:
-            inner = self._estimation.estimator.init(self._prior(task))
-            noise = tuple(task.start.noise_std)
-            self._state = EstimationState(inner=inner, noise_std=noise, last=self._known(task.sample))
+            began = self._prior(task)
+            inner = self._estimation.estimator.init(began)
+            self._state = EstimationState(inner=inner, began=began, last=self._known(task.sample))
             self._control = None if self._controller is None else self._controller.init(task.sample.time)
             return ShadowResult(task.cycle, self.plan.role, "started", time.perf_counter() - begin)
         sample = self._known(task.sample)
@@ -138,7 +138,8 @@ class ShadowStepper:
             full[setup.model.indices("parameters", setup.parameters)] = values
             rest = states_at_rest(setup.model, state, task.sample.inputs, full, task.sample.time)
             state = np.concatenate([state, rest])
-        return replace(start, time=task.sample.time, state=state, parameters=values)
+        colour = None if self.plan.effects else start.colour  # what they explain, the errors do not show any more
+        return replace(start, time=task.sample.time, state=state, parameters=values, colour=colour)
 
     def _run_on(
         self, fitted: FloatArray, begin: float, inputs: FloatArray, values: FloatArray, now: float

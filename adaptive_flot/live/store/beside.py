@@ -13,8 +13,10 @@ from adaptive_flot.contracts import Decision, Estimate, Prior
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.live.requests import Answered
 from adaptive_flot.live.store.numbers import as_array, as_column, as_text
+from adaptive_flot.live.store.rows import error_columns, known_of_errors
 
-PRIOR = ("state", "parameters", "covariance", "noise_std")
+PRIOR = ("state", "parameters", "covariance")
+"""Arrays of a prior that it always has, beside those of the errors."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,8 @@ def shadow_row(result: ShadowResult) -> dict[str, Any]:
 
 def change_row(change: ModelChange) -> dict[str, Any]:
     """Row of the table `models`."""
-    prior = {name: as_text(getattr(change.prior, name)) for name in PRIOR} | {"time": repr(change.prior.time)}
+    known = change.prior
+    prior = {name: as_text(getattr(known, name)) for name in PRIOR} | error_columns(known) | {"time": repr(known.time)}
     effects = json.dumps([effect.as_dict() for effect in change.effects])
     return {"effects": effects, "prior": json.dumps(prior), "person": change.person}
 
@@ -123,5 +126,6 @@ def stored_change(row: RowMapping) -> ModelChange:
         Effect(**{**e, "settings": {k: _setting(v) for k, v in e.get("settings", {}).items()}})
         for e in json.loads(row["effects"])
     )
-    prior = Prior(float(known["time"]), *(as_array(known[name]) for name in PRIOR))
+    arrays = {name: as_array(known[name]) for name in PRIOR} | known_of_errors(known)
+    prior = Prior(float(known["time"]), **arrays, ongoing=True)
     return ModelChange(effects, prior, row["person"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from sqlalchemy import Connection, Engine, Table, create_engine, event, func, insert, make_url, select
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
+from adaptive_flot.contracts import Prior
 from adaptive_flot.errors import LinkError
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome, Written
@@ -115,7 +116,7 @@ class Memory:
         self,
         snapshot: Snapshot,
         outcome: Outcome,
-        noise_std: Sequence[float],
+        began: Prior | None,
         before: Mapping[str, Written],
         found: str = "",
         beside: Beside = NOTHING_BESIDE,
@@ -126,8 +127,8 @@ class Memory:
         ----------
         snapshot, outcome
             What the plant told, and what the cycle came to.
-        noise_std
-            Noise that the estimator counts with (m,).
+        began
+            What the estimator was started with; None before.
         before
             What came of the writes of the cycle before.
         found
@@ -151,8 +152,8 @@ class Memory:
         rows[schema.limits] = self._changed_limits(snapshot)
         if outcome.sample is not None:
             rows[schema.samples] = [sample_row(outcome)]
-        if outcome.estimate is not None:
-            rows[schema.estimates] = [estimate_row(outcome, noise_std)]
+        if outcome.estimate is not None and began is not None:
+            rows[schema.estimates] = [estimate_row(outcome.estimate, began)]
         if outcome.decision is not None:
             rows[schema.decisions] = [decision_row(outcome)]
         rows[schema.writes] = [{"input": name, "value": value} for name, value in outcome.writes.items()]

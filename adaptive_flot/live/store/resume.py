@@ -14,6 +14,7 @@ from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.beside import stored_change
 from adaptive_flot.live.store.numbers import as_array
+from adaptive_flot.live.store.rows import known_of_errors
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ def stored_resumed(connection: Connection, session: int, cycle: int) -> Resumed:
     e = schema.estimates.c
     query = select(schema.estimates).where(e.session == session, e.cycle == cycle)
     row = connection.execute(query).mappings().one()
-    prior = Prior(0.0, *(as_array(row[name]) for name in ("state", "parameters", "covariance", "noise_std")))
+    arrays = {name: as_array(row[name]) for name in ("state", "parameters", "covariance")} | known_of_errors(row)
+    prior = Prior(0.0, **arrays, ongoing=True)
     return Resumed(session, cycle, prior, _extensions(connection, session, cycle))
 
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from adaptive_flot.contracts import DelayedValue
+from adaptive_flot.contracts import DelayedValue, Estimate, Prior
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.live.outcome import Outcome, Written
 from adaptive_flot.live.safety.checks import Check
 from adaptive_flot.live.snapshot import Snapshot
-from adaptive_flot.live.store.numbers import as_column, as_text
+from adaptive_flot.live.store.numbers import as_array, as_column, as_text
 
 ACTING = "acting "
 ESTIMATED = ("parameters", "covariance", "state", "prediction", "innovation")
 """Arrays of an estimate that are stored."""
+OF_ERRORS = ("noise_std", "colour", "core_noise_std")
+"""Arrays of a prior about the errors of the measurements, each (m,)."""
 
 
 def cycle_row(snapshot: Snapshot, outcome: Outcome) -> dict[str, Any]:
@@ -61,12 +62,21 @@ def sample_row(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def estimate_row(outcome: Outcome, noise_std: Sequence[float]) -> dict[str, Any]:
-    """Row of the table `estimates`, with the noise that the estimator counts with (m,)."""
-    estimate = outcome.estimate
-    assert estimate is not None
+def estimate_row(estimate: Estimate, began: Prior) -> dict[str, Any]:
+    """Row of the table `estimates`, with what is known of the errors since the estimator was started."""
     arrays = {name: as_text(getattr(estimate, name)) for name in ESTIMATED}
-    return {**arrays, "status": estimate.status.name, "noise_std": as_text(np.array(noise_std))}
+    return {**arrays, **error_columns(began), "status": estimate.status.name}
+
+
+def error_columns(prior: Prior) -> dict[str, str | None]:
+    """What a prior knows of the errors of the measurements, by column; None where it is not known."""
+    known = {name: getattr(prior, name) for name in OF_ERRORS}
+    return {name: None if value is None else as_text(value) for name, value in known.items()}
+
+
+def known_of_errors(row: Mapping[Any, Any]) -> dict[str, FloatArray]:
+    """The same back from a row."""
+    return {name: as_array(text) for name in OF_ERRORS if (text := row[name]) is not None}
 
 
 def decision_row(outcome: Outcome) -> dict[str, Any]:

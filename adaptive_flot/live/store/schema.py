@@ -19,7 +19,7 @@ from sqlalchemy import (
     Text,
 )
 
-VERSION = 2
+VERSION = 3
 """Version of the tables; another one is refused."""
 metadata = MetaData()
 
@@ -81,6 +81,8 @@ estimates = _of_cycle(
     Column("prediction", Text, nullable=False),
     Column("innovation", Text, nullable=False),
     Column("noise_std", Text, nullable=False),
+    Column("colour", Text, doc="of the errors of the first record; NULL where it is not known, as `core_noise_std`"),
+    Column("core_noise_std", Text),
 )
 decisions = _of_cycle(
     "decisions",

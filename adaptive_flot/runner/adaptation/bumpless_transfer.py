@@ -66,6 +66,8 @@ def transfer(
     start = extended_prior(prior, old.model, model, old.parameters, extension.parameters, steps[first - 1])
     if extension.initial_state is not None:
         start = replace(start, state=_fitted_state(extension, estimator.setup, start, steps[:first], since))
+    if extension.effects:  # what they explain, the errors do not show any more
+        start = replace(start, colour=None)
     further = np.concatenate([running.further, model.parameter_values[len(old.model.parameters) :]])
     now = replace(running, estimator=estimator, controller=controller, further=further)
     now = replace(now, estimator_state=estimator.init(start))
@@ -74,7 +76,7 @@ def transfer(
         state, estimate = estimator.update(now.estimator_state, now.with_all_parameters(step.plant.sample))
         now = replace(now, estimator_state=state, estimate=estimate)
         again.append(estimate)
-    now = replace(now, prior=_prior_of(again[-1], running.prior))
+    now = replace(now, prior=start.at(again[-1]))
     known = tuple(s.estimate for s in steps[first:] if s.estimate is not None)
     if isinstance(controller, TakesOver):
         taken = controller.take_over(running.controller, running.controller_state, known, tuple(again))
@@ -92,7 +94,7 @@ def _where(started: Prior, steps: Sequence[Step], since: float) -> tuple[int, Pr
     estimate = steps[first - 1].estimate
     if estimate is None or estimate.time <= started.time + 1e-9:
         return first, started
-    return first, _prior_of(estimate, started)
+    return first, started.at(estimate)
 
 
 def _fitted_state(extension: Extension, setup: Setup, start: Prior, steps: Sequence[Step], since: float) -> FloatArray:
@@ -104,11 +106,6 @@ def _fitted_state(extension: Extension, setup: Setup, start: Prior, steps: Seque
     p = full_parameters(setup.model, setup.parameters, start.parameters)
     run = Stepper(setup.model, setup.dt).simulate(extension.initial_state, np.vstack(inputs), p, since)
     return np.asarray(run.states[-1])
-
-
-def _prior_of(estimate: Estimate, started: Prior) -> Prior:
-    """Where an estimator stood, as far as its estimate tells."""
-    return Prior(estimate.time, estimate.state, estimate.parameters, estimate.covariance, started.noise_std)
 
 
 def extended_prior(

@@ -10,6 +10,7 @@ import pytest
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import FloatArray
 from estimators.adaptive_imm import AdaptiveImm
+from estimators.adaptive_imm.bank import Triangles
 from estimators.adaptive_imm.trust import Trust
 from estimators.pem import Pem
 from tests.estimators import toys
@@ -121,3 +122,20 @@ def test_outliers_beside_each_other_are_no_error_of_the_model(cell_case: CellCas
         outputs[column] += 20 * cell_case.prior.noise_std[0]
         samples[k] = replace(samples[k], outputs=outputs)
     assert {e.status for e in replay(estimator, cell_case.prior, tuple(samples))} == {Status.OK}
+
+
+def test_starting_again_counts_neither_the_first_record_nor_the_nominal_values_twice(cell_case: CellCase) -> None:
+    """After a gap: mean and covariance are those of the estimate, and the model is ruled out as before."""
+    estimator, first = AdaptiveImm(cell_case.setup), replace(cell_case.prior, colour=np.array([30.0]))
+    last = replay(estimator, first, cell_case.samples[:20])[-1]
+    again = estimator.init(first.at(last))
+    assert again.trust == estimator.init(first).trust and again.wrong == again.trust.doubt == 1.0
+    where = estimator.layout.coordinates
+    expected = estimator.coordinates.from_parameters(last.parameters)
+    np.testing.assert_allclose(again.z[where, 0], expected, rtol=1e-12)
+    slopes = estimator.coordinates.slopes(expected)
+    shape = Triangles(len(again.z))
+    P = np.zeros((len(again.z), len(again.z)))
+    P[shape.rows, shape.columns] = again.P[:, list(estimator.modes.kinds).index("rest")]
+    shown = again.trust.shown(np.diag(slopes) @ P[where, where] @ np.diag(slopes))
+    np.testing.assert_allclose(np.tril(shown), np.tril(last.covariance), rtol=1e-6)
