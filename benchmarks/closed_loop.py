@@ -23,6 +23,7 @@ from rich.progress import track
 from rich.table import Table
 
 from adaptive_flot.greybox.data.tables import write_table
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.commands.comparison import Comparison, Contender, compare
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_summary
@@ -40,7 +41,7 @@ SCENARIOS = (
 )
 SEEDS = 10
 PROCESSES = 2
-MPC, ADAPTIVE = "economic_mpc", "rpem"
+MPC, ADAPTIVE = "economic_mpc", DEFAULT_ESTIMATOR
 LONGEST_BELOW = 0.01
 """Share of the time that may be below the grade limit."""
 LEAST_SHARE = 0.95
@@ -66,7 +67,7 @@ def run_missing(folder: Path, scenarios: Sequence[str], seeds: Sequence[int], pr
 
 
 def figures(comparison: Comparison) -> Iterator[Figure]:
-    """What was asked of the economic MPC with RPEM in one scenario, and what it reached: medians over the seeds."""
+    """What was asked of the economic MPC with the default estimator in one scenario, and reached: medians of seeds."""
     contenders = {(c.controller, c.estimator): c for c in comparison.contenders}
     adaptive = contenders.get((MPC, ADAPTIVE))
     if adaptive is None:

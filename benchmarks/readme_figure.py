@@ -27,7 +27,7 @@ def draw_paper_scenario() -> Figure:
 def draw_closed_loop() -> Figure:
     """closed_loop_drift, seed 1, economic MPC: air flow, grade and recovery with RPEM, fixed and true parameters."""
     scenario = load_scenario("closed_loop_drift")
-    case = series.cases([(scenario, run_scenario(scenario, seeds=[1]))])[0]
+    case = series.cases([(scenario, run_scenario(scenario, ["rpem", "fixed", "oracle"], [1]))])[0]
     assert case.controller == "economic_mpc"
     return figures.time_figure([p for p in closed_loop.operation_panels(case) if p.label in CLOSED_LOOP])
 

@@ -16,10 +16,11 @@ from adaptive_flot.live.link_file import load_link
 from adaptive_flot.live.plant.link_text import link_text
 from adaptive_flot.live.plant.server import ServerPlace
 from adaptive_flot.live.program import live
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.scenario.loading import load_scenario
 
 SCENARIO, SPEED, HOURS = "undeclared_effect", 2.0, 24.0
-CASE = ("economic_mpc", "rpem_discovery")
+CASE = ("economic_mpc", f"{DEFAULT_ESTIMATOR}_discovery")
 SHADOWS = {"fixed": {"estimator": "fixed", "controller": "economic_mpc"}}
 FOLDER = Path("results/live_demo")
 

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.contracts import Setup
+from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, Verdict, Word
 from adaptive_flot.errors import AdaptiveFlotError, ModelError
@@ -20,6 +21,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.adaptation import search, supervisor
 from adaptive_flot.runner.adaptation.extension import Extension
 from adaptive_flot.runner.adaptation.search import Finding, search_record
@@ -96,8 +98,9 @@ def same(one: Run, two: Run) -> None:
         ("rpem", (growth(0.0), LATE_FEED), {}),
         ("ekf", (LATE_FEED,), {}),
         ("fixed", (LATE_FEED,), {}),
+        (DEFAULT_ESTIMATOR, (LATE_FEED,), {}),
     ],
-    ids=["rpem, closed loop", "rpem, states", "ekf, states", "fixed, states"],
+    ids=["rpem, closed loop", "rpem, states", "ekf, states", "fixed, states", "default, states"],
 )
 def test_an_effect_of_size_zero_changes_nothing(
     write_scenario: WriteScenario,
@@ -112,6 +115,21 @@ def test_an_effect_of_size_zero_changes_nothing(
     assert watched.inquiries is not None and [i.extended for i in watched.inquiries] == [True]
     assert unwatched.inquiries is None
     same(watched, unwatched)
+
+
+def test_an_extended_model_is_judged_anew(
+    write_scenario: WriteScenario, monkeypatch: pytest.MonkeyPatch, alarming: None
+) -> None:
+    """Errors of the first record that are not white rule out the model of the fit, not the one that was found."""
+    prior = BatchFit.prior
+    coloured = np.array([30.0])
+    monkeypatch.setattr(BatchFit, "prior", lambda self, time: replace(prior(self, time), colour=coloured))
+    still: dict[str, Any] = {"parameters": {}}
+    watched, unwatched = with_and_without(write_scenario, monkeypatch, DEFAULT_ESTIMATOR, (LATE_FEED,), still)
+    assert watched.inquiries and watched.inquiries[0].extended
+    since = watched.inquiries[0].judged_s + 1
+    late, same_time = (set(run.table["status"][run.table["time_s"] > since]) for run in (watched, unwatched))
+    assert "model_error" not in late and same_time == {"model_error"}
 
 
 def test_further_states_of_no_effect_do_not_bump_the_inputs(
