@@ -170,7 +170,7 @@ def _round(
             if before is not None:
                 # a further effect must have a name: a pair of curves without one would explain anything
                 wanted = [s for s in wanted if s.candidate.known]
-                wanted = with_each_output(scorer, wanted, still_wrong(problem, base, before.fit))
+                wanted = with_each_output(scorer, wanted, still_wrong(problem, before.fit))
             wanted = [s for s in wanted if s.penalised > threshold]
             linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")

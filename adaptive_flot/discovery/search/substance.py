@@ -41,7 +41,7 @@ def better(problem: Problem, base: Fit, before: Alternative | None, latest: Roun
 def _has_substance(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     if excess(problem, before, after) > SUBSTANCE * excess(problem, base, after):
         return True
-    removed, wrong = excess_by_output(problem, before, after), excess_by_output(problem, base, after)
+    removed, wrong = excess_by_output(problem, before, after), _means(problem, after, before) - 1.0
     return bool(np.any((removed > VISIBLE) & (removed > MOST_OF_AN_OUTPUT * wrong)))
 
 
@@ -78,16 +78,12 @@ def worth_extending(problem: Problem, base: Fit, best: Alternative, left: tuple[
     removed = np.nansum(((base.residual(problem) / size) ** 2 - (best.fit.residual(problem) / size) ** 2)[rows])
     if gain > SUBSTANCE / 2 * float(removed):
         return True
-    return bool(still_wrong(problem, base, best.fit))
+    return bool(still_wrong(problem, best.fit))
 
 
-def still_wrong(problem: Problem, base: Fit, best: Fit) -> list[int]:
-    """Places among the measured outputs of those that `best` leaves wrong.
-
-    Its squared error is more than VISIBLE above the noise, and most of what the base left.
-    """
-    was, still = (_means(problem, best, fit) - 1.0 for fit in (base, best))
-    return np.flatnonzero((still > VISIBLE) & (still > MOST_OF_AN_OUTPUT * was)).tolist()
+def still_wrong(problem: Problem, best: Fit) -> list[int]:
+    """Places among the measured outputs of those that `best` leaves wrong: VISIBLE above the noise."""
+    return np.flatnonzero(_means(problem, best, best) - 1.0 > VISIBLE).tolist()
 
 
 def _means(problem: Problem, scale: Fit, fit: Fit) -> FloatArray:

@@ -7,7 +7,9 @@ stays wrong.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 from adaptive_flot.discovery.assessment.verification import changes, verify
 from adaptive_flot.discovery.record.problem import Problem
@@ -41,12 +43,36 @@ def with_certain_part(problem: Problem, result: SearchResult, judged: Judgement)
         return replace(judged, word="named", part=named)
     if part:
         return replace(judged, word="unnamed", part=part[:1])
-    last = tuple(dict.fromkeys(a.names[-1] for a in near))
-    others = {n for a in near for n in a.names[:-1]}
-    if all(a.known[-1] for a in near) and len(last) <= LARGEST_CLASS and not others & set(last):
-        if _rests_on_an_output(problem, result, best, set(last)):
-            return replace(judged, word="class", members=last, part=(best.names[-1],))
+    for members in _one_of_each(near):
+        if _rests_on_an_output(problem, result, best, set(members)):
+            return replace(judged, word="class", members=members, part=(members[0],))
     return judged
+
+
+def _one_of_each(near: Sequence[Alternative]) -> Iterator[tuple[Name, ...]]:
+    """The smallest groups of names of which every set has just one, that of the first set in front.
+
+    One stands for another: beside the same rest, a set with each is near. Groups whose names never meet the same rest
+    are put together by chance.
+    """
+    names = tuple(dict.fromkeys(n for a in near for n, known in zip(a.names, a.known, strict=True) if known))
+    sets = [set(a.names) for a in near]
+    for size in range(2, LARGEST_CLASS + 1):
+        for members in combinations(names, size):
+            group = set(members)
+            if all(len(group & s) == 1 for s in sets) and _interchangeable(group, sets):
+                yield tuple(sorted(members, key=lambda n: n not in near[0].names))
+
+
+def _interchangeable(group: set[Name], sets: Sequence[set[Name]]) -> bool:
+    """Whether a walk from set to set, that changes one member of the group for another, meets all of them."""
+    rests = [(s & group, s - group) for s in sets]
+    reached, before = {*rests[0][0]}, set[Name]()
+    while reached != before:
+        before = set(reached)
+        beside = [rest for own, rest in rests if own <= before]
+        reached |= {n for own, rest in rests if rest in beside for n in own}
+    return reached == group
 
 
 def _rests_on_an_output(problem: Problem, result: SearchResult, best: Alternative, part: set[Name]) -> bool:
