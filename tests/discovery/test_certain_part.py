@@ -73,6 +73,15 @@ def test_an_output_that_is_slightly_wrong_counts_beside_one_that_is_far_off(two_
     assert {e.effect.site for e in two_things.verdict.effects} == {"heat_loss", "flow_meter"}
 
 
+def test_outliers_do_not_make_an_output_wrong(two_things: Discovery) -> None:
+    """Two values in a hundred, thirty noise deviations away, would be an error of more than four."""
+    assert two_things.search is not None and two_things.problem is not None
+    best, problem = two_things.search.alternatives[0].fit, two_things.problem
+    outputs = problem.record.outputs.copy()
+    outputs[7::50] += 30 * best.noise.stationary_std() * problem.weights[7::50]
+    assert not still_wrong(replace(problem, record=replace(problem.record, outputs=outputs)), best)
+
+
 def _search(found: Discovery, *sets: tuple[tuple[tuple[str, str], ...], float]) -> SearchResult:
     """Sets of effects by how much worse they are than the first, all with its fit; the first round is the record's."""
     assert found.search is not None

@@ -13,6 +13,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import squared_errors
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.robust import without_spikes
 from adaptive_flot.discovery.results import Alternative, Round
 from adaptive_flot.greybox.model import FloatArray
 
@@ -87,6 +88,7 @@ def still_wrong(problem: Problem, best: Fit) -> list[int]:
 
 
 def _means(problem: Problem, scale: Fit, fit: Fit) -> FloatArray:
-    """Mean squared error (m,) of a fit on the rows fitted, in variances of the noise of `scale`."""
-    size = problem.weights * scale.noise.stationary_std()
-    return cast(FloatArray, np.nanmean(squared_errors(problem, fit, size, problem.rows("estimate")), axis=0))
+    """Mean squared error (m,) of a fit on the rows fitted, in variances of the noise of `scale`; without outliers."""
+    size, rows = scale.noise.stationary_std(), problem.rows("estimate")
+    errors = without_spikes(fit.residual(problem) / problem.weights)[rows] / size
+    return cast(FloatArray, np.nanmean(errors**2, axis=0))
