@@ -14,7 +14,7 @@ from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.base_fit import prepare
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.results import Verdict
-from adaptive_flot.discovery.search.search import scorer_of
+from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.greybox import Dataset, Model, Quantity, Scope
 from tests.discovery.heated import CAPACITY, DT, ROOM, Truth, heated_tank, moves, tank_record
 

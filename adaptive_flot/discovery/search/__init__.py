@@ -3,6 +3,8 @@
 Map
 ---
 search.py              Rounds of score, refit and compare.
+rounds.py              One round, and the scores it starts from.
+exchange.py            What else may stand in the place of an earlier effect.
 alternatives.py        Which candidates are worth a full fit, and that fit.
 fit_jobs.py            Which fits are made in a round.
 successive_halving.py  Refits in rounds, the worse half left out of the next.

@@ -17,7 +17,7 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, SearchResult
 from adaptive_flot.discovery.search.alternatives import fit_variant, variant_model
-from adaptive_flot.discovery.search.search import scorer_of, threshold_of, what_is_left
+from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of, what_is_left
 from adaptive_flot.greybox.forms.form import FormKind
 
 MINOR = 0.5

@@ -25,7 +25,7 @@ from adaptive_flot.discovery.search.joint_fits import (
     discount,
     discounted,
 )
-from adaptive_flot.discovery.search.search import LEAST_EVIDENCE, scorer_of, what_is_left
+from adaptive_flot.discovery.search.rounds import LEAST_EVIDENCE, scorer_of, what_is_left
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CHEAP = 30_000
