@@ -16,7 +16,7 @@ from adaptive_flot.discovery.results import Alternative, Round
 from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist, with_each_output
 from adaptive_flot.discovery.search.fit_jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.simplify import simpler
-from adaptive_flot.discovery.search.substance import excess, still_wrong
+from adaptive_flot.discovery.search.substance import excess, repairs, still_wrong
 from adaptive_flot.discovery.search.successive_halving import refit
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 
@@ -84,7 +84,8 @@ def run_round(
 def ranked(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tuple[Alternative, ...]:
     """The best fit of each set of names, best first.
 
-    Left out are dependences that turned out flat: those that add next to nothing to a constant at the same site.
+    Left out are dependences that turned out flat: those that add next to nothing to a constant at the same site. Beside
+    another effect they must add next to nothing to any output: one that is far off for another cause hides the rest.
     """
     unique: dict[frozenset[tuple[str, str]], Alternative] = {}
     for a in sorted(alternatives, key=lambda a: a.fit.bic):
@@ -98,7 +99,8 @@ def ranked(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tupl
             if driver in DYNAMIC_DRIVERS or driver == "constant" or constant is None:
                 continue
             if excess(problem, constant.fit, a.fit) < FLAT * excess(problem, base, a.fit):
-                return True
+                if len(a.names) == 1 or not repairs(problem, base, constant.fit, a.fit, FLAT):
+                    return True
         return False
 
     return tuple(a for a in kept if not flat(a))

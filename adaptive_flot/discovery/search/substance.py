@@ -46,6 +46,12 @@ def _has_substance(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool
     return bool(np.any((removed > VISIBLE) & (removed > MOST_OF_AN_OUTPUT * wrong)))
 
 
+def repairs(problem: Problem, base: Fit, before: Fit, after: Fit, share: float) -> bool:
+    """Whether a fit removes a share of what the base model left of one output that it leaves visibly wrong."""
+    removed, wrong = excess_by_output(problem, before, after), excess_by_output(problem, base, after)
+    return bool(np.any((wrong > VISIBLE) & (removed > share * wrong)))
+
+
 def excess(problem: Problem, fit: Fit, better_fit: Fit) -> float:
     """Mean squared error of the rows fitted in units of the better fit's noise, less that of the better fit.
 
