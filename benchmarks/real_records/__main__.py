@@ -26,7 +26,10 @@ LARGEST_CLASS = 2
 
 @dataclass(frozen=True)
 class Judged:
-    """A verdict beside the truth, and what it is worth: `right`, `wrong`, or `open` where nothing is told."""
+    """A verdict beside the truth, and what it is worth.
+
+    `right`, `wrong`, `wide` where the right part is one of more than two, or `open` where nothing is told.
+    """
 
     record: str
     truth: str
@@ -48,8 +51,18 @@ def faulted_days(folder: Path) -> Iterator[Judged]:
     for day, (part, fault) in unit.TRUTH.items():
         verdict = find_changes(model, [days[day]], [days[unit.REFERENCE]], processes=available_processes()).verdict
         sites = {unit.SAME_PART.get(site, site) for site in told(verdict)}
-        worth = "open" if not sites else "right" if part in sites and len(sites) <= LARGEST_CLASS else "wrong"
-        yield Judged(f"air handling {day}", f"{part} {fault}".replace("_", " "), verdict, worth)
+        yield Judged(
+            f"air handling {day}", f"{part} {fault}".replace("_", " "), verdict, worth_of(part, verdict, sites)
+        )
+
+
+def worth_of(part: str, verdict: Verdict, sites: set[str]) -> str:
+    """What a verdict is worth that tells some sites, where one part is at fault."""
+    if not sites:
+        return "open"
+    if part not in sites or (verdict.word == "named" and sites != {part}):
+        return "wrong"
+    return "right" if len(sites) <= LARGEST_CLASS else "wide"
 
 
 def run_on(fit: Fit, record: Dataset, seen: int) -> float:
