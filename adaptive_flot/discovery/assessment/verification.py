@@ -82,8 +82,8 @@ def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> floa
     """
     rows = problem.rows("estimate")
     size = problem.weights * after.noise.stationary_std()
-    old, new = (np.nanmean(squared_errors(problem, fit, size, rows), axis=0) for fit in (before, after))
-    gained = np.maximum(np.nan_to_num(old - new), 0.0)
+    old, new = (column_means(squared_errors(problem, fit, size, rows)) for fit in (before, after))
+    gained = np.maximum(old - new, 0.0)
     if not gained.sum() > 0:
         return 1.0
     innovations = np.clip(np.where(rows[:, None], after.innovations, np.nan), -problem.clip, problem.clip)
@@ -125,6 +125,13 @@ def changes(
         sigma = float(noise[j] * np.sqrt(np.mean(problem.weights[rows, j] ** 2)))
         errors.append(OutputChange(q.name, q.unit, a, b, sigma, _reduction(old[:, j], new[:, j], block)[1]))
     return tuple(errors)
+
+
+def column_means(values: FloatArray) -> FloatArray:
+    """Mean of each column (m,) of values (n, m), missing ones left out; zero of a column without any."""
+    seen = np.isfinite(values)
+    means: FloatArray = np.where(seen, values, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+    return means
 
 
 def squared_errors(problem: Problem, fit: Fit, size: FloatArray, rows: BoolArray) -> FloatArray:

@@ -6,11 +6,9 @@ nothing over all outputs, though it is all that is wrong with its own. So each o
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import squared_errors
+from adaptive_flot.discovery.assessment.verification import column_means, squared_errors
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import without_spikes
@@ -97,4 +95,4 @@ def _means(problem: Problem, scale: Fit, fit: Fit) -> FloatArray:
     """Mean squared error (m,) of a fit on the rows fitted, in variances of the noise of `scale`; without outliers."""
     size, rows = scale.noise.stationary_std(), problem.rows("estimate")
     errors = without_spikes(fit.residual(problem) / problem.weights)[rows] / size
-    return cast(FloatArray, np.nanmean(errors**2, axis=0))
+    return column_means(errors**2)
