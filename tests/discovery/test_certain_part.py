@@ -142,3 +142,11 @@ def test_a_part_that_no_output_needs_is_not_told(two_things: Discovery) -> None:
     alike = replace(best, names=(LOSS, ("flow_meter", "fan_speed")), fit=replace(best.fit, bic=best.fit.bic + 100))
     result = replace(result, rounds=(*result.rounds, Round((), 10.0, (alike,))))
     assert with_certain_part(two_things.problem, result, _judged(result)).word == "abstain"
+
+
+def test_what_all_sets_share_is_not_certain_while_an_output_stays_wrong(two_things: Discovery) -> None:
+    result = _search(two_things, ((LOSS, SENSOR), 0.0), ((HEATER, SENSOR), 5.0))
+    judged = replace(_judged(result), word="class", members=(LOSS, HEATER, SENSOR))
+    assert "Certain: flow_meter by constant." in reason_words(judged, result, (), ())
+    said = reason_words(judged, result, (), (), wrong=["temperature"])
+    assert "All that come near have flow_meter by constant; still wrong: temperature." in said and "Certain" not in said

@@ -25,6 +25,9 @@ NORMAL95 = 1.96
 INSTRUMENTS = {"sensor": "sensor", "actuator": "part that acts", "feed": "feed"}
 """Roles whose quantities do not depend on the state of the process, in words."""
 
+STILL_WRONG = 2.0
+"""An output whose error on the report rows is more than so many times its noise is wrong after all."""
+
 
 def insufficient(screening: Screening) -> Verdict:
     """The verdict on a record that says too little, with every reason."""
@@ -67,7 +70,8 @@ def conclude(state: State) -> Verdict:
 def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
     """The verdict in one paragraph: in the words of the innovations form where that has decided."""
     if not state.sentence:
-        said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction)
+        wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
+        said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong)
         return f"{said} {state.certain}".rstrip()
     errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
     return f"{state.sentence} Error of the free run on held-out rows: {errors}."

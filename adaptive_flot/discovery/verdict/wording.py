@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -34,8 +36,12 @@ def reason_words(
     effects: tuple[NamedEffect, ...],
     drift: tuple[str, ...],
     contradiction: str = "",
+    wrong: Sequence[str] = (),
 ) -> str:
-    """The verdict in one paragraph; what contradicts a name comes first."""
+    """The verdict in one paragraph; what contradicts a name comes first.
+
+    Where outputs stay `wrong` after all, what every set has is what they share, and not certain.
+    """
     if contradiction and judgement.best is not None:
         fitted = " with ".join(f"{site} by {driver}" for site, driver in judgement.best.names)
         return (
@@ -65,7 +71,7 @@ def reason_words(
     if judgement.word == "named":
         return f"The model lacks this: {said}. {_beside(judgement)}{evidence}."
     if judgement.word == "class":
-        return f"{_class_words(judgement)} {evidence}."
+        return f"{_class_words(judgement, wrong)} {evidence}."
     if judgement.word == "unnamed":
         return f"The model lacks something that has no name: {said}. {_beside(judgement)}{evidence}."
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
@@ -75,7 +81,7 @@ def reason_words(
     )
 
 
-def _class_words(judgement: Judgement) -> str:
+def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     assert judgement.best is not None  # a class has a best member
     sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
     if judgement.part or all(len(a.names) == 1 for a in sets):
@@ -86,7 +92,10 @@ def _class_words(judgement: Judgement) -> str:
     rest = "; ".join(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in sure) for a in sets)
     first = "The model lacks several effects. "
     if sure:
-        first += f"Certain: {', '.join(f'{s} by {d}' for s, d in sure)}. "
+        shared = ", ".join(f"{s} by {d}" for s, d in sure)
+        first += (
+            f"All that come near have {shared}; still wrong: {', '.join(wrong)}. " if wrong else f"Certain: {shared}. "
+        )
     return f"{first}This record can not tell these apart, of which the first is kept: {rest}."
 
 
