@@ -13,36 +13,27 @@ from adaptive_flot.discovery.search.substance import excess_by_output, still_wro
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
 from adaptive_flot.discovery.verdict.wording import reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
-from tests.discovery.heated import CAPACITY, DT, ROOM, moves
+from adaptive_flot.greybox.model import Model, Quantity, Scope
+from tests.discovery.heated import CAPACITY, DT, ROOM, equations, heated_tank, moves
 
 LOSS, HEATER, SENSOR = ("heat_loss", "fan_speed"), ("heating", "fan_speed"), ("flow_meter", "constant")
 CONFIRMED = Verification(0.5, (0.4, 0.6), (), True)
 
 
 def _equations(m: Scope) -> None:
-    temperature = m.state("temperature")
-    heating = m.site("heating", m.parameter("efficiency") * m.input("power"), "actuator", unit="W")
-    loss = m.site("heat_loss", m.parameter("loss") * (temperature - ROOM), unit="W")
-    m.derivative("temperature", (heating - loss) / CAPACITY)
-    m.output("temperature", m.site("thermometer", temperature, "sensor", "offset", unit="K"))
+    equations(m)
     m.output("air", m.site("flow_meter", 0.1 * m.input("fan_speed"), "sensor", unit="m3/s"))
 
 
 def tank_with_meter() -> Model:
-    """A heated tank whose fan has a flow meter, with its loss known wrongly."""
-    return Model(
+    """A heated tank whose fan has a flow meter, whose efficiency is known, and whose record does not start at rest."""
+    tank = heated_tank()
+    return replace(
+        tank,
         name="metered-tank",
-        states=(Quantity("temperature", "K", "", 273.0, 373.0, 10.0),),
-        inputs=(Quantity("power", "W", "", 0.0, 1e4, 1e3), Quantity("fan_speed", "1/s", "", 0.0, 100.0, 5.0)),
-        parameters=(
-            Parameter("efficiency", 0.9, "-", "data sheet", None, 0.5, 1.0, 0.05),
-            Parameter("loss", 80.0, "W/K", "first guess", None, 1.0, 1000.0, 10.0, role="estimated"),
-        ),
-        outputs=(Quantity("temperature", "K", "", 273.0, 373.0, 1.0), Quantity("air", "m3/s", "", 0.0, 10.0, 0.1)),
+        parameters=tuple(replace(p, role="fixed") if p.name == "efficiency" else p for p in tank.parameters),
+        outputs=(*tank.outputs, Quantity("air", "m3/s", "", 0.0, 10.0, 0.1)),
         equations=_equations,
-        max_step_s=60.0,
-        initial_guess={"temperature": 310.0},
         starts_steady=False,
     )
 

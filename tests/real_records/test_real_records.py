@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.results import Verdict, Word
 from adaptive_flot.greybox import Dataset, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
+from benchmarks.real_records.__main__ import worth_of
 
 INPUTS = {
     "air handling unit": [15.0, 22.0, 0.3, 0.2, 0.1],
@@ -35,3 +37,20 @@ def test_every_fault_is_at_a_site_of_the_model() -> None:
     assert {part for part, _ in air_handling_unit.TRUTH.values()} <= sites
     assert {*air_handling_unit.SAME_PART, *air_handling_unit.SAME_PART.values()} <= sites
     assert electric_drives.TRUTH[0] in {s.name for s in electric_drives.make_model().sites}
+
+
+@pytest.mark.parametrize(
+    ("word", "sites", "worth"),
+    [
+        ("abstain", set(), "open"),
+        ("named", {"valve"}, "right"),
+        ("named", {"valve", "sensor"}, "wrong"),
+        ("named", {"sensor"}, "wrong"),
+        ("class", {"valve", "sensor"}, "right"),
+        ("class", {"valve", "sensor", "damper"}, "wide"),
+        ("class", {"sensor", "damper"}, "wrong"),
+    ],
+)
+def test_a_verdict_is_worth_what_it_says_of_the_part_at_fault(word: Word, sites: set[str], worth: str) -> None:
+    """No wrong part counts as right, and a class that holds the right part is never a wrong name."""
+    assert worth_of("valve", Verdict(word, ""), sites) == worth

@@ -12,17 +12,15 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Round
-from adaptive_flot.discovery.search.alternatives import effect_bounds, fixed_coefficients
 from adaptive_flot.discovery.search.rounds import ranked, run_round, scorer_of
+from adaptive_flot.discovery.search.simplify import refitted
 
 EXCHANGED = 8
 """Candidates that are refitted in the place of one."""
 
 
 def with_exchanges(
-    problem: Problem,
     fitter: Fitter,
     base: Fit,
     latest: Round,
@@ -33,14 +31,14 @@ def with_exchanges(
 
     Parameters
     ----------
-    problem, fitter, base
-        The record, its fitter, and the fit of the model as it is.
+    fitter, base
+        The fitter of the record, and the fit of the model as it is.
     latest
         The round; its best set has several effects, or nothing is to be exchanged.
     processes, progress
         As in `search`.
     """
-    best = latest.alternatives[0]
+    problem, best = fitter.problem, latest.alternatives[0]
     found, compared = [*latest.alternatives], latest.compared
     for k in range(len(best.names) - 1):
         if problem.time_is_up:
@@ -50,7 +48,7 @@ def with_exchanges(
             continue
         progress("what else it may be")
         scorer, _ = scorer_of(problem, rest.fit)
-        again = run_round(problem, fitter, base, [scorer], [rest], processes, progress, EXCHANGED)
+        again = run_round(fitter, base, [scorer], [rest], processes, progress, EXCHANGED)
         found += again.alternatives
         compared = compared and again.compared
     return replace(latest, alternatives=ranked(problem, base, found), compared=compared)
@@ -58,14 +56,7 @@ def with_exchanges(
 
 def without(fitter: Fitter, base: Fit, a: Alternative, k: int) -> Alternative | None:
     """The alternative without its effect number k, fitted from where it stands; None when that can not be."""
-    effects = [replace(e, coefficients=fixed_coefficients(e)) for i, e in enumerate(a.effects) if i != k]
-    model = base.model.with_effects(effects)
-    free = [*base.names]
-    bounds: dict[str, tuple[float, float]] = {}
-    for effect in effects:
-        free += [effect.parameter(c.name) for c in effect.terms if c.name not in effect.coefficients]
-        bounds |= effect_bounds(fitter.problem, model, effect)
-    fit = fitter.fit(model, tuple(free), {}, a.fit, bounds, rounds=2)
+    fit = refitted(fitter, base, a, [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k])
     if fit is None:
         return None
     names, known = ((*values[:k], *values[k + 1 :]) for values in (a.names, a.known))

@@ -31,7 +31,6 @@ SHORTLIST_NEAR, SHORTLIST_FURTHER = 9, 5
 
 
 def run_round(
-    problem: Problem,
     fitter: Fitter,
     base: Fit,
     scorers: list[Scorer],
@@ -44,8 +43,8 @@ def run_round(
 
     Parameters
     ----------
-    problem, fitter, base
-        The record, its fitter, and the fit of the model as it is.
+    fitter, base
+        The fitter of the record, and the fit of the model as it is.
     scorers
         Scores along the first of the beam, from one or two linearisations.
     beam
@@ -55,7 +54,7 @@ def run_round(
     further
         Candidates that are refitted as further effects.
     """
-    threshold = max(map(threshold_of, scorers))
+    problem, threshold = fitter.problem, max(map(threshold_of, scorers))
     scores = tuple(scorers[0].scores())
     alternatives: list[Alternative] = []
     compared = True
@@ -98,9 +97,9 @@ def ranked(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tupl
             constant = by_names.get(frozenset((*a.names[:k], (site, "constant"), *a.names[k + 1 :])))
             if driver in DYNAMIC_DRIVERS or driver == "constant" or constant is None:
                 continue
-            if excess(problem, constant.fit, a.fit) < FLAT * excess(problem, base, a.fit):
-                if len(a.names) == 1 or not repairs(problem, base, constant.fit, a.fit, FLAT):
-                    return True
+            little = excess(problem, constant.fit, a.fit) < FLAT * excess(problem, base, a.fit)
+            if little and (len(a.names) == 1 or not repairs(problem, base, constant.fit, a.fit, FLAT)):
+                return True
         return False
 
     return tuple(a for a in kept if not flat(a))

@@ -53,13 +53,13 @@ def search(
     scorer, sites = scorer_of(problem, base, responses)
     near = _near(fitter, base, nominal)
     scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
-    rounds = [run_round(problem, fitter, base, scorers, [None], processes, progress)]
+    rounds = [run_round(fitter, base, scorers, [None], processes, progress)]
     accepted: list[Round] = []
     best: Alternative | None = None
     left = what_is_left(scorer, rounds[0].threshold)
     while better(problem, base, best, rounds[-1]):
         if best is not None:
-            rounds[-1] = with_exchanges(problem, fitter, base, rounds[-1], processes, progress)
+            rounds[-1] = with_exchanges(fitter, base, rounds[-1], processes, progress)
         accepted.append(rounds[-1])
         best = rounds[-1].alternatives[0]
         progress("what is left")
@@ -68,7 +68,7 @@ def search(
         if len(best.names) == MOST_EFFECTS or not worth_extending(problem, base, best, left) or problem.time_is_up:
             break
         beam = _beam(rounds[-1], best, BEAM)
-        rounds.append(run_round(problem, fitter, base, [scorer], beam, processes, progress))
+        rounds.append(run_round(fitter, base, [scorer], beam, processes, progress))
     slow_s = max(SLOW_S, SLOW_ROWS * problem.record.dt)
     return _confirmed(problem, SearchResult(base, tuple(rounds), (), None, *left, sites, slow_s=slow_s), accepted)
 

@@ -28,7 +28,7 @@ def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
             continue
         others = [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k]
         shift = Effect(effect.site, "constant", "shift", mode=effect.mode)
-        fit = _refitted(fitter, base, a, [*others[:k], shift, *others[k:]], _middle(effect))
+        fit = refitted(fitter, base, a, [*others[:k], shift, *others[k:]], _middle(effect))
         if fit is not None:
             names = (*a.names[:k], constant, *a.names[k + 1 :])
             known = (*a.known[:k], True, *a.known[k + 1 :])
@@ -41,7 +41,11 @@ def _middle(effect: Effect) -> float:
     return float(np.mean(effect.levels)) if effect.levels else 0.0
 
 
-def _refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], middle: float) -> Fit | None:
+def refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], middle: float = 0.0) -> Fit | None:
+    """Fit of other effects, from where those that an alternative has as well stand in it; None when that can not be.
+
+    A constant that it does not have starts at `middle`.
+    """
     held = [fixed_coefficients(e) for e in effects]
     model = base.model.with_effects([replace(e, coefficients=h) for e, h in zip(effects, held, strict=True)])
     free = [*base.names]
