@@ -56,10 +56,11 @@ def search(
     rounds = [run_round(fitter, base, scorers, [None], processes, progress)]
     accepted: list[Round] = []
     best: Alternative | None = None
+    beam: list[Alternative | None] = [None]
     left = what_is_left(scorer, rounds[0].threshold)
     while better(problem, base, best, rounds[-1]):
         if best is not None:
-            rounds[-1] = with_exchanges(fitter, base, rounds[-1], processes, progress)
+            rounds[-1] = with_exchanges(fitter, base, rounds[-1], beam, processes, progress)
         accepted.append(rounds[-1])
         best = rounds[-1].alternatives[0]
         progress("what is left")
