@@ -2,7 +2,7 @@
 
 The first effect of several is chosen while the others are missing. It is then the one that makes up best for them, and
 the true one may not even be among those that were extended. So each effect is taken out, and whatever scores best in
-its place is refitted (a stepwise search that goes both ways: Efroymson, *Multiple regression analysis*, 1960). Where the
+its place is refitted (a stepwise search that goes both ways: Efroymson, *Multiple regression analysis*, 1960). Once the
 best set has changed, its other effects were chosen beside what has gone: they are searched again too.
 """
 
