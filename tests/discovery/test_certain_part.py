@@ -11,6 +11,7 @@ from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, Round, SearchResult, Verification
 from adaptive_flot.discovery.search.substance import excess_by_output, still_wrong
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
+from adaptive_flot.discovery.verdict.judge import judge
 from adaptive_flot.discovery.verdict.wording import reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model, Quantity, Scope
@@ -141,3 +142,15 @@ def test_what_all_sets_share_is_not_certain_while_an_output_stays_wrong(two_thin
     assert "Certain: flow_meter by constant." in reason_words(judged, result, (), ())
     said = reason_words(judged, result, (), (), wrong=["temperature"])
     assert "All that come near have flow_meter by constant; still wrong: temperature." in said and "Certain" not in said
+
+
+def test_two_dependences_of_one_quantity_are_no_two_causes(two_things: Discovery) -> None:
+    """One dependence of another shape would look the same. What stands at a site of its own is certain all the same."""
+    both = _search(two_things, ((LOSS, ("heat_loss", "time"), SENSOR), 0.0))
+    judged = judge(both)
+    assert judged.word == "class" and set(judged.members) == set(both.alternatives[0].names)
+    said = reason_words(judged, both, (), ())
+    assert "Certain: flow_meter by constant. heat_loss depends on fan_speed or time, or on both" in said
+    assert "can not tell these apart" not in said
+    apart = _search(two_things, ((LOSS, ("heating", "time"), SENSOR), 0.0))
+    assert judge(apart).word == "named"

@@ -14,14 +14,12 @@ from itertools import combinations
 from adaptive_flot.discovery.assessment.verification import changes, verify
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, SearchResult
-from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS
+from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, Name, same_site
 
 VISIBLE = 1.4
 """An output is wrong without the part: its error is so many times its noise, so half of its square is no noise."""
 REPAIRED = 0.8
 """Share of its squared error above the noise that the part removes from that output."""
-
-Name = tuple[str, str]
 
 
 def with_certain_part(problem: Problem, result: SearchResult, judged: Judgement) -> Judgement:
@@ -37,7 +35,7 @@ def with_certain_part(problem: Problem, result: SearchResult, judged: Judgement)
         return judged
     near = [best, *(a for a in result.alternatives if a is not best and judged.near(a))]
     known = dict(zip(best.names, best.known, strict=True))
-    sure = [n for n in best.names if all(n in a.names for a in near)]
+    sure = [n for n in best.names if all(n in a.names for a in near) and n not in same_site(best.names)]
     part = tuple(n for n in sure if _rests_on_an_output(problem, result, best, {n}))
     if named := tuple(n for n in part if known[n]):
         return replace(judged, word="named", part=named)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.assessment.verification import verify
@@ -16,6 +17,8 @@ MUCH = 0.1
 """Share of the error removed on fresh rows from which something is missing, though it may not be what was found."""
 LARGEST_CLASS = 3
 MOST_RIVALS = 5
+
+Name = tuple[str, str]
 
 
 def judge(result: SearchResult) -> Judgement:
@@ -56,7 +59,7 @@ def judge(result: SearchResult) -> Judgement:
         return Judgement("abstain", best, (), rivals, margin)
     best, rivals = named[0], _others(result, named[0])
     names = tuple(dict.fromkeys(tuple(sorted(a.names)) for a in named))
-    if len(names) == 1:
+    if len(names) == 1 and not same_site(best.names):
         return Judgement("named", best, (), rivals, margin)
     members = tuple(dict.fromkeys(n for group in names for n in group))
     if any(a.delta_bic > -LEAST_MARGIN for a in named):  # one that explains nothing comes close: so does the best
@@ -64,6 +67,15 @@ def judge(result: SearchResult) -> Judgement:
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
+
+
+def same_site(names: Sequence[Name]) -> tuple[Name, ...]:
+    """The names (site, driver) that share their site with another of these.
+
+    Two dependences of one quantity are no two causes for sure: one of another shape looks the same.
+    """
+    sites = [site for site, _ in names]
+    return tuple(n for n in names if sites.count(n[0]) > 1)
 
 
 def held_up(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[SearchResult, Judgement]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
+from adaptive_flot.discovery.verdict.judge import same_site
 
 
 def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
@@ -88,15 +89,20 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
         said = f"The model lacks one of these, which this record can not tell apart: {members}."
         return f"{said} {_beside(judgement)}".rstrip()
-    sure = [n for n in judgement.best.names if all(n in a.names for a in sets)]
-    rest = "; ".join(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in sure) for a in sets)
-    first = "The model lacks several effects. "
-    if sure:
-        shared = ", ".join(f"{s} by {d}" for s, d in sure)
-        first += (
-            f"All that come near have {shared}; still wrong: {', '.join(wrong)}. " if wrong else f"Certain: {shared}. "
-        )
-    return f"{first}This record can not tell these apart, of which the first is kept: {rest}."
+    shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
+    either = [n for n in same_site(judgement.best.names) if n in shared]
+    words = ["The model lacks several effects."]
+    if sure := ", ".join(f"{s} by {d}" for s, d in shared if (s, d) not in either):
+        begun, ended = ("All that come near have", f"; still wrong: {', '.join(wrong)}") if wrong else ("Certain:", "")
+        words.append(f"{begun} {sure}{ended}.")
+    for site in dict.fromkeys(s for s, _ in either):
+        drivers = " or ".join(d for s, d in either if s == site)
+        words.append(f"{site} depends on {drivers}, or on both: one dependence of another shape would look the same.")
+    rest = [" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in shared) for a in sets]
+    if any(rest):
+        listed = "; ".join(r or "nothing more" for r in rest)
+        words.append(f"This record can not tell these apart, of which the first is kept: {listed}.")
+    return " ".join(words)
 
 
 def _beside(judgement: Judgement) -> str:
