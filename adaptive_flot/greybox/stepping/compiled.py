@@ -102,9 +102,7 @@ def load_library(name: str, source: str, flags: Sequence[str], load: Callable[[P
         No compiler, it fails, or the library can not be kept, trusted or loaded.
     """
     compiler = find_compiler()
-    content = "\0".join([source, compiler.identity, *flags])
-    digest = hashlib.sha256(content.encode()).hexdigest()[:24]
-    library = cache_folder() / f"{name}-{digest}.so"
+    library = _place(name, source, flags, compiler)
     if os.path.lexists(library):
         _check_safe(library)
         # an unfinished library is never there, but a disk may have lost part of one
@@ -116,6 +114,19 @@ def load_library(name: str, source: str, flags: Sequence[str], load: Callable[[P
         return load(library)
     except (RuntimeError, OSError) as error:
         raise CompileError(f"{library} can not be loaded ({_last_line(str(error))})") from error
+
+
+def is_kept(name: str, source: str, flags: Sequence[str]) -> bool:
+    """Whether C source was compiled before, by the compiler that would be asked now."""
+    try:
+        return os.path.lexists(_place(name, source, flags, find_compiler()))
+    except CompileError:
+        return False
+
+
+def _place(name: str, source: str, flags: Sequence[str], compiler: Compiler) -> Path:
+    content = "\0".join([source, compiler.identity, *flags])
+    return cache_folder() / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:24]}.so"
 
 
 def _check_safe(path: Path, levels: int = CACHE_LEVELS) -> None:

@@ -20,9 +20,11 @@ from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.nodes import NodeStepper
 from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.greybox.stepping.whole_record import library
 from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
 from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord
-from adaptive_flot.greybox.stepping.whole_record.source import record_source
+from adaptive_flot.greybox.stepping.whole_record.source import kernel_source
+from adaptive_flot.greybox.stepping.whole_record.tape import tape_of
 
 PROBLEM = compiler_problem()
 needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be compiled here: {PROBLEM}")
@@ -33,8 +35,10 @@ ROWS = 40
 def own_cache(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(compiled, "cache_folder", lambda: libraries)
     monkeypatch.setattr(stepper, "LEAST_STEPS", 1)
+    library._library.cache_clear()
     yield
     compiled._compiler.cache_clear()
+    library._library.cache_clear()
 
 
 def equations(m: Scope) -> None:
@@ -125,6 +129,41 @@ def test_every_form_gives_the_numbers_of_the_plain_step(name: str) -> None:
 
 
 @needs_compiler
+@pytest.mark.parametrize("name", FORMS)
+def test_a_tape_and_the_compiled_equations_give_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So nothing depends on when the compiler was thought worth it."""
+    extended = replace(SMALL.with_effects([effect_of(name)]), record_code=True)
+    (x0, u), p = record(extended), extended.parameter_values
+    wrt, gradient = [q.name for q in extended.parameters[-3:]], np.eye(len(x0), 5)
+    code = WholeRecord(extended, 1.0, 1, wrt)
+    monkeypatch.setattr(library, "is_kept", lambda *_: False)
+    by_tape = code(x0, u, p, 5.0, gradient)
+    assert code._compiled is None
+    monkeypatch.setattr(library, "WORTH_COMPILING", 0)
+    again = code(x0, u, p, 5.0, gradient)
+    assert code._compiled is not None and set(code._compiled) == {"rates", "ends", "weights"}
+    for what in ("states", "outputs", "signals", "gradients", "last_gradient"):
+        np.testing.assert_array_equal(getattr(again, what), getattr(by_tape, what))
+
+
+@needs_compiler
+def test_a_model_is_compiled_once_it_has_run_often_and_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    x0, u = record(SMALL)
+    p = SMALL.parameter_values
+    code = WholeRecord(replace(SMALL, name="often"), 0.9, 1, None)
+    monkeypatch.setattr(library, "WORTH_COMPILING", 2 * ROWS)
+    kept = iter([False, True])
+    monkeypatch.setattr(library, "is_kept", lambda *_: next(kept))
+    code(x0, u, p)
+    assert code._compiled is None
+    code(x0, u, p)
+    assert code._compiled
+    later = WholeRecord(replace(SMALL, name="later"), 0.9, 1, None)
+    later(x0, u[:1], p)
+    assert later._compiled == code._compiled, "what is kept is used from the first run on"
+
+
+@needs_compiler
 def test_the_cell_gives_the_numbers_of_the_plain_step(model: Model) -> None:
     x0, u = record(model)
     compare(model, Stepper(model, 1.0), Stepper(replace(model, record_code=True), 1.0), u, x0)
@@ -186,9 +225,9 @@ def test_knots_are_numbers_beside_the_code() -> None:
 
     def source(reference: float) -> tuple[str, list[float]]:
         effect = Effect("place", "drive", "power", settings={"reference": reference})
-        made = SMALL.with_effects([effect])
-        sizes = len(made.states), len(made.inputs), len(made.outputs), len(made.signals)
-        return record_source(kernels(made, ("gain",), True), sizes, 1)
+        made = kernels(SMALL.with_effects([effect]), ("gain",), True)
+        tapes = {name: tape_of(getattr(made, name)) for name in ("rates", "ends", "weights")}
+        return kernel_source(tapes), [float(v) for tape in tapes.values() for v in tape.memory]
 
     (one, numbers), (other, others) = source(1.5), source(1.7)
     assert one == other

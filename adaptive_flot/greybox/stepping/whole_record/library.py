@@ -1,24 +1,32 @@
-"""Whole records in one call of machine code."""
+"""Whole records in one call of machine code, which is the same for every model."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, load_library
+from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, is_kept, load_library
 from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
-from adaptive_flot.greybox.stepping.whole_record.source import record_source
+from adaptive_flot.greybox.stepping.whole_record.source import RECORD_SOURCE, kernel_source
+from adaptive_flot.greybox.stepping.whole_record.tape import Tape, tape_of
 
-_FLAGS = (*FLAGS, "-ftree-vectorize")
+_FLAGS = ("-O2", "-ftree-vectorize", "-fno-gcse", "-fno-crossjumping", "-ffp-contract=off", "-fPIC", "-shared")
+"""The last but four keep a jump of its own for each operation, which the processor then foresees."""
+_KERNEL_FLAGS = FLAGS
+WORTH_COMPILING = 12_000
+"""Steps of a model from which its own equations are compiled. A step by tape takes some 1 ns an operation longer, and
+the compiler 90 us an operation; an operation stands in four evaluations of a step."""
 MOST_OPERATIONS = 20_000
-"""Operations of a step above which the compiler takes longer than it saves."""
+"""Operations of a step above which its tape takes longer to write than it saves."""
 _MATRICES = 11
 """Matrices (nx, q) of working memory."""
 
@@ -40,6 +48,30 @@ class Rows:
     last_gradient: FloatArray
 
 
+class _Tape(ctypes.Structure):
+    """A tape as the library sees it."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in ("code", "memory", "arguments", "results", "compiled")]
+
+    def __init__(self, tape: Tape, memory: FloatArray, compiled: int | None) -> None:
+        super().__init__(*(a.ctypes.data for a in (tape.code, memory, tape.arguments, tape.results)), compiled)
+
+
+_SIZES = ("nx", "nu", "ny", "ns", "np", "nr", "rx", "ne")
+_TABLES = ("decays", "rate_rows", "rate_columns", "end_rows", "end_columns")
+_TAPES = ("rates", "ends", "weights")
+
+
+class _Kernels(ctypes.Structure):
+    """Kernels as the library sees them."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in _SIZES),
+        *((name, ctypes.c_void_p) for name in _TABLES),
+        *((name, _Tape) for name in _TAPES),
+    ]
+
+
 class WholeRecord:
     """The fast step of a model over records, in machine code.
 
@@ -57,22 +89,26 @@ class WholeRecord:
     Raises
     ------
     CompileError
-        It can not be compiled or loaded.
+        The library can not be compiled or loaded, or the model has an operation that it does not know.
     """
 
     def __init__(self, model: Model, dt: float | None, substeps: int, wrt: Sequence[str] | None) -> None:
-        self._dt, self._substeps, self._wrt = dt, substeps, None if wrt is None else tuple(wrt)
+        self._dt, self._substeps = dt, substeps
         counts = (len(q) for q in (model.states, model.inputs, model.outputs, model.signals))
         self._nx, nu, self._ny, self._ns = counts
         self._width, self._np = nu + (dt is None), len(model.parameters)
-        made = kernels(model, self._wrt, dt is not None)
+        made = kernels(model, None if wrt is None else tuple(wrt), dt is not None)
         operations = made.rates.n_instructions() + made.ends.n_instructions()
         if operations > MOST_OPERATIONS:
-            raise CompileError(f"{model.name} has {operations} operations; the compiler would take too long")
-        sizes = self._nx, nu, self._ny, self._ns
-        source, numbers = record_source(made, sizes, len(self._wrt or ()))
-        self._numbers = np.array(numbers or [0.0])
-        self._run = load_library("record", source, _FLAGS, _open)
+            raise CompileError(f"{model.name} has {operations} operations; their tape would take too long to write")
+        rate, end = made.rates_entries, made.ends_entries
+        jacobians = len(rate), sum(row < self._nx for row, _ in rate), len(end)
+        self._sizes = self._nx, nu, self._ny, self._ns, self._np, *jacobians
+        self._tables = _table([*made.decays, False], np.uint8), *_columns(rate), *_columns(end)
+        self._tapes = {name: tape_of(getattr(made, name)) for name in _TAPES}
+        self._run = _library()
+        self._compiled: dict[str, int] | None = None
+        self._steps = 0
 
     def __call__(
         self,
@@ -115,7 +151,12 @@ class WholeRecord:
         work = np.empty(_MATRICES * self._nx * q)
         wanted: list[FloatArray | None] = [made.states, made.outputs, made.signals]
         wanted += [None if plain else made.gradients, made.state_gradients if anew else None]
+        compiled = self._machine_code(rows)
+        memories = {name: tape.memory.copy() for name, tape in self._tapes.items()}  # so that threads may run at once
+        tapes = [_Tape(tape, memories[name], compiled.get(name)) for name, tape in self._tapes.items()]
+        given = _Kernels(*self._sizes, *(table.ctypes.data for table in self._tables), *tapes)
         self._run(
+            ctypes.byref(given),
             rows,
             self._substeps,
             self._dt or 0.0,
@@ -126,7 +167,6 @@ class WholeRecord:
             _pointer(u),
             _pointer(p),
             self._np if p.ndim == 2 else 0,
-            _pointer(self._numbers),
             int(anew),
             *map(_pointer, wanted),
             _pointer(made.last_state),
@@ -134,6 +174,19 @@ class WholeRecord:
             _pointer(work),
         )
         return made
+
+    def _machine_code(self, rows: int) -> Mapping[str, int]:
+        """Where the compiled tapes are; none before the model has run so often that the compiler is worth it."""
+        first = not self._steps
+        self._steps += rows * self._substeps
+        if self._compiled is None and (first or self._steps >= WORTH_COMPILING):
+            source = kernel_source(self._tapes)
+            if self._steps >= WORTH_COMPILING or is_kept("kernels", source, _KERNEL_FLAGS):
+                try:
+                    self._compiled = load_library("kernels", source, _KERNEL_FLAGS, _open_kernels)
+                except CompileError:
+                    self._compiled = {}
+        return self._compiled or {}
 
 
 def whole_record(model: Model, interval: Interval, wrt: tuple[str, ...] | None) -> WholeRecord | None:
@@ -144,14 +197,35 @@ def whole_record(model: Model, interval: Interval, wrt: tuple[str, ...] | None) 
         return None
 
 
+def _table(values: Sequence[int], kind: type[np.integer[Any]]) -> NDArray[np.integer[Any]]:
+    return np.ascontiguousarray(values, dtype=kind)
+
+
+def _columns(entries: Sequence[tuple[int, int]]) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]]]:
+    """Rows and columns of the entries of a Jacobian."""
+    rows, columns = ([e[k] for e in entries] for k in range(2))
+    return _table(rows, np.int16), _table(columns, np.int16)
+
+
 def _pointer(array: FloatArray | None) -> ctypes.c_void_p:
     return ctypes.c_void_p(None if array is None else array.ctypes.data)
+
+
+@lru_cache(maxsize=1)
+def _library() -> Any:
+    return load_library("record", RECORD_SOURCE, _FLAGS, _open)
 
 
 def _open(library: Path) -> Any:
     run = ctypes.CDLL(str(library)).run
     pointer, whole, real = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-    run.argtypes = [whole, whole, real, real, *[pointer] * 2, whole, *[pointer] * 2, whole, pointer, whole]
+    run.argtypes = [pointer, whole, whole, real, real, *[pointer] * 2, whole, *[pointer] * 2, whole, whole]
     run.argtypes += [pointer] * 8
     run.restype = None
     return run
+
+
+def _open_kernels(library: Path) -> dict[str, int]:
+    """Addresses of the functions of a library, which stays loaded."""
+    opened = ctypes.CDLL(str(library))
+    return {name: int(ctypes.cast(getattr(opened, name), ctypes.c_void_p).value or 0) for name in _TAPES}
