@@ -157,14 +157,12 @@ def heed_report(state: State) -> State:
     """Take a name back where the held-out rows contradict it."""
     problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
     error = report_errors(problem, before, after, state.report_record)
-    record = problem.record if state.report_record is None else state.report_record
-    noise = noise_from_row_to_row(record.outputs, before.model, error)
+    noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
     against = contradiction(judgement, error, noise)
     if not against and state.report_record is None:
-        at_the_end = changes(last_report_rows(problem), before, after, "report")
-        against = contradiction_at_the_end(
-            judgement, at_the_end, noise_from_row_to_row(record.outputs, before.model, at_the_end)
-        )
+        last = last_report_rows(problem)
+        at_the_end = changes(last, before, after, "report")
+        against = contradiction_at_the_end(judgement, at_the_end, noise_from_row_to_row(last, before.model, at_the_end))
     if against:
         judgement = replace(judgement, word="abstain", members=(), part=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""

@@ -13,6 +13,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,
     last_report_rows,
+    noise_from_row_to_row,
     unexplained,
 )
 from adaptive_flot.greybox import Effect
@@ -98,6 +99,23 @@ def test_the_stage_turns_a_contradicted_name_into_an_abstention(draught: Discove
     assert heed_report(state).judged.word == "named"
     exchanged = heed_report(replace(state, before=draught.after, after=draught.before))
     assert exchanged.judged.word == "abstain" and "larger" in exchanged.contradiction
+
+
+def test_noise_that_grows_with_the_value_counts_as_it_is_on_the_report_rows(draught: Discovery) -> None:
+    """The median of the differences is that of the many small values; the error is that of the few large ones."""
+    assert draught.problem is not None and draught.before is not None
+    problem, model, rng = draught.problem, draught.before.model, np.random.default_rng(5)
+    weights = np.where(np.arange(len(problem.record)) % 40 < 32, 0.05, 2.2)[:, None]
+    noise = 0.3 * weights * rng.standard_normal((len(problem.record), 1))
+    outputs = problem.record.outputs.copy()
+    outputs[:, problem.columns] = 20.0 * weights + noise
+    grown = replace(problem, record=replace(problem.record, outputs=outputs), weights=weights)
+    change = replace(_change(1.0, 1.0, 0.0, 0.0), output=model.outputs[problem.columns[0]].name)
+    found = noise_from_row_to_row(grown, model, [change])
+    report = problem.rows("report")
+    assert found == pytest.approx(np.sqrt(np.mean(noise[report] ** 2)), rel=0.25)
+    constant = noise_from_row_to_row(replace(grown, weights=np.ones_like(weights)), model, [change])
+    assert constant < 0.2 * found
 
 
 def test_none_asks_for_a_residual_at_the_level_of_a_noise_that_no_model_has_fitted() -> None:

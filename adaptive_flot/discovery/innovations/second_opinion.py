@@ -101,8 +101,8 @@ def _told(state: State, search: Search, told: Told) -> State:
     members = tuple((h.site, h.driver) for _, h in told.open)
     judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
     error = report_errors(problem, before, after, state.report_record)
-    record = problem.record if state.report_record is None else state.report_record
-    against = contradiction(judgement, error, noise_from_row_to_row(record.outputs, before.model, error))
+    noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
+    against = contradiction(judgement, error, noise)
     if against or (state.judged.word in TELLS and not _smaller(error, state.error)):
         return _kept(state, told)
     _, result = state.searched

@@ -15,6 +15,7 @@ import numpy as np
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
 WORSE = 0.02
@@ -103,8 +104,21 @@ def last_report_rows(problem: Problem) -> Problem:
     return replace(problem, splits=splits)
 
 
-def noise_from_row_to_row(outputs: FloatArray, model: Model, changes: Sequence[OutputChange]) -> FloatArray:
-    """Noise of each changed output (m,) from its differences from row to row, which needs no model."""
-    columns = [model.index("outputs", c.output) for c in changes]
-    noise: FloatArray = np.nan_to_num(noise_by_differences(outputs[:, columns]))
-    return noise
+def noise_from_row_to_row(
+    problem: Problem, model: Model, changes: Sequence[OutputChange], report: Dataset | None = None
+) -> FloatArray:
+    """Noise of each changed output (m,) on the report rows, from its differences from row to row.
+
+    Where the noise grows with the value, as the weights w of the problem say, its root mean square over these rows::
+
+        s_y / w sqrt(mean of w^2)        with s_y / w the noise of y / w by differences
+
+    A record of its own that reports has no weights.
+    """
+    if report is not None:
+        outputs = report.outputs[:, [model.index("outputs", c.output) for c in changes]]
+        return np.asarray(np.nan_to_num(noise_by_differences(outputs)))
+    columns = [problem.columns.index(model.index("outputs", c.output)) for c in changes]
+    weights = problem.weights[:, columns]
+    size = np.sqrt(np.nanmean(weights[problem.rows("report")] ** 2, axis=0))
+    return np.asarray(np.nan_to_num(noise_by_differences(problem.measured[:, columns] / weights) * size))
