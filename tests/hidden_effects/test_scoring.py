@@ -11,7 +11,7 @@ import pytest
 from adaptive_flot.errors import DataError
 from benchmarks.hidden_effects.score.commands import run_command
 from benchmarks.hidden_effects.score.figures import method_command
-from benchmarks.hidden_effects.score.outcome import classify
+from benchmarks.hidden_effects.score.outcome import classify, effects_told
 from benchmarks.hidden_effects.score.results import removed_share, result_row, results_table
 from benchmarks.hidden_effects.score.summary import as_json, confusion, rate
 from benchmarks.hidden_effects.score.verdict import SubmittedVerdict, read_verdict
@@ -87,6 +87,25 @@ def _verdict(kind: str, *names: dict[str, str]) -> SubmittedVerdict:
 def test_outcomes(answer: dict[str, Any], verdict: SubmittedVerdict, outcome: str) -> None:
     """Each kind of verdict against each kind of truth."""
     assert classify(answer, verdict) == outcome
+
+
+@pytest.mark.parametrize(
+    ("verdict", "told"),
+    [
+        (_verdict("named", BUBBLE, WASH), 2),
+        (_verdict("named", BUBBLE), 1),
+        (_verdict("named", BUBBLE, WASH, OTHER), 0),
+        (_verdict("class", BURST, BUBBLE, OTHER, WASH), 2),
+        (_verdict("class", BURST, BUBBLE), 1),
+        (_verdict("class", BURST, BUBBLE, OTHER, WASH, *({"site": f"s{k}", "driver": "time"} for k in range(3))), 0),
+        (_verdict("unnamed", WASH), 1),
+        (_verdict("abstain", WASH), 0),
+        (_verdict("none"), 0),
+    ],
+)
+def test_how_many_of_two_effects_are_told(verdict: SubmittedVerdict, told: int) -> None:
+    """Three names for each effect at most, and none of those said for sure may be wrong."""
+    assert effects_told(PAIR, verdict) == told
 
 
 def test_removed_error_is_measured_against_the_benchmarks_own_base() -> None:

@@ -67,6 +67,19 @@ def classify(answer: Answer, verdict: SubmittedVerdict) -> str:
     return _class(answer, said) if verdict.verdict == "class" else _named(answer, said)
 
 
+def effects_told(answer: Answer, verdict: SubmittedVerdict) -> int:
+    """How many of the hidden effects are told: a right name of each among those given, at most three an effect.
+
+    None where one of several names that are said for sure is wrong.
+    """
+    said = {n.pair() for n in (verdict.members if verdict.verdict == "class" else verdict.effects)}
+    told = sum(bool(right_names(effect) & said) for effect in answer["effects"])
+    if verdict.verdict == "named":
+        return 0 if _named(answer, list(said)) == "wrong_name" else told
+    few = len(said) <= LARGEST_CLASS * len(answer["effects"])
+    return told if few and verdict.verdict in ("class", "unnamed") else 0
+
+
 def right_names(effect: dict[str, Any]) -> set[Pair]:
     """Every name of one hidden effect."""
     return {(effect["site"], effect["driver"]), *((a["site"], a["driver"]) for a in effect["accepted"])}

@@ -12,7 +12,7 @@ import pandas as pd
 from adaptive_flot.files import replace_file
 from benchmarks.hidden_effects.generate.folder import load_answers
 from benchmarks.hidden_effects.generate.record import BIN
-from benchmarks.hidden_effects.score.outcome import Answer, classify
+from benchmarks.hidden_effects.score.outcome import Answer, classify, effects_told
 from benchmarks.hidden_effects.score.verdict import SubmittedVerdict, read_verdict
 
 UNDECIDED = ("abstain", "insufficient")
@@ -95,6 +95,7 @@ def result_row(answer: Answer, verdict: SubmittedVerdict | str, meta: dict[str, 
         "verdict": readable.verdict if readable else status,
         "said": "+".join(f"{n.site}:{n.driver}" for n in said),
         "outcome": outcome,
+        "effects_told": 0 if readable is None else effects_told(answer, readable),
         "removed_share": removed_share(answer, readable),
         "output": main_output(answer) or "",
         "seconds": meta.get("seconds", math.nan),
