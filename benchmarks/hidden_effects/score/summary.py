@@ -53,6 +53,7 @@ def rates(table: pd.DataFrame) -> list[Rate]:
     named = table["verdict"] == "named"
     wrong = outcome == "wrong_name"
     alarm = outcome == "false_alarm"
+    told = table["effects_told"][category == "pair"]
     return [
         rate("wrong name, of records with an effect", wrong[hidden], "<= 2.4 %"),
         rate("false alarm, of controls (none, drift)", alarm[controls], "<= 5 %"),
@@ -70,7 +71,7 @@ def rates(table: pd.DataFrame) -> list[Rate]:
             ">= 50 %",
         ),
         rate("pairs: both named", (outcome == "right")[category == "pair"]),
-        rate("pairs: one effect told at least", (table["effects_told"] > 0)[category == "pair"], ">= 80 %"),
+        rate("pairs: one effect told at least", told > 0, ">= 80 %"),
         rate("pairs: wrong name", wrong[category == "pair"]),
         rate("out of catalogue: wrong name", wrong[category == "beyond"]),
         rate("unexcited: wrong name or false alarm", (wrong | alarm)[category == "unexcited"]),
