@@ -53,7 +53,7 @@ def rates(table: pd.DataFrame) -> list[Rate]:
     named = table["verdict"] == "named"
     wrong = outcome == "wrong_name"
     alarm = outcome == "false_alarm"
-    told = table["effects_told"][category == "pair"]
+    told, word = (table[c][category == "pair"] for c in ("effects_told", "verdict"))
     return [
         rate("wrong name, of records with an effect", wrong[hidden], "<= 2.4 %"),
         rate("false alarm, of controls (none, drift)", alarm[controls], "<= 5 %"),
@@ -65,11 +65,7 @@ def rates(table: pd.DataFrame) -> list[Rate]:
         rate("false alarm: nothing hidden", alarm[category == "none"]),
         rate("false alarm: drift of n, C", alarm[category == "drift"]),
         rate("drift of n, C called coalescence or growth exponent", (outcome == "tolerated")[category == "drift"]),
-        rate(
-            "pairs: both named, or in a class of three names each",
-            (table["effects_told"] == 2)[category == "pair"],
-            ">= 50 %",
-        ),
+        rate("pairs: both named, or in a class of three names each", (told == 2) & (word != "unnamed"), ">= 50 %"),
         rate("pairs: both named", (outcome == "right")[category == "pair"]),
         rate("pairs: one effect told at least", told > 0, ">= 80 %"),
         rate("pairs: wrong name", wrong[category == "pair"]),
