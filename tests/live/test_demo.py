@@ -19,7 +19,10 @@ PATIENCE_S = 180
 
 
 def test_one_command_starts_plant_link_and_page(tmp_path: Path) -> None:
-    code = f"from pathlib import Path; from adaptive_flot.live.demo import main; main(Path('demo'), {free_port()}, 0)"
+    # a shell that starts the tests in the background lets them ignore Ctrl-C, and with them all that they start
+    heeded = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    start = f"from adaptive_flot.live.demo import main; main(Path('demo'), {free_port()}, 0)"
+    code = f"{heeded}; from pathlib import Path; {start}"
     demo = subprocess.Popen(
         [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path.cwd())!r}); {code}"],
         cwd=tmp_path,
@@ -27,6 +30,7 @@ def test_one_command_starts_plant_link_and_page(tmp_path: Path) -> None:
         text=True,
     )
     said: list[str] = []
+    children: list[psutil.Process] = []
     assert demo.stdout is not None
     reading = threading.Thread(target=lambda out=demo.stdout: said.extend(iter(out.readline, "")))
     reading.start()
@@ -42,8 +46,9 @@ def test_one_command_starts_plant_link_and_page(tmp_path: Path) -> None:
         demo.send_signal(signal.SIGINT)
         assert demo.wait(PATIENCE_S) == 0
     finally:
-        if demo.poll() is None:
-            demo.kill()
+        if demo.poll() is None:  # what it started holds its output open, and would let the reading wait for ever
+            for process in [*psutil.Process(demo.pid).children(recursive=True), psutil.Process(demo.pid)]:
+                process.kill()
         reading.join()
         demo.stdout.close()
     assert not psutil.wait_procs(children, PATIENCE_S)[1], "nothing outlives the command"
