@@ -20,11 +20,12 @@ from adaptive_flot.greybox.stepping.whole_record.source import RECORD_SOURCE, ke
 from adaptive_flot.greybox.stepping.whole_record.tape import Tape, tape_of
 
 _FLAGS = ("-O2", "-ftree-vectorize", "-fno-gcse", "-fno-crossjumping", "-ffp-contract=off", "-fPIC", "-shared")
-"""The last but four keep a jump of its own for each operation, which the processor then foresees."""
-_KERNEL_FLAGS = FLAGS
+"""Without `gcse` and `crossjumping` each operation keeps a jump of its own, which the processor then foresees."""
+_KERNEL_FLAGS = (*FLAGS, "-fno-builtin-pow")
+"""A compiler that knows a power writes it as a product, whose last bit may be another."""
 WORTH_COMPILING = 12_000
 """Steps of a model from which its own equations are compiled. A step by tape takes some 1 ns an operation longer, and
-the compiler 90 us an operation; an operation stands in four evaluations of a step."""
+the compiler 50 us an operation; an operation stands in four evaluations of a step."""
 MOST_OPERATIONS = 20_000
 """Operations of a step above which its tape takes longer to write than it saves."""
 _MATRICES = 11
