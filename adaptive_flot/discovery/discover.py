@@ -21,11 +21,13 @@ from adaptive_flot.discovery.stages import (
     fit_without_report,
     heed_report,
     judge_alternatives,
+    let_feed_wander,
     plan_test,
     screen_record,
     search_at_once,
     search_one_by_one,
     split_rows,
+    tell_wandering,
 )
 from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import conclude
@@ -109,8 +111,10 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     fit_model_as_it_is,
     check_explained,
     examine_residual,
+    let_feed_wander,
     search_one_by_one,
     search_at_once,
+    tell_wandering,
     compare_with_common_nuisance,
     judge_alternatives,
     fit_without_report,

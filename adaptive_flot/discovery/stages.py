@@ -10,8 +10,9 @@ import numpy as np
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
 from adaptive_flot.discovery.assessment.verification import changes
+from adaptive_flot.discovery.assessment.wandering import course_words, needed, rows_of_block, wandering, with_course
 from adaptive_flot.discovery.candidates.responses import Responses
-from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
+from adaptive_flot.discovery.fitting.base_fit import prepare, split_finer, split_record
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
@@ -21,6 +22,7 @@ from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.discovery.results import Judgement, State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
+from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
@@ -94,6 +96,27 @@ def examine_residual(state: State) -> State:
     return replace(state, detection=detect(*state.fitted))
 
 
+def let_feed_wander(state: State) -> State:
+    """Give a feed that nobody measures a course of its own, where that explains more than any effect."""
+    problem, base = state.fitted
+    if state.responses is None or problem.time_is_up:
+        return state
+    state.progress("look for a feed that wanders")
+    responses = state.responses
+    course = wandering(problem, base, scorer_of(problem, base, responses)[0], responses)
+    if course is None:
+        return state
+    cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
+    problem = split_finer(problem, cycle, rows_of_block(course, problem.record.dt))
+    for _ in range(2):  # once more along the fit that has it
+        problem = replace(problem, wander=with_course(problem, course, responses))
+        fitted = Fitter(problem).fit(base.model, base.names, like=base, rounds=2)
+        if fitted is None:
+            return state
+        base, responses = fitted, Responses(problem, fitted)
+    return replace(state, problem=problem, base=base, responses=responses)
+
+
 def search_one_by_one(state: State) -> State:
     """Add one effect after the other, as long as each brings evidence and substance; confirm the best."""
     problem, base = state.fitted
@@ -110,6 +133,20 @@ def search_at_once(state: State) -> State:
         return state
     problem, result = search_jointly(problem, result, processes=state.processes, progress=state.progress)
     return replace(state, problem=problem, base=result.base, search=result)
+
+
+def tell_wandering(state: State) -> State:
+    """Say that a feed wanders, where the best alternative needs it."""
+    problem, result = state.searched
+    wander = problem.wander
+    if wander is None:
+        return state
+    fit = result.alternatives[0].fit if result.alternatives else result.base
+    if needed(problem, fit):
+        unit = next(site.unit for site in fit.model.sites if site.name == wander.site) or ""
+        return replace(state, wandering=course_words(wander, unit))
+    said = f"a course of {wander.site} was estimated beside every alternative; beside the best one it is not needed"
+    return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
 def compare_with_common_nuisance(state: State) -> State:

@@ -29,7 +29,9 @@ def outcome(answer: Answer, verdict: SubmittedVerdict) -> str:
         return "tolerated"
     if verdict.verdict == "class" and len(members) < len(verdict.members) and not answer["effects"]:
         return "tolerated"
-    return classify(answer, verdict.model_copy(update={"effects": effects, "members": members}))
+    ended = classify(answer, verdict.model_copy(update={"effects": effects, "members": members}))
+    # a class says that one of its members is off: with one that is, it is true, though it tells nothing of the effect
+    return "tolerated" if ended == "wrong_class" and len(members) < len(verdict.members) else ended
 
 
 def results(folder: Path, label: str) -> pd.DataFrame:

@@ -49,6 +49,7 @@ def answer(*effects: tuple[str, str]) -> dict[str, Any]:
             "right_class",
         ),
         (TRUTH, said("class", ("burst_rate", "level"), ("gas_slip", "level")), "wrong_class"),
+        (TRUTH, said("class", ("burst_rate", "level"), ("settling", "constant")), "tolerated"),
         (TRUTH, said("abstain"), "abstained"),
     ],
 )

@@ -17,7 +17,7 @@ from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.linear_run import linear_run
-from adaptive_flot.greybox.stepping.nodes import IntArray, NodeStepper, substeps
+from adaptive_flot.greybox.stepping.nodes import IntArray, Nodes, NodeStepper, substeps
 from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
@@ -60,21 +60,28 @@ class Responses:
         probes = [Effect(s, "constant", "shift") for s in self.sites]
         extended = model.with_effects([e for e in probes if e.label not in has])
         p0 = np.array([q.value for q in extended.parameters])
-        record, self._nodes = problem.record, problem.nodes
-        stepper = Stepper(extended, record.dt)
-        if self._nodes is None and stepper.substeps > MOST_UNROLLED:
-            self._nodes = substeps(record, stepper.substeps)
-        if self._nodes is not None:
-            stepper = NodeStepper(extended)
-        self._steps = record.inputs[1:] if self._nodes is None else self._nodes.inputs
-        run = stepper.simulate(fit.initial_state, self._steps, p0, float(record.time[0]))
-        self._at = np.vstack([fit.initial_state, run.states])
+        stepper = self._simulated(extended, problem.nodes, p0)
+        if not np.isfinite(self._at).all():  # a fit that was made at every row may be too fast for coarser steps
+            stepper = self._simulated(extended, None, p0)
         self.states = self._spread(self._at)
         names = (*fit.names, *(e.parameter("amplitude") for e in probes))
         self._jacobians(stepper, names, p0)
         self._q = len(fit.names)
         self._describe(extended, p0)
         self.nuisance = self._nuisance()
+
+    def _simulated(self, model: Model, nodes: Nodes | None, p: FloatArray) -> Stepper:
+        """The stepper of the run, at these nodes or by the model's own steps, and what it came to."""
+        record, stepper = self.problem.record, Stepper(model, self.problem.record.dt)
+        if nodes is None and stepper.substeps > MOST_UNROLLED:
+            nodes = substeps(record, stepper.substeps)
+        self._nodes = nodes
+        if nodes is not None:
+            stepper = NodeStepper(model)
+        self._steps = record.inputs[1:] if nodes is None else nodes.inputs
+        run = stepper.simulate(self.fit.initial_state, self._steps, p, float(record.time[0]))
+        self._at = np.vstack([self.fit.initial_state, run.states])
+        return stepper
 
     def _jacobians(self, stepper: Stepper, names: tuple[str, ...], p: FloatArray) -> None:
         time = self.problem.record.time if self._nodes is None else self._nodes.times

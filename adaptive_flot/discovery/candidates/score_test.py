@@ -12,6 +12,10 @@ Philos. Soc.* 44 (1948) 50; with nuisance parameters (M) Neyman's C(alpha), *Pro
 M takes out what adapted parameters and initial state can absorb: that is no evidence. The noise model is that of the
 residual after *everything in the catalogue at once* (a ridge fit), so that it is neither blind to coloured noise nor
 soaked up by the very effect that is looked for.
+
+Where a disturbance wanders (see `record.wander`), its course u ~ N(0, I) is free as well: Z has the responses to it,
+and for each component of u a further row, with 1 in Z, 0 in X, and -u in e. So M takes out what the course can absorb,
+at the price of its prior.
 """
 
 from __future__ import annotations
@@ -82,16 +86,20 @@ class Scorer:
         profiles = [profile for c in candidates for v in c.variants for profile in v.profiles]
         self._reached = with_rows_before(self.rows)
         weighted = self._weighted_responses(profiles)
-        nuisance = (responses.nuisance / problem.weights[:, :, None])[self._reached]
+        nuisance = responses.nuisance
+        if problem.wander is not None:
+            nuisance = np.concatenate([nuisance, problem.wander.responses], axis=2)
+        nuisance = (nuisance / problem.weights[:, :, None])[self._reached]
         residual = without_spikes(fit.residual(problem) / problem.weights)
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in profiles])
         self.noise = self._clean_noise(residual, weighted, nuisance)
         e = self.noise.whiten(residual)
         present = np.isfinite(e) & self.rows[:, None]
         self._present = present[self._reached]
-        self._output = np.nonzero(self._present)[1]  # of each value that is present
-        base, _ = np.linalg.qr(self.noise.whiten(nuisance)[self._present])
-        self._base = base
+        self._rows_of_course = len(fit.course)
+        output = np.nonzero(self._present)[1]
+        self._output = np.concatenate([output, np.full(len(fit.course), -1)])  # of each value that is present
+        self._base = base = np.linalg.qr(self._with_prior(self._whitened(nuisance)))[0]
         columns = self._whitened(weighted)
         del weighted  # each is 150 MB for a whole catalogue
         columns *= self._size  # from here on in standard deviations of the prior
@@ -101,7 +109,7 @@ class Scorer:
             columns[part] -= base[part] @ along
         left = np.einsum("ij,ij->j", columns, columns)
         columns[:, left < ABSORBED**2 * size] = 0.0  # what is left is rounding
-        self.residual = self._project(np.clip(e[present], -1e3, 1e3))
+        self.residual = self._project(np.concatenate([np.clip(e[present], -1e3, 1e3), -fit.course]))
         self._columns = columns
         self._along = columns.T @ self.residual
         self._grams = {s.start: columns[:, s].T @ columns[:, s] for _, s in self._all_variants()}
@@ -124,10 +132,22 @@ class Scorer:
         return weighted
 
     def _whitened(self, weighted: FloatArray) -> FloatArray:
-        """Whitened responses (values present, r) of weighted ones (rows, m, r), a few at a time to save memory."""
-        white = np.empty((int(self._present.sum()), weighted.shape[2]))
+        """Whitened responses (values present, r) of weighted ones (rows, m, r), a few at a time to save memory.
+
+        Below them stand the rows of the course, where they are zero.
+        """
+        count = int(self._present.sum())
+        white = np.empty((count + self._rows_of_course, weighted.shape[2]))
+        white[count:] = 0.0
         for part in _parts(weighted.shape[2]):
-            white[:, part] = self.noise.whiten(weighted[:, :, part])[self._present]
+            white[:count, part] = self.noise.whiten(weighted[:, :, part])[self._present]
+        return white
+
+    def _with_prior(self, white: FloatArray) -> FloatArray:
+        """Whitened responses to all that is free, the last ones to the course, with 1 in its rows."""
+        k = self._rows_of_course
+        if k:
+            white[-k:, -k:] = np.eye(k)
         return white
 
     @staticmethod
@@ -172,6 +192,13 @@ class Scorer:
         table[present] = left
         full[self.rows] = table * std
         return self.problem.noise(full, self.rows)
+
+    def projected(self, responses: FloatArray) -> FloatArray:
+        """Whitened responses M X (values present, r) of plain ones X (N, m, r), without what is free already."""
+        weighted = (responses / self.problem.weights[:, :, None])[self._reached]
+        white = self._whitened(weighted)
+        white -= self._base @ (self._base.T @ white)
+        return white
 
     def scores(self) -> list[Score]:
         """Scores of all candidates, best first."""

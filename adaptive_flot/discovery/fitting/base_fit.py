@@ -11,7 +11,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import placements, with_nodes
 from adaptive_flot.discovery.record.noise import proportional
-from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.record.problem import CYCLES, Problem, make_problem, split_names
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.greybox.model import Model
 
@@ -39,6 +39,16 @@ def split_record(
     kept = replace(problem, columns=columns, weights=problem.weights[:, enough], floor=problem.floor[enough])
     reasons = () if columns else ("no output is measured throughout the record",)
     return kept, replace(checked, reasons=reasons, notes=checked.notes + left)
+
+
+def split_finer(problem: Problem, cycle: Sequence[str], least_rows: int) -> Problem:
+    """The same problem with more and shorter splits, of at least so many rows each; as it is where that is none."""
+    cycles = (len(problem.record) - problem.first_row) // (len(cycle) * least_rows)
+    if cycles <= CYCLES:
+        return problem
+    splits = split_names(len(problem.record), problem.first_row, GUARD_ROWS, cycles, cycle)
+    counts = [np.isfinite(problem.measured[splits == name]).sum(axis=0) for name in cycle]
+    return replace(problem, splits=splits) if np.min(counts) >= FEWEST_VALUES else problem
 
 
 def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:

@@ -66,7 +66,12 @@ class Descent:
 
     def _predict(self, z: FloatArray) -> FloatArray:
         p, x0 = self.unknowns.unpack(z)
-        return self.simulator.outputs(self.problem.record, x0, p)[:, self.problem.columns]
+        return self._with_course(z, self.simulator.outputs(self.problem.record, x0, p)[:, self.problem.columns])
+
+    def _with_course(self, z: FloatArray, free: FloatArray) -> FloatArray:
+        """A free run (N, m), and what a disturbance that wanders adds to it."""
+        wander = self.problem.wander
+        return free if wander is None else free + wander.outputs(z[self.unknowns.first_of_course :])
 
     def _jacobian(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Predictions (N, m) and their derivatives (N, m, unknowns)."""
@@ -75,7 +80,10 @@ class Descent:
         y, dy, _ = self.simulator.sensitivities(self.problem.record, x0, p, self.unknowns.names, gradient)
         columns = list(self.problem.columns)
         dy[:, :, : self.unknowns.q] *= self.unknowns.scale
-        return y[:, columns], dy[:, columns, :]
+        slope = dy[:, columns, :]
+        if self.problem.wander is not None:
+            slope = np.concatenate([slope, self.problem.wander.responses], axis=2)
+        return self._with_course(z, y[:, columns]), slope
 
     def _objective(self, z: FloatArray, predicted: FloatArray, noise: Noise) -> float:
         if not np.all(np.abs(predicted) < 1e100):
@@ -126,7 +134,10 @@ class Descent:
         scale = np.array([s.scale for s in self.model.states])
         self.unknowns.turn(np.diag(scale))
         _, slope = self._jacobian(self.unknowns.centre)
-        weighted = slope[:, :, self.unknowns.q :] / (self.problem.weights * self._white_std())[:, :, None]
+        weighted = (
+            slope[:, :, self.unknowns.q : self.unknowns.first_of_course]
+            / (self.problem.weights * self._white_std())[:, :, None]
+        )
         rows = weighted[self.rows].reshape(-1, len(scale))
         if not np.isfinite(rows).all():
             return np.zeros((len(scale), 0))
@@ -176,7 +187,7 @@ class Descent:
                 promised = float(2 * b @ moved - moved @ A @ moved)
                 kept = gained > (SHAPE_KEPT if shaped else KEPT) * promised
                 if kept:
-                    slope = _corrected(slope, moved, there - predicted, np.diag(A))
+                    slope = _corrected(slope, moved, there - predicted, self._of_the_model(np.diag(A)))
                 done = gained < max(TOLERANCE, SLOW * (first - new))
                 z, value, predicted = trial, new, there
                 enough, exact = done and exact, False
@@ -189,6 +200,14 @@ class Descent:
                 break
             predicted, slope, exact = there, fresh, True
         return z, predicted, slope, exact
+
+    def _of_the_model(self, weight: FloatArray) -> FloatArray:
+        """Weights (unknowns,) without those of the course: what that does is linear, its derivatives are right."""
+        if self.problem.wander is None:
+            return weight
+        own = weight.copy()
+        own[self.unknowns.first_of_course :] = 0.0
+        return own
 
     def _tried(
         self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
@@ -242,6 +261,10 @@ class Descent:
         problem, rows = self.problem, self.rows
         loss, noise = loss_of(problem, predicted, rows)
         A, _ = self._system(z, predicted, slope, noise)
+        first = self.unknowns.first_of_course
+        course = z[first:]
+        if problem.wander is not None:
+            loss += float(course @ course) + float(np.linalg.slogdet(A[first:, first:])[1])
         inverse = np.linalg.pinv(A, hermitian=True)[: self.unknowns.q, : self.unknowns.q]
         covariance = cast(FloatArray, inverse * np.outer(self.unknowns.scale, self.unknowns.scale))
         p, x0 = self.unknowns.unpack(z)
@@ -261,6 +284,7 @@ class Descent:
             loss,
             loss + float(penalty),
             self.unknowns.directions,
+            course,
         )
 
 

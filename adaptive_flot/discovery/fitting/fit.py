@@ -11,6 +11,13 @@ truncated squares for outliers (Hinich & Talwar, *J. Am. Statist. Assoc.* 70 (19
     BIC = loss + q log(number of measurements)
 
 with q free parameters: Schwarz, *Ann. Statist.* 6 (1978) 461.
+
+Where a disturbance wanders (see `record.wander`), the loss is that of the course u integrated out, with the whitened
+responses H to it (Laplace's method; exact but for the clipping)::
+
+    loss + u'u + log det(I + H'H)
+
+Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (5.8). It costs no free parameters.
 """
 
 from __future__ import annotations
@@ -65,6 +72,8 @@ class Fit:
     bic: float
     directions: FloatArray
     """Free combinations of the initial state (nx, r): those the record can tell; the rest keeps its first guess."""
+    course: FloatArray
+    """Course u (k,) of a disturbance that wanders; empty without. What it does is part of `predicted`."""
 
     def residual(self, problem: Problem) -> FloatArray:
         """Measured minus predicted (N, m)."""

@@ -1,4 +1,7 @@
-"""What a fit is free to move: parameters, and those combinations of the initial state that the record can tell."""
+"""What a fit is free to move: parameters, those combinations of the initial state that the record can tell, a course.
+
+The course is that of a disturbance that wanders, where the problem has one (see `record.wander`).
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ LAGGED_SCALES = 0.1
 
 
 class Unknowns:
-    """Unknowns z: the q free parameters over their scale, then the r free directions of the initial state.
+    """Unknowns z: q free parameters over their scale, r free directions of the initial state, and the course u (k,).
 
     Attributes
     ----------
@@ -31,9 +34,9 @@ class Unknowns:
     shaped
         Whether some of them shape an effect (an onset, a time constant): derivatives by these change from step to step.
     lower, upper, centre
-        Range and start of z (q + r,).
+        Range and start of z (q + r + k,).
     prior, prior_centre
-        Standard deviation and centre of the weak prior of z (q + r,).
+        Standard deviation and centre of the weak prior of z (q + r + k,).
     directions
         Free combinations of the initial state (nx, r).
     """
@@ -66,17 +69,18 @@ class Unknowns:
         self._range = np.array(low) / self.scale, np.array(high) / self.scale
         self._prior = np.where(unbound, np.inf, PRIOR_SCALES)
         self._prior_centre = np.array([p.value for p in parameters]) / self.scale
+        self._course = self._first_course(like)
         self.turn(self._first_directions(like))
 
     def turn(self, directions: FloatArray) -> None:
         """Make these directions (nx, r) of the initial state the free ones."""
-        r = directions.shape[1]
+        r, k = directions.shape[1], len(self._course)
         self.directions = directions
-        self.lower = np.concatenate([self._range[0], np.full(r, -np.inf)])
-        self.upper = np.concatenate([self._range[1], np.full(r, np.inf)])
-        self.prior = np.concatenate([self._prior, np.full(r, DIRECTION_PRIOR)])
-        self.prior_centre = np.concatenate([self._prior_centre, np.zeros(r)])
-        start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r)])
+        self.lower = np.concatenate([self._range[0], np.full(r + k, -np.inf)])
+        self.upper = np.concatenate([self._range[1], np.full(r + k, np.inf)])
+        self.prior = np.concatenate([self._prior, np.full(r, DIRECTION_PRIOR), np.ones(k)])
+        self.prior_centre = np.concatenate([self._prior_centre, np.zeros(r + k)])
+        start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r), self._course])
         self.centre = np.clip(start, self.lower, self.upper)
 
     def _first_state(self, like: Fit | None) -> FloatArray:
@@ -92,6 +96,14 @@ class Unknowns:
             return steady_state(self.model, record.inputs[0], self.base).state
         except RangeError:
             return guess
+
+    def _first_course(self, like: Fit | None) -> FloatArray:
+        """The course (k,) of a fit, or none; empty where the problem has no wander."""
+        wander = self.problem.wander
+        if wander is None:
+            return np.zeros(0)
+        k = wander.responses.shape[2]
+        return like.course if like is not None and len(like.course) == k else np.zeros(k)
 
     def _first_directions(self, like: Fit | None) -> FloatArray:
         """Free directions of the initial state (nx, r): those of a fit, in the states that the model has in common.
@@ -125,13 +137,18 @@ class Unknowns:
         """Parameters (np,) and initial state (nx,), kept inside the physical range of each state."""
         p = self.base.copy()
         p[self.where] = z[: self.q] * self.scale
-        x0 = self.x0 + self.directions @ z[self.q :]
+        x0 = self.x0 + self.directions @ z[self.q : self.first_of_course]
         lower = np.array([s.lower for s in self.model.states])
         upper = np.array([s.upper for s in self.model.states])
         return p, cast(FloatArray, np.clip(x0, lower, upper))
 
+    @property
+    def first_of_course(self) -> int:
+        """Where the course begins in z."""
+        return self.q + len(self.directions.T)
+
     def initial_gradient(self) -> FloatArray:
-        """Derivative of the initial state by z (nx, q + r)."""
+        """Derivative of the initial state by all of z but the course (nx, q + r)."""
         return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
 
 

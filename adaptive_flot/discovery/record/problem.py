@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from adaptive_flot.discovery.record.noise import Noise, fit_noise, white_noise
 from adaptive_flot.discovery.record.robust import CLIP
+from adaptive_flot.discovery.record.wander import Wander
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.nodes import Nodes
@@ -53,6 +54,8 @@ class Problem:
         When searches and fits are to end, by `time.monotonic` [s]: they keep what they have come to.
     nodes
         Rows that a search simulates, where that makes no difference to speak of; None for all.
+    wander
+        An unmeasured disturbance whose course every fit estimates beside its other unknowns; None without.
     """
 
     record: Dataset
@@ -63,6 +66,7 @@ class Problem:
     floor: FloatArray
     whiten: bool = True
     nodes: Nodes | None = None
+    wander: Wander | None = None
     site_sizes: Mapping[str, float] = field(default_factory=dict)
     deadline: float = float("inf")
 
@@ -139,13 +143,18 @@ def make_problem(
     cycles
         How often the pattern of splits repeats.
     """
-    n = len(record)
     columns = tuple(model.index("outputs", name) for name in record.measured(model))
+    splits = split_names(len(record), burn_in, guard, cycles, cycle)
+    scale = np.array([model.outputs[c].scale for c in columns])
+    return Problem(record, columns, adapted, splits, np.ones((len(record), len(columns))), 1e-7 * scale)
+
+
+def split_names(n: int, burn_in: int, guard: int, cycles: int, cycle: Sequence[str]) -> NDArray[np.str_]:
+    """Name of the split of each of n rows (n,); arguments as of `make_problem`."""
     splits = np.full(n, "", dtype="<U8")
     edges = np.linspace(burn_in, n, cycles * len(cycle) + 1).round().astype(int)
     for k, (start, stop) in enumerate(pairwise(edges)):
         split = cycle[k % len(cycle)]
         same = k > 0 and cycle[(k - 1) % len(cycle)] == split
         splits[start + (0 if same or k == 0 else guard) : stop] = split
-    scale = np.array([model.outputs[c].scale for c in columns])
-    return Problem(record, columns, adapted, splits, np.ones((n, len(columns))), 1e-7 * scale)
+    return splits

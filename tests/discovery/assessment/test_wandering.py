@@ -1,0 +1,146 @@
+"""A room whose temperature wanders beside a tank: told as that, and the effect beside it by its name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import multivariate_normal
+
+from adaptive_flot.discovery.assessment.wandering import Course, _drops, course_words, wandering, with_course
+from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.candidates.score_test import Scorer
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.record.wander import Wander, knots_of_course, lines_between, root_of_covariance
+from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray, Model, Scope
+from tests.discovery.heated import CAPACITY, DT, ROOM, heated_tank, moves
+
+ROWS = 1200
+STD, TIME = 2.0, 1500.0
+ADAPTED = ("efficiency", "loss")
+
+
+def _equations(m: Scope) -> None:
+    temperature = m.state("temperature")
+    room = m.site("room", ROOM + 0 * temperature, "feed", "offset", unit="K")
+    heating = m.site("heating", m.parameter("efficiency") * m.input("power"), "actuator", unit="W")
+    loss = m.site("heat_loss", m.parameter("loss") * (temperature - room), unit="W")
+    m.derivative("temperature", (heating - loss) / CAPACITY)
+    m.output("temperature", m.site("thermometer", temperature, "sensor", "offset", unit="K"))
+
+
+def _tank() -> Model:
+    return replace(heated_tank(), name="tank-in-a-room", equations=_equations)
+
+
+def _course(seed: int, std: float) -> FloatArray:
+    memory = np.exp(-DT / TIME)
+    e = np.random.default_rng(seed).standard_normal(ROWS + 500)
+    return std * np.asarray(lfilter([np.sqrt(1 - memory**2)], [1, -memory], e))[500:]
+
+
+def _record(std: float, exponent: float = 0.0, seed: int = 0, dt: float = DT) -> Dataset:
+    """Truth in NumPy: Euler, ten steps a row; the room wanders, and a draught takes heat (exponent not zero)."""
+    inputs = np.column_stack([moves(ROWS, 500, 3000, 40, seed + 100), moves(ROWS, 5, 20, 25, seed + 200)])
+    temperature, seen = 305.0, []
+    for (power, fan), room in zip(inputs, ROOM + _course(seed, std), strict=True):
+        loss = 80.0 * (fan / 10) ** exponent
+        for _ in range(10):
+            temperature += DT / 10 * (0.9 * power - loss * (temperature - room)) / CAPACITY
+        seen.append(temperature)
+    y = np.array(seen) + 0.05 * np.random.default_rng(seed + 1).standard_normal(ROWS)
+    return Dataset("tank", dt * np.arange(1.0, ROWS + 1), dt, inputs, y[:, None])
+
+
+def _fitted(record: Dataset) -> tuple[Problem, Fit, Scorer, Responses]:
+    problem = make_problem(record, _tank(), ADAPTED, burn_in=30, guard=5)
+    fit = Fitter(problem).fit(_tank())
+    assert fit is not None
+    responses = Responses(problem, fit)
+    return problem, fit, scorer_of(problem, fit, responses)[0], responses
+
+
+def test_the_drop_is_that_of_a_gaussian_with_the_covariance_of_the_course() -> None:
+    """Against the density of e ~ N(0, I + X K X') from SciPy, which knows nothing of the lemma."""
+    rng = np.random.default_rng(0)
+    X, e = rng.standard_normal((40, 5)), 2 * rng.standard_normal(40)
+    root = root_of_covariance(np.linspace(0, 4000, 5), 900.0)
+    for std, drop in _drops(X.T @ X, X.T @ e, root):
+        covariance = np.eye(40) + std**2 * X @ root @ root.T @ X.T
+        expected = 2 * multivariate_normal(cov=covariance).logpdf(e) - 2 * multivariate_normal(cov=np.eye(40)).logpdf(e)
+        assert drop == pytest.approx(expected, abs=1e-6)
+
+
+def test_lines_between_knots_are_what_numpy_interpolates() -> None:
+    time = np.arange(0.0, 100.0)
+    knots = knots_of_course(time, 96, 4)
+    values = np.random.default_rng(1).standard_normal(len(knots))
+    assert len(knots) == 25
+    np.testing.assert_allclose(lines_between(time, knots) @ values, np.interp(time, knots, values), atol=1e-12)
+
+
+def test_a_room_that_wanders_is_found_with_its_size() -> None:
+    problem, fit, scorer, responses = _fitted(_record(STD))
+    course = wandering(problem, fit, scorer, responses)
+    assert course is not None
+    assert course.site == "room"
+    rate = course.std / np.sqrt(course.time)  # what a record much longer than the samples apart tells best
+    assert 1 / 1.5 < rate / (STD / np.sqrt(TIME)) < 1.5
+    said = course_words(with_course(problem, course, responses), "K")
+    assert said.startswith("room wanders: standard deviation about ")
+    assert " K, " in said
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.6])
+def test_a_room_at_rest_does_not_wander(exponent: float) -> None:
+    """Neither where nothing is missing nor where an effect is."""
+    problem, fit, scorer, responses = _fitted(_record(0.0, exponent))
+    assert wandering(problem, fit, scorer, responses) is None
+
+
+def test_a_record_shorter_than_two_hours_is_not_asked() -> None:
+    problem, fit, scorer, responses = _fitted(_record(STD))
+    first = replace(problem.record, time=problem.record.time / 10)
+    assert wandering(replace(problem, record=first), fit, scorer, responses) is None
+
+
+def test_a_course_that_may_not_move_changes_no_fit() -> None:
+    """Reduction: a standard deviation next to zero gives the fit without a course."""
+    problem, fit, _, responses = _fitted(_record(0.0))
+    still = replace(problem, wander=with_course(problem, Course("room", 1e-9, TIME, True, 0.0), responses))
+    again = Fitter(still).fit(fit.model, fit.names, like=fit, rounds=2)
+    assert again is not None
+    np.testing.assert_allclose(again.values, fit.values, rtol=1e-4)
+    assert again.loss == pytest.approx(fit.loss, abs=0.5)
+    np.testing.assert_allclose(again.course, 0.0, atol=1e-4)
+
+
+def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None:
+    problem, fit, _, responses = _fitted(_record(STD))
+    wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
+    allowed = Fitter(replace(problem, wander=wander)).fit(fit.model, fit.names, like=fit, rounds=2)
+    assert allowed is not None
+    rows = problem.rows("estimate")
+    assert np.std(allowed.residual(problem)[rows]) < 1.5 * 0.05 < 0.1 * np.std(fit.residual(problem)[rows])
+    assert np.all(np.abs(allowed.values - [0.9, 80.0]) < 4 * allowed.std())
+    assert np.all(np.abs(allowed.values - [0.9, 80.0]) < np.abs(fit.values - [0.9, 80.0]) + allowed.std())
+
+
+def test_the_outputs_of_a_course_are_linear_in_it() -> None:
+    wander = Wander("room", 1.0, 900.0, True, np.arange(12.0).reshape(3, 2, 2))
+    np.testing.assert_array_equal(wander.outputs(np.array([1.0, 2.0])), wander.responses @ [1.0, 2.0])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_an_effect_beside_a_room_that_wanders_is_named(seed: int) -> None:
+    found = discover(_tank(), _record(STD / 2, exponent=0.6, seed=seed))
+    assert found.verdict.word == "named", found.verdict.reason
+    assert [(e.effect.site, e.effect.driver) for e in found.verdict.effects] == [("heat_loss", "fan_speed")]
+    assert "room wanders: standard deviation about" in found.verdict.reason
