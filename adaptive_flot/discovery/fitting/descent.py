@@ -42,6 +42,8 @@ KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
 constant change more."""
 
+COURSE_STEPS = 2
+"""Steps that end on the best course of a disturbance that wanders."""
 START_FRACTIONS = (1.0, 0.3, 0.1)
 """Fractions of a first-order estimate that are tried as the start."""
 
@@ -255,11 +257,28 @@ class Descent:
 
         return step
 
+    def _with_best_course(
+        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
+    ) -> tuple[FloatArray, FloatArray]:
+        """Unknowns and predictions with the best course beside the rest, for a noise model: a linear problem."""
+        if self.problem.wander is None:
+            return z, predicted
+        own = slice(self.unknowns.first_of_course, None)
+        for _ in range(COURSE_STEPS):  # which values are clipped may change
+            A, b = self._system(z, predicted, slope, noise)
+            moved = np.zeros(len(z))
+            moved[own] = np.linalg.solve(A[own, own], b[own])
+            z, predicted = z + moved, predicted + self.problem.wander.outputs(moved[own])
+        return z, predicted
+
     def _result(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> Fit | None:
         if not np.isfinite(predicted).all():
             return None
         problem, rows = self.problem, self.rows
         loss, noise = loss_of(problem, predicted, rows)
+        z, predicted = self._with_best_course(z, predicted, slope, noise)
+        if problem.wander is not None:
+            loss, noise = loss_of(problem, predicted, rows)
         A, _ = self._system(z, predicted, slope, noise)
         first = self.unknowns.first_of_course
         course = z[first:]

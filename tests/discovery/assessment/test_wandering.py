@@ -16,6 +16,7 @@ from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.record.robust import without_spikes
 from adaptive_flot.discovery.record.wander import Wander, knots_of_course, lines_between, root_of_covariance
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -131,6 +132,56 @@ def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None
     assert np.std(allowed.residual(problem)[rows]) < 1.5 * 0.05 < 0.1 * np.std(fit.residual(problem)[rows])
     assert np.all(np.abs(allowed.values - [0.9, 80.0]) < 4 * allowed.std())
     assert np.all(np.abs(allowed.values - [0.9, 80.0]) < np.abs(fit.values - [0.9, 80.0]) + allowed.std())
+
+
+def test_the_loss_is_that_of_the_course_integrated_out() -> None:
+    """Minus two log-likelihood of N(0, I + H H') for the residual without its course, but for the innovations' size."""
+    problem, fit, _, responses = _fitted(_record(STD))
+    wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
+    problem = replace(problem, wander=wander)
+    allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
+    assert allowed is not None
+    rows = problem.rows("estimate")
+    e = allowed.noise.whiten(allowed.residual(problem))[rows][:, 0]
+    H = allowed.noise.whiten(wander.responses)[rows][:, 0]
+    kept = np.isfinite(e) & (np.abs(e) < problem.clip)
+    clipped = float(np.sum(np.isfinite(e) & ~kept)) * problem.clip**2
+    e, H = (e + H @ allowed.course)[kept], H[kept]
+    covariance = np.eye(len(e)) + H @ H.T
+    expected = float(e @ np.linalg.solve(covariance, e) + np.linalg.slogdet(covariance)[1])
+    sizes = 2 * float(np.log(allowed.noise.std[0])) * int(rows.sum())
+    assert allowed.loss - sizes == pytest.approx(expected + clipped, abs=0.5)
+
+
+def test_a_score_beside_a_course_is_that_of_generalised_least_squares() -> None:
+    """With the covariance I + H H' written out, which the scorer never builds."""
+    problem, fit, _, responses = _fitted(_record(STD, exponent=0.6))
+    wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
+    problem = replace(problem, wander=wander)
+    allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
+    assert allowed is not None
+    responses = Responses(problem, allowed)
+    scorer = scorer_of(problem, allowed, responses)[0]
+    rows = problem.rows("estimate")
+
+    def white(series: FloatArray) -> FloatArray:
+        return scorer.noise.whiten(series)[rows][:, 0]
+
+    e, H = white(without_spikes(allowed.residual(problem))), white(wander.responses)
+    kept = np.isfinite(e)
+    e, H, Z = (e + H @ allowed.course)[kept], H[kept], white(responses.nuisance)[kept]
+    flat = np.linalg.inv(np.linalg.cholesky(np.eye(len(e)) + H @ H.T))
+    Z, e = flat @ Z, flat @ e
+    e -= Z @ np.linalg.lstsq(Z, e, rcond=None)[0]
+    compared = 0
+    for candidate in scorer.candidates[::7]:
+        score = scorer.variant_scores(candidate)[0]
+        X = flat @ white(responses.of(list(score.variant.profiles)))[kept]
+        X -= Z @ np.linalg.lstsq(Z, X, rcond=None)[0]
+        gain = float(e @ X @ np.linalg.lstsq(X, e, rcond=1e-10)[0])
+        assert score.gain == pytest.approx(gain, rel=1e-3, abs=1e-3), candidate.name
+        compared += gain > 1.0
+    assert compared >= 2
 
 
 def test_the_outputs_of_a_course_are_linear_in_it() -> None:
