@@ -29,6 +29,11 @@ settings.register_profile(
 settings.load_profile("deterministic")
 
 
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One worker more than there are cores: half the time of the live tests is waiting for a clock."""
+    return (os.cpu_count() or 1) + 1
+
+
 @pytest.fixture(scope="session")
 def shared_file() -> Callable[[str], Path]:
     """Path of a file in the shared folder beside the repository; the test is skipped where it is absent."""
