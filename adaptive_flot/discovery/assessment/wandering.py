@@ -85,7 +85,7 @@ def wandering(problem: Problem, base: Fit, scorer: Scorer, responses: Responses)
             break
         fit, responses = extended, Responses(problem, extended)
         scorer = scorer_of(problem, fit, responses)[0]
-    # what would have to wander by nearly its own size is no feed
+    # what fits best as far as the last of the sizes is something else
     return best if explains and best.share < LARGEST else None
 
 
@@ -127,7 +127,8 @@ def course_words(wander: Wander, unit: str) -> str:
     size = f"{wander.std:.3g} {unit}".rstrip() if wander.offset else f"{100 * wander.std:.2g} %"
     return (
         f"{wander.site} wanders: standard deviation about {size}, correlation time about {wander.time:.0f} s. Its "
-        "course was estimated beside every alternative, and is in the errors before and after."
+        "course was estimated beside every alternative, and is in the errors before and after. What acts as this feed "
+        "does, and changes as slowly, would look the same."
     )
 
 
