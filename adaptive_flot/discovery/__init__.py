@@ -17,6 +17,7 @@ hypotheses/   Named hypotheses about several records: what has changed since a r
 innovations/  A second opinion with process noise: when something happened, and what it may be.
 discover.py   What is called for one record: the stages, one after the other.
 stages.py     The stages, from the data to the proposed test.
+wandering.py  Whether a feed that nobody measures wanders; its course is then a part of every fit.
 changes.py    What has changed since a reference, events too.
 
 Where a statistic is computed
@@ -25,6 +26,7 @@ score statistic            candidates/score_test.py   Scorer
 null law of the search     candidates/score_test.py   Scorer.null_gains
 likelihood, BIC            fitting/fit.py             loss_of, Fit.bic
 noise model                record/noise.py            fit_noise
+marginal likelihood, feed  wandering.py               _best, fitting/fit.py
 effective sample size      record/effective_samples.py  correlation_times
 Ljung-Box, Holm            assessment/detect.py       detect
 block bootstrap            assessment/verification.py verify

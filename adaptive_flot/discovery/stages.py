@@ -10,7 +10,6 @@ import numpy as np
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
 from adaptive_flot.discovery.assessment.verification import changes
-from adaptive_flot.discovery.assessment.wandering import course_words, needed, rows_of_block, wandering, with_course
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.base_fit import prepare, split_finer, split_record
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
@@ -37,6 +36,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     noise_from_row_to_row,
     unexplained,
 )
+from adaptive_flot.discovery.wandering import course_words, needed, rows_of_block, wandering, with_course
 from adaptive_flot.greybox.assumed_start import wrong_start
 
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5

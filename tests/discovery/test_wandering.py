@@ -9,7 +9,6 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
-from adaptive_flot.discovery.assessment.wandering import Course, _drops, course_words, wandering, with_course
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.discover import discover
@@ -19,6 +18,7 @@ from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.record.robust import without_spikes
 from adaptive_flot.discovery.record.wander import Wander, knots_of_course, lines_between, root_of_covariance
 from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.discovery.wandering import Course, _drops, course_words, wandering, with_course
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Scope
 from tests.discovery.heated import CAPACITY, DT, ROOM, heated_tank, moves
