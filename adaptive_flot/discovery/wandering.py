@@ -126,7 +126,7 @@ def course_words(wander: Wander, unit: str) -> str:
     """What wanders and how, in a sentence."""
     size = f"{wander.std:.3g} {unit}".rstrip() if wander.offset else f"{100 * wander.std:.2g} %"
     return (
-        f"{wander.site} wanders: standard deviation about {size}, correlation time about {wander.time:.0f} s. Its "
+        f"The {wander.site} wanders: standard deviation about {size}, correlation time about {wander.time:.0f} s. Its "
         "course was estimated beside every alternative, and is in the errors before and after. What acts as this feed "
         "does, and changes as slowly, would look the same."
     )

@@ -37,7 +37,7 @@ def _equations(m: Scope) -> None:
     m.output("temperature", m.site("thermometer", temperature, "sensor", "offset", unit="K"))
 
 
-def _tank() -> Model:
+def tank_in_a_room() -> Model:
     return replace(heated_tank(), name="tank-in-a-room", equations=_equations)
 
 
@@ -47,7 +47,7 @@ def _course(seed: int, std: float) -> FloatArray:
     return std * np.asarray(lfilter([np.sqrt(1 - memory**2)], [1, -memory], e))[500:]
 
 
-def _record(std: float, exponent: float = 0.0, seed: int = 0, dt: float = DT) -> Dataset:
+def record_in_a_room(std: float, exponent: float = 0.0, seed: int = 0, dt: float = DT) -> Dataset:
     """Truth in NumPy: Euler, ten steps a row; the room wanders, and a draught takes heat (exponent not zero)."""
     inputs = np.column_stack([moves(ROWS, 500, 3000, 40, seed + 100), moves(ROWS, 5, 20, 25, seed + 200)])
     temperature, seen = 305.0, []
@@ -61,8 +61,8 @@ def _record(std: float, exponent: float = 0.0, seed: int = 0, dt: float = DT) ->
 
 
 def _fitted(record: Dataset) -> tuple[Problem, Fit, Scorer, Responses]:
-    problem = make_problem(record, _tank(), ADAPTED, burn_in=30, guard=5)
-    fit = Fitter(problem).fit(_tank())
+    problem = make_problem(record, tank_in_a_room(), ADAPTED, burn_in=30, guard=5)
+    fit = Fitter(problem).fit(tank_in_a_room())
     assert fit is not None
     responses = Responses(problem, fit)
     return problem, fit, scorer_of(problem, fit, responses)[0], responses
@@ -88,33 +88,33 @@ def test_lines_between_knots_are_what_numpy_interpolates() -> None:
 
 
 def test_a_room_that_wanders_is_found_with_its_size() -> None:
-    problem, fit, scorer, responses = _fitted(_record(STD))
+    problem, fit, scorer, responses = _fitted(record_in_a_room(STD))
     course = wandering(problem, fit, scorer, responses)
     assert course is not None
     assert course.site == "room"
     rate = course.std / np.sqrt(course.time)  # what a record much longer than the samples apart tells best
     assert 1 / 1.5 < rate / (STD / np.sqrt(TIME)) < 1.5
     said = course_words(with_course(problem, course, responses), "K")
-    assert said.startswith("room wanders: standard deviation about ")
+    assert said.startswith("The room wanders: standard deviation about ")
     assert " K, " in said
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.6])
 def test_a_room_at_rest_does_not_wander(exponent: float) -> None:
     """Neither where nothing is missing nor where an effect is."""
-    problem, fit, scorer, responses = _fitted(_record(0.0, exponent))
+    problem, fit, scorer, responses = _fitted(record_in_a_room(0.0, exponent))
     assert wandering(problem, fit, scorer, responses) is None
 
 
 def test_a_record_shorter_than_two_hours_is_not_asked() -> None:
-    problem, fit, scorer, responses = _fitted(_record(STD))
+    problem, fit, scorer, responses = _fitted(record_in_a_room(STD))
     first = replace(problem.record, time=problem.record.time / 10)
     assert wandering(replace(problem, record=first), fit, scorer, responses) is None
 
 
 def test_a_course_that_may_not_move_changes_no_fit() -> None:
     """Reduction: a standard deviation next to zero gives the fit without a course."""
-    problem, fit, _, responses = _fitted(_record(0.0))
+    problem, fit, _, responses = _fitted(record_in_a_room(0.0))
     still = replace(problem, wander=with_course(problem, Course("room", 1e-9, TIME, True, 0.0), responses))
     again = Fitter(still).fit(fit.model, fit.names, like=fit, rounds=2)
     assert again is not None
@@ -124,7 +124,7 @@ def test_a_course_that_may_not_move_changes_no_fit() -> None:
 
 
 def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None:
-    problem, fit, _, responses = _fitted(_record(STD))
+    problem, fit, _, responses = _fitted(record_in_a_room(STD))
     wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
     allowed = Fitter(replace(problem, wander=wander)).fit(fit.model, fit.names, like=fit, rounds=2)
     assert allowed is not None
@@ -136,7 +136,7 @@ def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None
 
 def test_the_loss_is_that_of_the_course_integrated_out() -> None:
     """Minus two log-likelihood of N(0, I + H H') for the residual without its course, but for the innovations' size."""
-    problem, fit, _, responses = _fitted(_record(STD))
+    problem, fit, _, responses = _fitted(record_in_a_room(STD))
     wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
     problem = replace(problem, wander=wander)
     allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
@@ -155,7 +155,7 @@ def test_the_loss_is_that_of_the_course_integrated_out() -> None:
 
 def test_a_score_beside_a_course_is_that_of_generalised_least_squares() -> None:
     """With the covariance I + H H' written out, which the scorer never builds."""
-    problem, fit, _, responses = _fitted(_record(STD, exponent=0.6))
+    problem, fit, _, responses = _fitted(record_in_a_room(STD, exponent=0.6))
     wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
     problem = replace(problem, wander=wander)
     allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
@@ -191,7 +191,7 @@ def test_the_outputs_of_a_course_are_linear_in_it() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_an_effect_beside_a_room_that_wanders_is_named(seed: int) -> None:
-    found = discover(_tank(), _record(STD / 2, exponent=0.6, seed=seed))
+    found = discover(tank_in_a_room(), record_in_a_room(STD / 2, exponent=0.6, seed=seed))
     assert found.verdict.word == "named", found.verdict.reason
     assert [(e.effect.site, e.effect.driver) for e in found.verdict.effects] == [("heat_loss", "fan_speed")]
-    assert "room wanders: standard deviation about" in found.verdict.reason
+    assert "The room wanders: standard deviation about" in found.verdict.reason

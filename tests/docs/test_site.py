@@ -29,21 +29,18 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_every_page_is_there(site: Path) -> None:
+def test_every_page_is_there_loads_nothing_from_the_network_and_draws_its_equations(site: Path) -> None:
+    """One test, so that no second worker builds the site again."""
     pages = [p.relative_to(DOCS).with_suffix(".html") for p in DOCS.rglob("*.md")]
     assert [p for p in pages if not (site / p).is_file()] == []
+    assert loaded_from_the_network(site) == {}
+    assert "<math" in (site / "discovery" / "how_it_decides.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_pages_load_nothing_from_the_network(site: Path) -> None:
-    """Scripts, styles, pictures and fonts are files of the site; links of the text may lead anywhere."""
+def loaded_from_the_network(site: Path) -> dict[str, list[tuple[str, str]]]:
+    """Scripts, styles, pictures and fonts that are no files of the site, by page; links may lead anywhere."""
     script = r'<(?:script|img|iframe|source)[^>]+src="(https?:[^"]+)"'
     style = r'<link[^>]+rel="(?:stylesheet|preload)"[^>]+href="(https?:[^"]+)"'
     loads = re.compile(f"{script}|{style}")
     found = {page.name: loads.findall(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
-    assert {name: urls for name, urls in found.items() if urls} == {}
-
-
-@pytest.mark.slow
-def test_equations_are_drawn_by_the_browser(site: Path) -> None:
-    assert "<math" in (site / "discovery" / "how_it_decides.html").read_text(encoding="utf-8")
+    return {name: urls for name, urls in found.items() if urls}

@@ -145,10 +145,10 @@ def _alternatives(discovery: Discovery, album: Album) -> list[Part]:
 def _measured_against_model(discovery: Discovery, problem: Problem, before: Fit, after: Fit, album: Album) -> Picture:
     """The first chart: what was measured, and free runs of the model as it is and with what was found."""
     found = "and with what was found" if after is not before else ""
-    caption = (
-        f"Measured values, and free runs of the model as it is {found}".rstrip()
-        + ": simulated from the inputs alone, never corrected by a measurement."
-    )
+    runs = f"Measured values, and free runs of the model as it is {found}".rstrip()
+    caption = f"{runs}: simulated from the inputs alone, never corrected by a measurement."
+    if problem.wander is not None:  # its course was estimated from the measurements
+        caption = f"{runs}: simulated from the inputs and the estimated course of {problem.wander.site}."
     panels = run_panels(problem, before, after)
     shown = _telling(discovery, problem)
     if len(shown) < len(panels):

@@ -1,0 +1,20 @@
+"""A run that has an estimated course is not said to come from the inputs alone."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.report.discovery.page import write_discovery_report
+from tests.discovery.test_wandering import record_in_a_room, tank_in_a_room
+
+
+def test_the_first_caption_tells_the_course(tmp_path: Path) -> None:
+    for std, expected in ((1.0, "the estimated course of room"), (0.0, "from the inputs alone")):
+        page = tmp_path / f"{std}.html"
+        found = discover(tank_in_a_room(), record_in_a_room(std, exponent=0.6))
+        write_discovery_report(found, "tank", page, command="discover tank.csv", read=[])
+        text = re.sub(r"\s+", " ", page.read_text(encoding="utf-8"))
+        assert expected in text
+        assert ("from the inputs alone" in text) == (std == 0.0)
