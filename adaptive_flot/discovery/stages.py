@@ -21,7 +21,6 @@ from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.discovery.results import Judgement, State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
-from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
@@ -103,7 +102,7 @@ def let_feed_wander(state: State) -> State:
         return state
     state.progress("look for a feed that wanders")
     responses = state.responses
-    course = wandering(problem, base, scorer_of(problem, base, responses)[0], responses)
+    course = wandering(problem, base, responses)
     if course is None:
         return state
     cycle = CYCLE if state.report_record is None else WITHOUT_REPORT

@@ -52,7 +52,7 @@ class Course:
     """`std` as a share of the usual value at the site."""
 
 
-def wandering(problem: Problem, base: Fit, scorer: Scorer, responses: Responses) -> Course | None:
+def wandering(problem: Problem, base: Fit, responses: Responses) -> Course | None:
     """How a feed wanders, where that explains the residual better than any effect; else None.
 
     A course competes with the effects, by first order (see `_best`). Where one of these explains more, the best is
@@ -63,8 +63,8 @@ def wandering(problem: Problem, base: Fit, scorer: Scorer, responses: Responses)
     ----------
     problem, base
         The record, and the fit of the model as it is.
-    scorer, responses
-        Scores and responses along that fit.
+    responses
+        Responses along that fit.
     """
     time = problem.record.time
     feeds = [
@@ -72,7 +72,7 @@ def wandering(problem: Problem, base: Fit, scorer: Scorer, responses: Responses)
     ]
     if not feeds or time[-1] - time[0] < LEAST_SPAN_S:
         return None
-    fit = base
+    fit, scorer = base, scorer_of(problem, base, responses)[0]
     for before in range(MOST_BEFORE + 1):
         best = max((_best(problem, scorer, responses, name) for name in feeds), key=lambda c: c.evidence)
         # a free curve in time at any site that acts on the same output is what a course would be taken for: no rival

@@ -10,7 +10,6 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from adaptive_flot.discovery.candidates.responses import Responses
-from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -60,12 +59,11 @@ def record_in_a_room(std: float, exponent: float = 0.0, seed: int = 0, dt: float
     return Dataset("tank", dt * np.arange(1.0, ROWS + 1), dt, inputs, y[:, None])
 
 
-def _fitted(record: Dataset) -> tuple[Problem, Fit, Scorer, Responses]:
+def _fitted(record: Dataset) -> tuple[Problem, Fit, Responses]:
     problem = make_problem(record, tank_in_a_room(), ADAPTED, burn_in=30, guard=5)
     fit = Fitter(problem).fit(tank_in_a_room())
     assert fit is not None
-    responses = Responses(problem, fit)
-    return problem, fit, scorer_of(problem, fit, responses)[0], responses
+    return problem, fit, Responses(problem, fit)
 
 
 def test_the_drop_is_that_of_a_gaussian_with_the_covariance_of_the_course() -> None:
@@ -88,8 +86,8 @@ def test_lines_between_knots_are_what_numpy_interpolates() -> None:
 
 
 def test_a_room_that_wanders_is_found_with_its_size() -> None:
-    problem, fit, scorer, responses = _fitted(record_in_a_room(STD))
-    course = wandering(problem, fit, scorer, responses)
+    problem, fit, responses = _fitted(record_in_a_room(STD))
+    course = wandering(problem, fit, responses)
     assert course is not None
     assert course.site == "room"
     rate = course.std / np.sqrt(course.time)  # what a record much longer than the samples apart tells best
@@ -102,19 +100,19 @@ def test_a_room_that_wanders_is_found_with_its_size() -> None:
 @pytest.mark.parametrize("exponent", [0.0, 0.6])
 def test_a_room_at_rest_does_not_wander(exponent: float) -> None:
     """Neither where nothing is missing nor where an effect is."""
-    problem, fit, scorer, responses = _fitted(record_in_a_room(0.0, exponent))
-    assert wandering(problem, fit, scorer, responses) is None
+    problem, fit, responses = _fitted(record_in_a_room(0.0, exponent))
+    assert wandering(problem, fit, responses) is None
 
 
 def test_a_record_shorter_than_two_hours_is_not_asked() -> None:
-    problem, fit, scorer, responses = _fitted(record_in_a_room(STD))
+    problem, fit, responses = _fitted(record_in_a_room(STD))
     first = replace(problem.record, time=problem.record.time / 10)
-    assert wandering(replace(problem, record=first), fit, scorer, responses) is None
+    assert wandering(replace(problem, record=first), fit, responses) is None
 
 
 def test_a_course_that_may_not_move_changes_no_fit() -> None:
     """Reduction: a standard deviation next to zero gives the fit without a course."""
-    problem, fit, _, responses = _fitted(record_in_a_room(0.0))
+    problem, fit, responses = _fitted(record_in_a_room(0.0))
     still = replace(problem, wander=with_course(problem, Course("room", 1e-9, TIME, True, 0.0), responses))
     again = Fitter(still).fit(fit.model, fit.names, like=fit, rounds=2)
     assert again is not None
@@ -124,7 +122,7 @@ def test_a_course_that_may_not_move_changes_no_fit() -> None:
 
 
 def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None:
-    problem, fit, _, responses = _fitted(record_in_a_room(STD))
+    problem, fit, responses = _fitted(record_in_a_room(STD))
     wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
     allowed = Fitter(replace(problem, wander=wander)).fit(fit.model, fit.names, like=fit, rounds=2)
     assert allowed is not None
@@ -136,7 +134,7 @@ def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None
 
 def test_the_loss_is_that_of_the_course_integrated_out() -> None:
     """Minus two log-likelihood of N(0, I + H H') for the residual without its course, but for the innovations' size."""
-    problem, fit, _, responses = _fitted(record_in_a_room(STD))
+    problem, fit, responses = _fitted(record_in_a_room(STD))
     wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
     problem = replace(problem, wander=wander)
     allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
@@ -155,7 +153,7 @@ def test_the_loss_is_that_of_the_course_integrated_out() -> None:
 
 def test_a_score_beside_a_course_is_that_of_generalised_least_squares() -> None:
     """With the covariance I + H H' written out, which the scorer never builds."""
-    problem, fit, _, responses = _fitted(record_in_a_room(STD, exponent=0.6))
+    problem, fit, responses = _fitted(record_in_a_room(STD, exponent=0.6))
     wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
     problem = replace(problem, wander=wander)
     allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
