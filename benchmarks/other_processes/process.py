@@ -27,11 +27,14 @@ class Case:
         record alone can not show, since constants take it up. `both` else.
     model
         Function of the process's module that makes the model.
+    tolerated
+        Further true names, which tell of a disturbance and not of an effect.
     """
 
     names: tuple[Pair, ...]
     when: Literal["both", "alone", "reference"] = "both"
     model: str = "make_model"
+    tolerated: tuple[Pair, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,8 @@ class Process:
     cases
         What may be the matter, by name.
     tolerated
-        True names of what the plant has on every record and the model has not, with why.
+        True names of what the plant has on every record and the model has not, with why. What wanders a little is
+        none: a name for it would be a false alarm.
     controlled
         Whether a controller may move an input.
     """

@@ -117,12 +117,10 @@ def _answer(
     if case.names:
         (site, driver), *others = case.names
         effects = [{"site": site, "driver": driver, "accepted": [{"site": s, "driver": d} for s, d in others]}]
-    # what the plant has all the time, has not changed since its reference; what wanders, has
-    tolerated = [
-        {"site": s, "driver": d, "why": why}
-        for (s, d), why in process.tolerated.items()
-        if (s, d) not in case.names and (d == "time" or not referred)
-    ]
+    # what the plant has all the time, has not changed since its reference
+    lasting = {} if referred else {p: why for p, why in process.tolerated.items() if p not in case.names}
+    known = lasting | dict.fromkeys(case.tolerated, name)
+    tolerated = [{"site": s, "driver": d, "why": why} for (s, d), why in known.items()]
     return {
         "record": f"record_{k:04d}",
         "process": process.name,

@@ -99,6 +99,5 @@ PROCESS = Process(
     },
     {
         ("loss", "indoor"): "there is a weakly coupled second store",
-        ("gains", EVENT): "people come and go",
     },
 )

@@ -105,7 +105,6 @@ PROCESS = Process(
         "probe slips": Case((("probe", EVENT),), "alone"),
     },
     {
-        ("demand", EVENT): "the demand of the water wanders",
         ("demand", SHIFT): "the water has a demand of its own",
         ("decay", "temperature"): "the decay grows a little with the temperature",
         ("probe", "lag"): "there is a corner that mixes slowly",

@@ -105,6 +105,5 @@ PROCESS = Process(
     },
     {
         ("filter", "flow"): "the filter is not quite turbulent",
-        ("fan", EVENT): "the wind blows on the outlet",
     },
 )

@@ -98,7 +98,6 @@ PROCESS = Process(
         "flow meter off": Case((("flow_meter", SHIFT), ("flow_meter", "own_value")), "reference"),
     },
     {
-        ("steam", EVENT): "the pressure of the steam wanders",
         ("steam", "lag"): "the tube stores heat",
         ("steam", "delay"): "the tube stores heat",
     },

@@ -104,8 +104,6 @@ PROCESS = Process(
         "gauge off": Case((("gauge", SHIFT), ("gauge", "own_value")), "reference"),
     },
     {
-        ("inflow", EVENT): "the pressure of the supply wanders",
-        ("valve", EVENT): "the pressure of the supply wanders",
         ("outflow", "level"): "the exponent of the outflow is not quite a half",
     },
     True,

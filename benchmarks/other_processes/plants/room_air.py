@@ -95,8 +95,6 @@ PROCESS = Process(
         "sensor off": Case((("sensor", SHIFT), ("sensor", "own_value")), "reference"),
     },
     {
-        ("breath", EVENT): "people differ in what they breathe out",
-        ("infiltration", EVENT): "the wind blows",
         ("sensor", "lag"): "there is an alcove that mixes slowly",
         ("sensor", "delay"): "there is an alcove that mixes slowly",
     },

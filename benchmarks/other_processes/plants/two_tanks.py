@@ -97,7 +97,6 @@ PROCESS = Process(
         "gauge hangs": Case((("lower_gauge", "own_value"),), "reference"),
     },
     {
-        ("pump", EVENT): "the mains wander",
         ("upper_outlet", "upper"): "the outlets are not quite orifices",
         ("lower_outlet", "lower"): "the outlets are not quite orifices",
     },
