@@ -203,8 +203,9 @@ def _frozen(values: FloatArray) -> BoolArray:
     elsewhere = same.copy()
     for a, b in long:
         elsewhere[a:b] = False
-    rest = len(same) - sum(b - a for a, b in long)
-    if rest > 0 and elsewhere.sum() / rest < 0.5:  # a quantised or held signal repeats itself all the time
+    rest = len(same) - sum(b - a for a, b in long) - (len(long) + 1)  # the steps into and out of a run tell nothing
+    # a quantised or held signal repeats itself all the time
+    if rest > FROZEN_ROWS and elsewhere.sum() / rest < 0.5:
         for a, b in long:
             mask[a + 1 : b + 1] = True
     return mask

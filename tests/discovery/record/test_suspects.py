@@ -49,6 +49,14 @@ def test_what_is_frozen_missing_or_stands_still_becomes_a_suspect_part() -> None
     assert np.isnan(cleaned.outputs[101:160, 0]).all() and any("had stopped?" in n for n in notes)
 
 
+def test_an_input_that_is_moved_in_long_steps_has_not_stopped() -> None:
+    """Nearly every row lies in a long run: the steps between the runs are no signal that changes from row to row."""
+    record = tank_record(Truth(exponent=0.0), 600)
+    u = record.inputs.copy()
+    u[:, 1] = np.repeat([8.0, 20.0, 12.0, 16.0], [230, 230, 40, 100])
+    assert clean_outputs(replace(record, inputs=u), heated_tank())[1:] == ((), ())
+
+
 def test_an_output_outside_its_range_gets_a_word() -> None:
     """Degrees Celsius where the model says kelvin; no factor puts that right."""
     model = heated_tank()
