@@ -32,11 +32,13 @@ TELLS = ("named", "class", "unnamed")
 def second_opinion(state: State) -> State:
     """Ask the innovations form where the free run leaves too much, and keep only what both allow.
 
-    What it names, takes the place of the free run's verdict, where the report rows do not contradict it. A name of the
-    free run that it does not know is taken back.
+    It is asked where nothing has a name, where a free curve in time has one, and where too much is left. What it names,
+    takes the place of the free run's verdict, where the report rows do not contradict it. A name of the free run that
+    it does not know is taken back.
     """
     problem, (before, _) = state.known_problem, state.refitted
-    asked = (state.judged.word == "abstain" and not state.contradiction) or _leaves_too_much(state)
+    silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
+    asked = silent or _follows_time(state) or _leaves_too_much(state)
     if not asked or not is_short(problem.record, before.model):
         return state
     state.progress("ask the innovations form")
@@ -59,7 +61,7 @@ def _kept(state: State, told: Told) -> State:
     named = {site for site, _ in judgement.best.names} if judgement.best and judgement.word == "named" else set()
     if named and not named <= told.sites:
         return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other sites explain more'}")
-    if judgement.word == "named" and judgement.best and any(_free_course(e) for e in judgement.best.effects):
+    if judgement.word == "named" and _follows_time(state):
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
         )
@@ -74,11 +76,21 @@ def _kept(state: State, told: Told) -> State:
 
 
 def _leaves_too_much(state: State) -> bool:
-    """By the rows of the record itself, each counted up to three standard deviations: outliers are no model error."""
+    """By all rows of the record, and by the report rows alone, which fitted nothing.
+
+    Each row counts up to three standard deviations: outliers are no model error.
+    """
     problem, (_, after) = state.known_problem, state.refitted
-    left = np.where(problem.rows()[:, None], after.residual(problem), np.nan)
-    noise = noise_by_differences(problem.measured)
-    return any(clipped_std(e) > FAR * s for e, s in zip(left.T, noise, strict=True) if s > 0)
+    residual, noise = after.residual(problem), noise_by_differences(problem.measured)
+    splits = (problem.rows(), problem.rows("report"))
+    left = [np.where(rows[:, None], residual, np.nan).T for rows in splits if rows.any()]
+    return any(clipped_std(e) > FAR * s for part in left for e, s in zip(part, noise, strict=True) if s > 0)
+
+
+def _follows_time(state: State) -> bool:
+    """Whether what is told holds a free curve in time: it follows anything between rows that it has seen."""
+    best = state.judged.best if state.judged.word in ("named", "class") else None
+    return best is not None and any(_free_course(e) for e in best.effects)
 
 
 def _taken_back(state: State, why: str) -> State:
