@@ -20,13 +20,13 @@ from adaptive_flot.discovery.innovations.search import Search, is_short
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
-from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
+from adaptive_flot.discovery.verdict.report_veto import MUCH_WORSE, contradiction, noise_from_row_to_row
 from adaptive_flot.greybox.effects import Effect
 
 FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
 TELLS = ("named", "class", "unnamed")
-"""Words of the free run that the innovations form replaces only where it leaves a smaller error on the report rows."""
+"""Words of the free run that tell something."""
 
 
 def second_opinion(state: State) -> State:
@@ -115,7 +115,7 @@ def _told(state: State, search: Search, told: Told) -> State:
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
     against = contradiction(judgement, error, noise)
-    if against or (state.judged.word in TELLS and not _smaller(error, state.error)):
+    if against or (_competes(state) and not _smaller(error, state.error, _allowed(state, names))):
         return _kept(state, told)
     _, result = state.searched
     return replace(
@@ -130,11 +130,33 @@ def _told(state: State, search: Search, told: Told) -> State:
     )
 
 
-def _smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...]) -> bool:
-    """Whether errors on the report rows are smaller than others, by the geometric mean over the outputs."""
+def _competes(state: State) -> bool:
+    """Whether the free run has something that must leave the larger error: what it tells, or its best alternative.
+
+    A free curve in time that is not told is no rival, and neither is what the report rows have taken back.
+    """
+    judged = state.judged
+    if judged.word in TELLS:
+        return True
+    untold = judged.best is not None and judged.word == "abstain" and not state.contradiction
+    return untold and judged.best is not None and not any(_free_course(e) for e in judged.best.effects)
+
+
+def _allowed(state: State, names: tuple[tuple[str, str], ...]) -> float:
+    """Ratio of errors up to which what is told is as good: above 1 for a fault at the place of a curve without a name.
+
+    Such a curve has more coefficients, and says less.
+    """
+    best = state.judged.best
+    same = best is not None and {site for site, _ in best.names} == {site for site, _ in names}
+    return 1 + MUCH_WORSE if same and state.judged.word == "unnamed" else 1.0
+
+
+def _smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], allowed: float) -> bool:
+    """Whether errors on the report rows are below `allowed` times others, by the geometric mean over the outputs."""
     with np.errstate(all="ignore"):
         ratios = [np.log(a.after / b.after) for a, b in zip(error, than, strict=True) if a.after > 0 and b.after > 0]
-    return not ratios or float(np.mean(ratios)) < 0
+    return not ratios or float(np.mean(ratios)) < float(np.log(allowed))
 
 
 def _free_run(state: State, search: Search, told: Told, before: Fit) -> Fit | None:
