@@ -121,7 +121,9 @@ def _told(
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
         return _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
-    if 2 <= len(members) <= LARGEST_CLASS and all(len(e.hypotheses) == len(best.hypotheses) for e in alike):
+    # "one of these" is true where each explanation has one effect beside what is certain, and not where it has two
+    one_open = all(len(e.hypotheses) == len(certain) + 1 for e in alike)
+    if 2 <= len(members) <= LARGEST_CLASS and one_open:
         return Told("class", best, certain, members, alike, "")
     if not certain:
         why = f"{len(alike)} explanations are about as good, and have no effect in common"

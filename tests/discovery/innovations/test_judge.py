@@ -1,6 +1,6 @@
 """What is told when an effect does not hold on rows that did not fit it: the search behind is a stand-in."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -112,3 +112,15 @@ def test_a_fault_at_the_end_of_its_range_is_no_explanation(slope: float, word: s
 
 def test_a_fault_at_the_end_of_its_range_that_gains_nothing_is_nothing() -> None:
     assert told(Given((SPAN,), 1.0, 0.0, slope=0.3)).word == "none"
+
+
+def test_pairs_that_share_no_effect_are_no_class_of_single_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each explanation has two effects: "one of these two sites" would be false of all of them."""
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: False)
+    x, y = lag("sensor"), lag("valve")
+    x_late, y_late = (replace(h, driver="time", effect=replace(h.effect, driver="time")) for h in (x, y))
+    pairs = Given((x_late, y), 500.0, 0.5), Given((y_late, x), 499.0, 0.5)
+    singles = [Given((h,), 100.0, 0.1) for h in (x, y)]
+    search: Any = Stand(Given((), 0.0, 0.0), *pairs, *singles)
+    ranked: Any = [*pairs, Given((), 0.0, 0.0)]
+    assert judging.judge(search, ranked[-1], ranked).word == "abstain"
