@@ -116,7 +116,7 @@ def test_a_fault_at_the_end_of_its_range_that_gains_nothing_is_nothing() -> None
 
 def test_pairs_that_share_no_effect_are_no_class_of_single_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each explanation has two effects: "one of these two sites" would be false of all of them."""
-    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: False)
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
     x, y = lag("sensor"), lag("valve")
     x_late, y_late = (replace(h, driver="time", effect=replace(h.effect, driver="time")) for h in (x, y))
     pairs = Given((x_late, y), 500.0, 0.5), Given((y_late, x), 499.0, 0.5)
