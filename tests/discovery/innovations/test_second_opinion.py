@@ -1,0 +1,49 @@
+"""When the innovations form is asked, and what its name must beat: judgements that are given, not searched."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from adaptive_flot.discovery.innovations import second_opinion as asking
+from adaptive_flot.discovery.results import OutputChange
+from adaptive_flot.greybox.effects import Effect
+
+CURVE = Effect("gains", "time", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
+STEP = Effect("gains", "time", "step", {"amplitude": 1.0, "onset": 5.0}, {"width": 2.0})
+LAW = Effect("gains", "sun", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
+
+
+def state(word: str, effect: Effect, contradiction: str = "") -> Any:
+    best = SimpleNamespace(effects=(effect,), names=((effect.site, effect.driver),))
+    return SimpleNamespace(judged=SimpleNamespace(word=word, best=best), contradiction=contradiction)
+
+
+@pytest.mark.parametrize(
+    ("word", "effect", "asked"),
+    [("named", CURVE, True), ("class", CURVE, True), ("none", CURVE, False), ("named", STEP, False), ("named", LAW, False)],
+)  # fmt: skip
+def test_a_free_curve_in_time_that_is_told_asks_for_a_second_opinion(word: str, effect: Effect, asked: bool) -> None:
+    assert asking._follows_time(state(word, effect)) == asked
+
+
+@pytest.mark.parametrize(
+    ("given", "competes"),
+    [
+        (state("named", LAW), True),
+        (state("abstain", LAW), True),
+        (state("abstain", CURVE), False),
+        (state("abstain", LAW, "on held-out rows it makes the error larger"), False),
+    ],
+)
+def test_the_best_of_an_abstention_must_leave_the_larger_error_too(given: Any, competes: bool) -> None:
+    assert asking._competes(given) == competes
+
+
+def test_only_a_fault_at_the_place_of_an_unnamed_curve_may_leave_a_little_more() -> None:
+    more, less = (OutputChange("y", "K", 9.0, left, 1.0, (0.5, 0.9)) for left in (1.05, 1.0))
+    here, elsewhere = (("gains", "own_value"),), (("loss", "own_value"),)
+    unnamed = state("unnamed", LAW)
+    assert asking._smaller((more,), (less,), asking._allowed(unnamed, here))
+    assert not asking._smaller((more,), (less,), asking._allowed(unnamed, elsewhere))
+    assert not asking._smaller((more,), (less,), asking._allowed(state("named", LAW), here))
