@@ -21,8 +21,14 @@ def state(word: str, effect: Effect, contradiction: str = "") -> Any:
 
 @pytest.mark.parametrize(
     ("word", "effect", "asked"),
-    [("named", CURVE, True), ("class", CURVE, True), ("none", CURVE, False), ("named", STEP, False), ("named", LAW, False)],
-)  # fmt: skip
+    [
+        ("named", CURVE, True),
+        ("class", CURVE, True),
+        ("none", CURVE, False),
+        ("named", STEP, False),
+        ("named", LAW, False),
+    ],
+)
 def test_a_free_curve_in_time_that_is_told_asks_for_a_second_opinion(word: str, effect: Effect, asked: bool) -> None:
     assert asking._follows_time(state(word, effect)) == asked
 
