@@ -133,9 +133,10 @@ HELD = 2**20
 def _steps(
     function: ca.Function, arguments: NDArray[np.int64], results: NDArray[np.int64], held: Sequence[int]
 ) -> tuple[list[Step], list[Step], list[float], int]:
-    """Operations on held arguments alone, the others, the numbers of the equations, and how many values the first leave.
+    """Operations on held arguments alone, the others, the numbers of the equations, how many values the first leave.
 
-    Those values count from HELD up, intermediate ones from -1 down. What only fetches an argument or a number is no operation: whoever uses it reads it where it is.
+    Those values count from HELD up, intermediate ones from -1 down. What only fetches an argument or a number is no
+    operation: whoever uses it reads it where it is.
     """
     number = {kind: k for k, kind in enumerate(OPERATIONS)}
     numbers: list[float] = []
