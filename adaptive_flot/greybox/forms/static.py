@@ -72,13 +72,27 @@ def spline_basis(x: ca.SX, knots: FloatArray) -> list[ca.SX]:
     Hastie, Tibshirani & Friedman, *The Elements of Statistical Learning*, 2nd ed., (5.4) and (5.5). The driver is
     scaled to the span of the knots first.
     """
-    low, span = knots[0], knots[-1] - knots[0]
-    at = [float(a) for a in (knots - low) / span]
-    values = np.array([_powers(a, at, [max(a - b, 0.0) ** 3 for b in at]) for a in at])
-    inverse: FloatArray = np.linalg.inv(values)
-    s = (x - low) / span
+    at, inverse = _scaled_knots(knots)
+    s = (x - knots[0]) / (knots[-1] - knots[0])
     terms = _powers(s, at, [ca.fmax(s - b, 0) ** 3 for b in at])
     return list(ca.vertsplit(ca.mtimes(ca.DM(inverse.T), ca.vertcat(*terms))))
+
+
+def spline_numbers(x: FloatArray, knots: FloatArray) -> FloatArray:
+    """The same splines (N, knots) at the numbers x (N,)."""
+    at, inverse = _scaled_knots(knots)
+    s = (x - knots[0]) / (knots[-1] - knots[0])
+    above = [np.maximum(s - b, 0.0) for b in at]
+    terms = _powers(s, at, [a * a * a for a in above])
+    table: FloatArray = np.column_stack([np.ones(len(s)), *terms[1:]]) @ inverse
+    return table
+
+
+def _scaled_knots(knots: FloatArray) -> tuple[list[float], FloatArray]:
+    """Knots from 0 to 1, and the inverse of the basis of truncated powers at them."""
+    at = [float(a) for a in (knots - knots[0]) / (knots[-1] - knots[0])]
+    values = np.array([_powers(a, at, [max(a - b, 0.0) ** 3 for b in at]) for a in at])
+    return at, np.linalg.inv(values)
 
 
 def _powers(v: Any, at: Sequence[float], cubes: Sequence[Any]) -> list[Any]:
