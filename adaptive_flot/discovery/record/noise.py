@@ -62,7 +62,7 @@ class Noise:
         m = series.shape[1]
         rows, outputs = np.nonzero(inside)
         flat, at = series.reshape(-1, series.shape[2]), rows * m + outputs
-        white = flat[at]
+        white: FloatArray = flat[at]
         for i, lags in enumerate(self.lags.T):
             own = np.where(rows > i, lags[outputs], 0.0)  # the first rows have no past
             if own.any():

@@ -121,8 +121,8 @@ def tape_of(function: ca.Function, held: Sequence[int] = ()) -> Tape:
     memory = np.zeros(places)
     memory[results[-1] : first] = numbers
     where = int(results[-1]), first
-    held_code, code = (np.ascontiguousarray(part, dtype=np.uint16) for part in (held_code, code))
-    return Tape(held_code, code, memory, arguments[:-1], results[:-1], where)
+    before, written = (np.ascontiguousarray(part, dtype=np.uint16) for part in (held_code, code))
+    return Tape(before, written, memory, arguments[:-1], results[:-1], where)
 
 
 Step = tuple[int, int, int, int]
