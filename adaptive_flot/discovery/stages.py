@@ -21,6 +21,7 @@ from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.discovery.results import Judgement, State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
+from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
@@ -35,7 +36,14 @@ from adaptive_flot.discovery.verdict.report_veto import (
     noise_from_row_to_row,
     unexplained,
 )
-from adaptive_flot.discovery.wandering import course_words, needed, rows_of_block, wandering, with_course
+from adaptive_flot.discovery.wandering import (
+    course_words,
+    needed,
+    rows_of_block,
+    unmeasured_feeds,
+    wandering,
+    with_course,
+)
 from adaptive_flot.greybox.assumed_start import wrong_start
 
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5
@@ -98,13 +106,14 @@ def examine_residual(state: State) -> State:
 def let_feed_wander(state: State) -> State:
     """Give a feed that nobody measures a course of its own, where that explains more than any effect."""
     problem, base = state.fitted
-    if state.responses is None or problem.time_is_up:
+    if state.responses is None or problem.time_is_up or not unmeasured_feeds(problem, base, state.responses):
         return state
     state.progress("look for a feed that wanders")
     responses = state.responses
-    course = wandering(problem, base, responses)
+    scored = scorer_of(problem, base, responses)
+    course = wandering(problem, base, responses, scored[0])
     if course is None:
-        return state
+        return replace(state, scored=scored)  # the search begins with the same
     cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
     problem = split_finer(problem, cycle, rows_of_block(course, problem.record.dt))
     for _ in range(2):  # once more along the fit that has it
@@ -119,10 +128,11 @@ def let_feed_wander(state: State) -> State:
 def search_one_by_one(state: State) -> State:
     """Add one effect after the other, as long as each brings evidence and substance; confirm the best."""
     problem, base = state.fitted
-    found = search(
-        problem, base, state.model, responses=state.responses, processes=state.processes, progress=state.progress
-    )
-    return replace(state, search=found, responses=None)
+    state.progress("score")
+    scored = state.scored or scorer_of(problem, base, state.responses)
+    state = replace(state, responses=None, scored=None)
+    found = search(problem, base, state.model, scored=scored, processes=state.processes, progress=state.progress)
+    return replace(state, search=found)
 
 
 def search_at_once(state: State) -> State:

@@ -52,7 +52,16 @@ class Course:
     """`std` as a share of the usual value at the site."""
 
 
-def wandering(problem: Problem, base: Fit, responses: Responses) -> Course | None:
+def unmeasured_feeds(problem: Problem, base: Fit, responses: Responses) -> list[str]:
+    """Sites of feeds that may wander unseen; none in a short record."""
+    time = problem.record.time
+    if time[-1] - time[0] < LEAST_SPAN_S:
+        return []
+    feeds = (site.name for site in base.model.sites if site.role == "feed")
+    return [name for name in feeds if not _measured(problem, responses, name)]
+
+
+def wandering(problem: Problem, base: Fit, responses: Responses, scorer: Scorer | None = None) -> Course | None:
     """How a feed wanders, where that explains the residual better than any effect; else None.
 
     A course competes with the effects, by first order (see `_best`). Where one of these explains more, the best is
@@ -63,16 +72,13 @@ def wandering(problem: Problem, base: Fit, responses: Responses) -> Course | Non
     ----------
     problem, base
         The record, and the fit of the model as it is.
-    responses
-        Responses along that fit.
+    responses, scorer
+        Responses along that fit, and scores along it where they are known already.
     """
-    time = problem.record.time
-    feeds = [
-        site.name for site in base.model.sites if site.role == "feed" and not _measured(problem, responses, site.name)
-    ]
-    if not feeds or time[-1] - time[0] < LEAST_SPAN_S:
+    feeds = unmeasured_feeds(problem, base, responses)
+    if not feeds:
         return None
-    fit, scorer = base, scorer_of(problem, base, responses)[0]
+    fit, scorer = base, scorer or scorer_of(problem, base, responses)[0]
     for before in range(MOST_BEFORE + 1):
         best = max((_best(problem, scorer, responses, name) for name in feeds), key=lambda c: c.evidence)
         # a free curve in time at any site that acts on the same output is what a course would be taken for: no rival

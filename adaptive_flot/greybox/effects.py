@@ -6,7 +6,7 @@ states. Plant, estimators and controllers use the extended model like any other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -113,6 +113,12 @@ class Effect:
     def label(self) -> str:
         """Name in messages and of the parameters: `bubble_size_by_air_flow`."""
         return f"{self.site}_by_{self.driver}"
+
+    @property
+    def structure(self) -> Hashable:
+        """What its equations depend on: all but the values of its coefficients."""
+        settings = ((name, tuple(np.atleast_1d(value).tolist())) for name, value in sorted(self.settings.items()))
+        return self.site, self.driver, self.form, self.mode, tuple(settings)
 
     @property
     def follower(self) -> str:

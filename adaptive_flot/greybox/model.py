@@ -36,6 +36,8 @@ from adaptive_flot.greybox.scope import Scope, Site
 __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Scope"]
 
 Arguments = TypeVarTuple("Arguments")
+MOST_EXTENDED = 64
+"""Kinds of effects whose equations a model keeps: a search comes back to those of a few rounds."""
 Made = TypeVar("Made")
 
 
@@ -113,6 +115,9 @@ class Model(Checks, Described):
     compiled: bool = False
     record_code: bool = False
     _functions: FunctionCache[Any] = field(default_factory=FunctionCache, init=False, repr=False, compare=False)
+    _extended: FunctionCache[Model] = field(
+        default_factory=lambda: FunctionCache(MOST_EXTENDED), init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         self.check_groups()
@@ -157,12 +162,17 @@ class Model(Checks, Described):
         """
         added = tuple(effects)
         check_distinct((*self.effects, *added))
-        return replace(
-            self,
-            states=self.states + self._effect_states(added),
-            parameters=self.parameters + tuple(p for e in added for p in e.parameters(self.effect_units(e))),
-            effects=self.effects + added,
-        )
+        parameters = self.parameters + tuple(p for e in added for p in e.parameters(self.effect_units(e)))
+
+        def extended() -> Model:
+            states = self.states + self._effect_states(added)
+            return replace(self, states=states, parameters=parameters, effects=self.effects + added)
+
+        # coefficients are arguments of all functions: effects of the same structure share these
+        other = copy.copy(self._extended.get(tuple(e.structure for e in added), extended))
+        object.__setattr__(other, "parameters", parameters)
+        object.__setattr__(other, "effects", self.effects + added)
+        return other
 
     def without_effects(self) -> Model:
         """Return this model without its effects; its own parameters keep their present values."""

@@ -252,3 +252,19 @@ def test_a_model_prints_as_one_short_line(model: Model) -> None:
     assert text.startswith("<Model name: flotation; states: tails_flow, level, ")
     assert text.endswith("; effects: grade_sensor_by_constant>")
     assert len(text) < 500
+
+
+def test_effects_of_one_kind_share_their_equations_and_keep_their_own_values(model: Model) -> None:
+    """Only the values of the coefficients may differ; another setting is another kind."""
+
+    def extended(reference: float, exponent: float) -> Model:
+        settings, values = {"reference": reference}, {"exponent": exponent}
+        return model.with_effects([Effect("bubble_size", "air_flow", "power", values, settings)])
+
+    one, other, third = extended(1e-3, 0.2), extended(1e-3, 0.4), extended(2e-3, 0.2)
+    assert one.ode is other.ode and one.ode is not third.ode
+    assert [m.fitted_effects()[0].coefficients["exponent"] for m in (one, other, third)] == [0.2, 0.4, 0.2]
+    assert not model.effects and one.effects != other.effects
+    moved = model.with_parameters({model.parameters[0].name: model.parameters[0].value * 1.01})
+    again = moved.with_effects(one.effects)
+    assert again.ode is one.ode and again.parameters[0] == moved.parameters[0]

@@ -112,6 +112,7 @@ class Scorer:
         self.residual = self._project(np.concatenate([np.clip(e[present], -1e3, 1e3), -fit.course]))
         self._columns = columns
         self._along = columns.T @ self.residual
+        self._null_gains: dict[tuple[int, int], FloatArray] = {}
         self._grams = {s.start: columns[:, s].T @ columns[:, s] for _, s in self._all_variants()}
 
     def _all_variants(self) -> Iterator[tuple[Variant, slice]]:
@@ -282,8 +283,13 @@ class Scorer:
             max over v of e'M X_v (X_v'M X_v)^-1 X_v'M e - k_v log(number of measurements)
 
         Davison & Hinkley, *Bootstrap Methods and their Application* (1997), 4.2; the maximum because the best of many
-        is reported (Westfall & Young, *Resampling-Based Multiple Testing*, 1993).
+        is reported (Westfall & Young, *Resampling-Based Multiple Testing*, 1993). Drawn once: a search asks again.
         """
+        if (draws, seed) not in self._null_gains:
+            self._null_gains[draws, seed] = self._drawn_null_gains(draws, seed)
+        return self._null_gains[draws, seed]
+
+    def _drawn_null_gains(self, draws: int, seed: int) -> FloatArray:
         rng = np.random.default_rng(seed)
         along = self._columns.T @ rng.standard_normal((len(self._columns), draws))
         best = np.full(draws, -np.inf)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.forms.static import spline_basis
+from adaptive_flot.greybox.forms.static import spline_numbers
 from adaptive_flot.greybox.model import FloatArray
 
 
@@ -25,16 +23,8 @@ def values_of(effect: Effect) -> list[float]:
 
 
 def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
-    """Cardinal natural splines (N, knots) at the values (N,): numbers from the very function the model uses."""
-    function = _spline_function(tuple(knots))
-    basis: FloatArray = np.array(function.map(len(values))(values)).T
-    return basis
-
-
-@lru_cache(maxsize=64)
-def _spline_function(knots: tuple[float, ...]) -> ca.Function:
-    x = ca.SX.sym("x")
-    return ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])
+    """Cardinal natural splines (N, knots) at the values (N,): those of the model, to rounding."""
+    return spline_numbers(values, np.asarray(knots, dtype=float))
 
 
 def drawn(effect: Effect, values: FloatArray) -> FloatArray:

@@ -65,6 +65,7 @@ class Descent:
     def __init__(self, problem: Problem, rows: BoolArray, model: Model, unknowns: Unknowns) -> None:
         self.problem, self.rows, self.model, self.unknowns = problem, rows, model, unknowns
         self.simulator = RecordSimulator(model, problem.record.dt, nodes_for(problem, model))
+        self._white_course: tuple[Noise, FloatArray] | None = None
 
     def _predict(self, z: FloatArray) -> FloatArray:
         p, x0 = self.unknowns.unpack(z)
@@ -76,16 +77,13 @@ class Descent:
         return free if wander is None else free + wander.outputs(z[self.unknowns.first_of_course :])
 
     def _jacobian(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Predictions (N, m) and their derivatives (N, m, unknowns)."""
+        """Predictions (N, m) and their derivatives (N, m, unknowns) but those by the course, which never change."""
         p, x0 = self.unknowns.unpack(z)
         gradient = self.unknowns.initial_gradient()
         y, dy, _ = self.simulator.sensitivities(self.problem.record, x0, p, self.unknowns.names, gradient)
         columns = list(self.problem.columns)
         dy[:, :, : self.unknowns.q] *= self.unknowns.scale
-        slope = dy[:, columns, :]
-        if self.problem.wander is not None:
-            slope = np.concatenate([slope, self.problem.wander.responses], axis=2)
-        return self._with_course(z, y[:, columns]), slope
+        return self._with_course(z, y[:, columns]), dy[:, columns, :]
 
     def _objective(self, z: FloatArray, predicted: FloatArray, noise: Noise) -> float:
         if not np.all(np.abs(predicted) < 1e100):
@@ -136,10 +134,7 @@ class Descent:
         scale = np.array([s.scale for s in self.model.states])
         self.unknowns.turn(np.diag(scale))
         _, slope = self._jacobian(self.unknowns.centre)
-        weighted = (
-            slope[:, :, self.unknowns.q : self.unknowns.first_of_course]
-            / (self.problem.weights * self._white_std())[:, :, None]
-        )
+        weighted = slope[:, :, self.unknowns.q :] / (self.problem.weights * self._white_std())[:, :, None]
         rows = weighted[self.rows].reshape(-1, len(scale))
         if not np.isfinite(rows).all():
             return np.zeros((len(scale), 0))
@@ -189,7 +184,7 @@ class Descent:
                 promised = float(2 * b @ moved - moved @ A @ moved)
                 kept = gained > (SHAPE_KEPT if shaped else KEPT) * promised
                 if kept:
-                    slope = _corrected(slope, moved, there - predicted, self._of_the_model(np.diag(A)))
+                    slope = self._corrected(slope, moved, there - predicted, np.diag(A))
                 done = gained < max(TOLERANCE, SLOW * (first - new))
                 z, value, predicted = trial, new, there
                 enough, exact = done and exact, False
@@ -203,13 +198,17 @@ class Descent:
             predicted, slope, exact = there, fresh, True
         return z, predicted, slope, exact
 
-    def _of_the_model(self, weight: FloatArray) -> FloatArray:
-        """Weights (unknowns,) without those of the course: what that does is linear, its derivatives are right."""
-        if self.problem.wander is None:
-            return weight
-        own = weight.copy()
-        own[self.unknowns.first_of_course :] = 0.0
-        return own
+    def _corrected(self, slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
+        """Derivatives that give the `change` (N, m) of the predictions along the step that made it.
+
+        What the course does is linear: its derivatives are right, and what it has changed is taken off.
+        """
+        own, course = np.split(moved, [self.unknowns.first_of_course])
+        if self.problem.wander is not None:
+            change = change - self.problem.wander.outputs(course)
+        along = weight[: len(own)] * own
+        updated: FloatArray = slope + (change - slope @ own)[:, :, None] * (along / max(float(own @ along), 1e-300))
+        return updated
 
     def _tried(
         self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
@@ -230,15 +229,27 @@ class Descent:
         """Normal equations (A, b) of the whitened, clipped, regularised problem."""
         rows, w = self.rows, self.problem.weights
         e = noise.whiten((self.problem.measured - predicted) / w)[rows]
-        J = noise.whiten(slope / w[:, :, None])[rows]
         present = np.isfinite(e)
         inside = present & (np.abs(np.where(present, e, 0)) <= self.problem.clip)
-        e = np.where(inside, e, 0)[inside]
-        J = J[inside]
+        e = e[inside]
+        everywhere = np.zeros(w.shape, dtype=bool)
+        everywhere[rows] = inside
+        J = noise.whiten_some(slope / w[:, :, None], everywhere)
+        if self.problem.wander is not None:
+            J = np.hstack([J, self._whitened_course(noise)[inside.ravel()]])
         prior = 1 / self.unknowns.prior**2
         A = J.T @ J + np.diag(prior)
         b = J.T @ e - prior * (z - self.unknowns.prior_centre)
         return A, b
+
+    def _whitened_course(self, noise: Noise) -> FloatArray:
+        """Whitened responses (values of the rows, k) to the course, once for each noise model."""
+        if self._white_course is None or self._white_course[0] is not noise:
+            assert self.problem.wander is not None  # asked by the caller
+            responses = self.problem.wander.responses / self.problem.weights[:, :, None]
+            all_of_them = np.broadcast_to(self.rows[:, None], responses.shape[:2])
+            self._white_course = noise, noise.whiten_some(responses, all_of_them)
+        return self._white_course[1]
 
     def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
         """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
@@ -305,13 +316,6 @@ class Descent:
             self.unknowns.directions,
             course,
         )
-
-
-def _corrected(slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
-    """Derivatives (N, m, unknowns) that give the `change` (N, m) of the predictions along the step that made it."""
-    along = weight * moved
-    updated: FloatArray = slope + (change - slope @ moved)[:, :, None] * (along / max(float(moved @ along), 1e-300))
-    return updated
 
 
 def _moderate(slope: FloatArray) -> bool:

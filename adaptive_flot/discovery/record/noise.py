@@ -54,6 +54,22 @@ class Noise:
             white[:, j] /= self.std[j]
         return white
 
+    def whiten_some(self, series: FloatArray, inside: NDArray[np.bool_]) -> FloatArray:
+        """Whitened series (count, q) of the values that are true in `inside` (N, m), by rows: `whiten(series)[inside]`.
+
+        The series (N, m, q), weighted already, has no missing value.
+        """
+        m = series.shape[1]
+        rows, outputs = np.nonzero(inside)
+        flat, at = series.reshape(-1, series.shape[2]), rows * m + outputs
+        white: FloatArray = flat[at]
+        for i, lags in enumerate(self.lags.T):
+            own = np.where(rows > i, lags[outputs], 0.0)  # the first rows have no past
+            if own.any():
+                white -= own[:, None] * flat[np.maximum(at - (i + 1) * m, 0)]
+        white /= self.std[outputs][:, None]
+        return white
+
     def stationary_std(self) -> FloatArray:
         """Standard deviation of the noise itself (m,), from its spectrum.
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
@@ -45,6 +46,8 @@ class State:
         The record in splits, and the fit of the model as it is to the estimation split.
     responses
         Linear responses along that fit, until the search has used them.
+    scored
+        Scores along that fit and sites of adapted parameters, where a stage before the search has needed them.
     detection
         What the residual of that fit shows.
     search, judgement
@@ -78,6 +81,7 @@ class State:
     problem: Problem | None = None
     base: Fit | None = None
     responses: Responses | None = None
+    scored: tuple[Scorer, tuple[str, ...]] | None = None
     detection: Detection | None = None
     search: SearchResult | None = None
     judgement: Judgement | None = None

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from adaptive_flot.discovery.assessment.verification import loglik_difference_sds, rows_per_effective_sample, verify
-from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -29,7 +29,7 @@ def search(
     base: Fit,
     nominal: Model,
     *,
-    responses: Responses | None = None,
+    scored: tuple[Scorer, tuple[str, ...]] | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> SearchResult:
@@ -41,16 +41,15 @@ def search(
         The record and the fit of the model as it is, on the estimation split.
     nominal
         The model with the parameter values it came with.
-    responses
-        Responses along the base fit, where they are known already.
+    scored
+        What `scorer_of` gives for the base fit, where it is known already.
     processes
         Fits that run at once.
     progress
         Called with a word for each stage.
     """
     fitter = Fitter(problem)
-    progress("score")
-    scorer, sites = scorer_of(problem, base, responses)
+    scorer, sites = scored or scorer_of(problem, base)
     near = _near(fitter, base, nominal)
     scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
     rounds = [run_round(fitter, base, scorers, [None], processes, progress)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
@@ -69,23 +72,33 @@ def spline_basis(x: ca.SX, knots: FloatArray) -> list[ca.SX]:
     Hastie, Tibshirani & Friedman, *The Elements of Statistical Learning*, 2nd ed., (5.4) and (5.5). The driver is
     scaled to the span of the knots first.
     """
-    low, span = knots[0], knots[-1] - knots[0]
-    s = (x - low) / span
-    at = (knots - low) / span
+    at, inverse = _scaled_knots(knots)
+    s = (x - knots[0]) / (knots[-1] - knots[0])
+    terms = _powers(s, at, [ca.fmax(s - b, 0) ** 3 for b in at])
+    return list(ca.vertsplit(ca.mtimes(ca.DM(inverse.T), ca.vertcat(*terms))))
 
-    def raw(v: ca.SX | float) -> list[ca.SX]:
-        def d(k: int) -> ca.SX:
-            cubic: ca.SX = (ca.fmax(v - at[k], 0) ** 3 - ca.fmax(v - at[-1], 0) ** 3) / (at[-1] - at[k])
-            return cubic
 
-        return [ca.SX(1), ca.SX(v), *(d(k) - d(len(at) - 2) for k in range(len(at) - 2))]
+def spline_numbers(x: FloatArray, knots: FloatArray) -> FloatArray:
+    """The same splines (N, knots) at the numbers x (N,)."""
+    at, inverse = _scaled_knots(knots)
+    s = (x - knots[0]) / (knots[-1] - knots[0])
+    above = [np.maximum(s - b, 0.0) for b in at]
+    terms = _powers(s, at, [a * a * a for a in above])
+    table: FloatArray = np.column_stack([np.ones(len(s)), *terms[1:]]) @ inverse
+    return table
 
-    values = np.array([[float(b) for b in raw(float(a))] for a in at])
-    inverse: FloatArray = np.linalg.inv(values)
-    terms = raw(s)
-    return [
-        sum((terms[i] * inverse[i, k] for i in range(1, len(at))), terms[0] * inverse[0, k]) for k in range(len(at))
-    ]
+
+def _scaled_knots(knots: FloatArray) -> tuple[list[float], FloatArray]:
+    """Knots from 0 to 1, and the inverse of the basis of truncated powers at them."""
+    at = [float(a) for a in (knots - knots[0]) / (knots[-1] - knots[0])]
+    values = np.array([_powers(a, at, [max(a - b, 0.0) ** 3 for b in at]) for a in at])
+    return at, np.linalg.inv(values)
+
+
+def _powers(v: Any, at: Sequence[float], cubes: Sequence[Any]) -> list[Any]:
+    """The basis of truncated powers at v, a number or a symbol, with the cubes of what v is above each knot."""
+    d = [(cube - cubes[-1]) / (at[-1] - knot) for cube, knot in zip(cubes[:-1], at[:-1], strict=True)]
+    return [1.0, v, *(each - d[-1] for each in d[:-1])]
 
 
 def _hinge(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:

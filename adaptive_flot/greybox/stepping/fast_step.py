@@ -135,7 +135,7 @@ def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
     """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
     n, q = decay.along.shape
     z, step = ca.SX.sym("z", n), ca.SX.sym("h")
-    factors = weights(z, step, series=isinstance(h, float))
+    factors = weights(z, step, series_phi(z) if isinstance(h, float) else closed_phi(z))
     values = ca.Function("weights", [z, step], factors)(h * decay.value, h)
     if not q:
         return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
@@ -145,12 +145,16 @@ def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
     return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
 
 
-def weights(z: ca.SX, h: ca.SX, *, series: bool) -> list[ca.SX]:
+Phis = tuple[ca.SX, ca.SX, ca.SX, ca.SX]
+"""phi_1 to phi_3 of z, and phi_1 of z / 2."""
+
+
+def weights(z: ca.SX, h: ca.SX, phi: Phis) -> list[ca.SX]:
     """Factors of state and slopes in the method for z = decay h: half, half_slope, whole, first, middle, last.
 
-    By the series near zero alone, or for any z <= 0.
+    `phi` are those near zero (`series_phi`), for other z (`far_phi`), or for any z <= 0 (`closed_phi`).
     """
-    phi1, phi2, phi3, phi1_half = (_series if series else closed_phi)(z)
+    phi1, phi2, phi3, phi1_half = phi
     return [
         z / 2 * phi1_half + 1,
         h / 2 * phi1_half,
@@ -161,7 +165,7 @@ def weights(z: ca.SX, h: ca.SX, *, series: bool) -> list[ca.SX]:
     ]
 
 
-def _series(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def series_phi(z: ca.SX) -> Phis:
     """phi_1 to phi_3 of z and phi_1 of z / 2, from phi_k(z) = sum over j of z^j / (j + k)!: no cancellation near 0."""
 
     def phi(k: int, at: ca.SX) -> ca.SX:
@@ -175,15 +179,17 @@ def _series(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     return z * phi2 + 1, phi2, phi3, phi(1, z / 2)
 
 
-def closed_phi(z: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """The same for any z <= 0: the series near 0, else phi_1 = (exp(z) - 1) / z, phi_k+1 = (phi_k - 1 / k!) / z."""
+def far_phi(z: ca.SX) -> Phis:
+    """The same for z <= -1: phi_1 = (exp(z) - 1) / z, phi_k+1 = (phi_k - 1 / k!) / z."""
+    phi1 = (ca.exp(z) - 1) / z
+    phi2 = (phi1 - 1) / z
+    return phi1, phi2, (phi2 - 0.5) / z, (ca.exp(z / 2) - 1) / (z / 2)
+
+
+def closed_phi(z: ca.SX) -> Phis:
+    """The same for any z <= 0: the series near 0, else `far_phi`."""
     near = z > -1
-    far = ca.if_else(near, -1.0, z)
-    phi1 = (ca.exp(far) - 1) / far
-    phi2 = (phi1 - 1) / far
-    phi3 = (phi2 - 0.5) / far
-    half = (ca.exp(far / 2) - 1) / (far / 2)
-    pairs = zip(_series(ca.if_else(near, z, 0.0)), (phi1, phi2, phi3, half), strict=True)
+    pairs = zip(series_phi(ca.if_else(near, z, 0.0)), far_phi(ca.if_else(near, -1.0, z)), strict=True)
     first, second, third, halved = (ca.if_else(near, small, large) for small, large in pairs)
     return first, second, third, halved
 

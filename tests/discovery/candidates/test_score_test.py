@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.noise import Noise, with_rows_before
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.static import spline_basis
 from adaptive_flot.greybox.stepping.nodes import place_nodes
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from tests.discovery.heated import DT, EXPONENT, Truth, heated_tank, tank_record
@@ -199,6 +201,9 @@ def test_splines_pass_through_their_knots_and_a_finer_one_draws_the_same_curve(
     knots = (1.0, 2.0, 4.0, 5.0)
     np.testing.assert_allclose(spline_values(np.array(knots), knots), np.eye(4), atol=1e-12)
     np.testing.assert_allclose(spline_values(np.linspace(0, 7, 30), knots).sum(axis=1), 1.0)
+    x, at = ca.SX.sym("x"), np.linspace(-1, 8, 40)
+    symbolic = ca.Function("basis", [x], [ca.vertcat(*spline_basis(x, np.array(knots)))])
+    np.testing.assert_allclose(spline_values(at, knots), [np.array(symbolic(v)).ravel() for v in at], atol=1e-12)
     *_, scorer = weak
     curve = next(v for v in _candidate(scorer, "heat_loss", "fan_speed").variants if v.effect.form == "curve")
     start = {n: float(k) for k, n in enumerate(curve.coefficients)}

@@ -141,7 +141,7 @@ def test_a_tape_and_the_compiled_equations_give_the_same_bits(name: str, monkeyp
     assert code._compiled is None
     monkeypatch.setattr(library, "WORTH_COMPILING", 0)
     again = code(x0, u, p, 5.0, gradient)
-    assert code._compiled is not None and set(code._compiled) == {"rates", "ends", "weights"}
+    assert code._compiled is not None and {"rates", "rates_held", "ends", "near", "far"} <= set(code._compiled)
     for what in ("states", "outputs", "signals", "gradients", "last_gradient"):
         np.testing.assert_array_equal(getattr(again, what), getattr(by_tape, what))
 
@@ -226,7 +226,7 @@ def test_knots_are_numbers_beside_the_code() -> None:
     def source(reference: float) -> tuple[str, list[float]]:
         effect = Effect("place", "drive", "power", settings={"reference": reference})
         made = kernels(SMALL.with_effects([effect]), ("gain",), True)
-        tapes = {name: tape_of(getattr(made, name)) for name in ("rates", "ends", "weights")}
+        tapes = {name: tape_of(getattr(made, name), (2, 3)) for name in ("rates", "ends")}
         return kernel_source(tapes), [float(v) for tape in tapes.values() for v in tape.memory]
 
     (one, numbers), (other, others) = source(1.5), source(1.7)
@@ -264,3 +264,19 @@ def test_a_short_run_is_not_worth_the_compiler(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(stepper, "LEAST_STEPS", ROWS + 1)
     quick = Stepper(replace(SMALL, record_code=True), 1.0)
     assert quick.record_code(ROWS, None) is None
+
+
+@needs_compiler
+def test_what_rests_with_the_inputs_is_worked_out_once_and_changes_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against a tape on which no argument is held; inputs that rest, move, and rest again."""
+    held = library._HELD
+    assert len(tape_of(kernels(SMALL, ("gain",), False).rates, held["rates"]).held) > 1
+    monkeypatch.setattr(library, "is_kept", lambda *_: False)
+    (x0, u), p, gradient = record(SMALL), SMALL.parameter_values, np.eye(2, 3)
+    u = np.column_stack([np.vstack([u, u[-1:], u[:3]]), np.linspace(0.2, 2.0, ROWS + 4)])
+    runs = []
+    for kept in (held, dict.fromkeys(held, ())):
+        monkeypatch.setattr(library, "_HELD", kept)
+        runs.append(WholeRecord(replace(SMALL, record_code=True), None, 1, ["gain"])(x0, u, p, 5.0, gradient))
+    for what in ("states", "outputs", "signals", "gradients", "last_gradient"):
+        np.testing.assert_array_equal(getattr(runs[0], what), getattr(runs[1], what))

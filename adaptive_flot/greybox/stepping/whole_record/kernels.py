@@ -5,12 +5,13 @@ The Jacobians are total ones: the algebraic variable moves along, by the implici
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.stepping.fast_step import weights
+from adaptive_flot.greybox.stepping.fast_step import Phis, far_phi, series_phi, weights
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,9 @@ class Kernels:
         by (x, unknown parameters).
     ends
         `(x, t, u, p) -> (y, s)` and the same entries of the Jacobian of y.
-    weights
-        `(z, h) ->` the six weights of the method for one state, and their derivatives by z.
+    near, far
+        `(z, h, z) ->` the six weights of the method for one state, and their derivatives by z: for z > -1, and for
+        others. With z twice their operations are those of the plain step, to the last bit.
     rates_entries, ends_entries
         Row and column of each entry of the Jacobians, by rows.
     decays
@@ -34,7 +36,8 @@ class Kernels:
 
     rates: ca.Function
     ends: ca.Function
-    weights: ca.Function
+    near: ca.Function
+    far: ca.Function
     rates_entries: tuple[tuple[int, int], ...]
     ends_entries: tuple[tuple[int, int], ...]
     decays: tuple[bool, ...]
@@ -83,14 +86,19 @@ def kernels(model: Model, wrt: tuple[str, ...] | None, fixed_step: bool) -> Kern
     rates_kernel, rates_entries = kernel("rates", [rates, decay], ca.vertcat(rates, decay))
     ends_kernel, ends_entries = kernel("ends", [y, s], y)
     h = ca.SX.sym("h")
-    one = ca.SX.sym("z")
-    values = weights(one, h, series=fixed_step)
-    derivatives = [ca.jtimes(w, one, ca.SX.ones(1)) for w in values] if wrt is not None else []
-    weight_kernel = ca.Function("weights", [one, h], [ca.vertcat(*values, *derivatives)], {"cse": True})
+    z, again = ca.SX.sym("z"), ca.SX.sym("again")
+
+    def weight_kernel(name: str, phi: Callable[[ca.SX], Phis]) -> ca.Function:
+        values = weights(z, h, phi(z if fixed_step else again))
+        both = ca.vertcat(z, again)
+        derivatives = [ca.jtimes(w, both, ca.SX.ones(2)) for w in values] if wrt is not None else []
+        return ca.Function(name, [z, h, again], [ca.vertcat(*values, *derivatives)], {"cse": True})
+
     return Kernels(
         rates_kernel,
         ends_kernel,
-        weight_kernel,
+        weight_kernel("near", series_phi),
+        weight_kernel("far", series_phi if fixed_step else far_phi),
         rates_entries,
         ends_entries,
         tuple(not decay[i].is_zero() for i in range(x.numel())),

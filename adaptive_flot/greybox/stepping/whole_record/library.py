@@ -52,15 +52,20 @@ class Rows:
 class _Tape(ctypes.Structure):
     """A tape as the library sees it."""
 
-    _fields_ = [(name, ctypes.c_void_p) for name in ("code", "memory", "arguments", "results", "compiled")]
+    _fields_ = [
+        (name, ctypes.c_void_p)
+        for name in ("held", "code", "memory", "arguments", "results", "compiled_held", "compiled")
+    ]
 
-    def __init__(self, tape: Tape, memory: FloatArray, compiled: int | None) -> None:
-        super().__init__(*(a.ctypes.data for a in (tape.code, memory, tape.arguments, tape.results)), compiled)
+    def __init__(self, tape: Tape, memory: FloatArray, held: int | None, compiled: int | None) -> None:
+        arrays = tape.held, tape.code, memory, tape.arguments, tape.results
+        super().__init__(*(a.ctypes.data for a in arrays), held, compiled)
 
 
 _SIZES = ("nx", "nu", "ny", "ns", "np", "nr", "rx", "ne")
 _TABLES = ("decays", "rate_rows", "rate_columns", "end_rows", "end_columns")
-_TAPES = ("rates", "ends", "weights")
+_HELD = {"rates": (2, 3), "ends": (2, 3), "near": (), "far": ()}
+"""Each tape, with the places of its arguments that are held from step to step: inputs and parameters."""
 
 
 class _Kernels(ctypes.Structure):
@@ -69,7 +74,7 @@ class _Kernels(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int64) for name in _SIZES),
         *((name, ctypes.c_void_p) for name in _TABLES),
-        *((name, _Tape) for name in _TAPES),
+        *((name, _Tape) for name in _HELD),
     ]
 
 
@@ -106,7 +111,7 @@ class WholeRecord:
         jacobians = len(rate), sum(row < self._nx for row, _ in rate), len(end)
         self._sizes = self._nx, nu, self._ny, self._ns, self._np, *jacobians
         self._tables = _table([*made.decays, False], np.uint8), *_columns(rate), *_columns(end)
-        self._tapes = {name: tape_of(getattr(made, name)) for name in _TAPES}
+        self._tapes = {name: tape_of(getattr(made, name), held) for name, held in _HELD.items()}
         self._run = _library()
         self._compiled: dict[str, int] | None = None
         self._steps = 0
@@ -154,7 +159,10 @@ class WholeRecord:
         wanted += [None if plain else made.gradients, made.state_gradients if anew else None]
         compiled = self._machine_code(rows)
         memories = {name: tape.memory.copy() for name, tape in self._tapes.items()}  # so that threads may run at once
-        tapes = [_Tape(tape, memories[name], compiled.get(name)) for name, tape in self._tapes.items()]
+        tapes = [
+            _Tape(tape, memories[name], compiled.get(f"{name}_held"), compiled.get(name))
+            for name, tape in self._tapes.items()
+        ]
         given = _Kernels(*self._sizes, *(table.ctypes.data for table in self._tables), *tapes)
         self._run(
             ctypes.byref(given),
@@ -229,4 +237,5 @@ def _open(library: Path) -> Any:
 def _open_kernels(library: Path) -> dict[str, int]:
     """Addresses of the functions of a library, which stays loaded."""
     opened = ctypes.CDLL(str(library))
-    return {name: int(ctypes.cast(getattr(opened, name), ctypes.c_void_p).value or 0) for name in _TAPES}
+    names = [each for name in _HELD for each in (name, f"{name}_held")]
+    return {name: int(ctypes.cast(getattr(opened, name), ctypes.c_void_p).value or 0) for name in names}

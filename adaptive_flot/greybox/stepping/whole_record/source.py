@@ -16,16 +16,16 @@ _HEAD = """
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
-/* `compiled` is the tape as machine code, or null. */
+/* `compiled` and `compiled_held` are the tape as machine code, or null. */
 typedef struct {
-    const uint16_t *code; double *memory; const int64_t *arguments, *results;
-    void (*compiled)(const double *, double *);
+    const uint16_t *held, *code; double *memory; const int64_t *arguments, *results;
+    void (*compiled_held)(const double *, double *), (*compiled)(const double *, double *);
 } Tape;
 typedef struct {
     int64_t nx, nu, ny, ns, np, nr, rx, ne;
     const uint8_t *decays;
     const int16_t *rate_rows, *rate_columns, *end_rows, *end_columns;
-    Tape rates, ends, weights;
+    Tape rates, ends, near, far;
 } Kernels;
 """
 
@@ -34,16 +34,27 @@ static double *argument(const Tape *tape, int k) { return tape->memory + tape->a
 static double *result(const Tape *tape, int k) { return tape->memory + tape->results[k]; }
 static void copy(double *to, const double *from, int64_t n) { memcpy(to, from, (size_t)n * sizeof(double)); }
 
-/* Inputs and parameters of a row: they stay where rates and ends read them. */
+/* Inputs and parameters of a row: they stay where rates and ends read them, with what depends on them alone. */
 static void hold(const Tape *tape, const Kernels *k, const double *u, const double *p) {
     copy(argument(tape, 2), u, k->nu);
     copy(argument(tape, 3), p, k->np);
+    if (tape->compiled_held) tape->compiled_held(tape->memory, tape->memory);
+    else evaluate(tape->held, tape->memory);
+}
+
+static int same(const double *one, const double *other, int64_t n) {
+    return memcmp(one, other, (size_t)n * sizeof(double)) == 0;
+}
+
+static void run_tape(const Tape *tape) {
+    if (tape->compiled) tape->compiled(tape->memory, tape->memory);
+    else evaluate(tape->code, tape->memory);
 }
 
 static void evaluate_at(const Tape *tape, const Kernels *k, const double *x, double t) {
     copy(argument(tape, 0), x, k->nx);
     *argument(tape, 1) = t;
-    evaluate(tape);
+    run_tape(tape);
 }
 
 /* Derivatives (n, q) of values whose Jacobian by (state, parameters) is given by entries. */
@@ -76,10 +87,12 @@ static void step(const Kernels *K, double t, double h, double *restrict x, doubl
     for (int i = 0; i < nx; i++) {
         memset(w[i], 0, sizeof w[i]);
         if (K->decays[i]) {
-            *argument(&K->weights, 0) = h * r[i];
-            *argument(&K->weights, 1) = h;
-            evaluate(&K->weights);
-            copy(w[i], result(&K->weights, 0), q ? 12 : 6);
+            const Tape *weights = h * r[i] > -1. ? &K->near : &K->far;
+            *argument(weights, 0) = h * r[i];
+            *argument(weights, 1) = h;
+            *argument(weights, 2) = h * r[i];
+            run_tape(weights);
+            copy(w[i], result(weights, 0), q ? 12 : 6);
         }
         else {
             w[i][0] = w[i][2] = 1.; w[i][1] = h / 2; w[i][3] = w[i][5] = h / 6; w[i][4] = h / 3;
@@ -147,8 +160,10 @@ void run(const Kernels *K, int64_t rows, int64_t substeps, double dt, double t0,
         const double length = dt > 0. ? dt : u[K->nu], h = length / (double)substeps;
         const double t = dt > 0. ? t0 + dt * (double)row : t0 + elapsed;
         if (q && anew) copy(S, S0, size);
-        hold(&K->rates, K, u, p);
-        hold(&K->ends, K, u, p);
+        if (!row || !same(u, u - width, K->nu) || !same(p, p - parameter_stride, K->np)) {
+            hold(&K->rates, K, u, p);
+            hold(&K->ends, K, u, p);
+        }
         for (int64_t i = 0; i < substeps; i++) step(K, t + (double)i * h, h, x, S, q, work);
         elapsed += length;
         evaluate_at(&K->ends, K, x, t + length);
@@ -175,10 +190,8 @@ def _evaluation() -> str:
         if kind != END
     ]
     return "\n".join([
-        "static void evaluate(const Tape *tape) {",
-        "if (tape->compiled) { tape->compiled(tape->memory, tape->memory); return; }",
+        "static void evaluate(const uint16_t *c, double *const m) {",
         f"static const void *const go[] = {{{jumps}}};",
-        "double *const m = tape->memory; const uint16_t *c = tape->code;",
         "goto *go[c[0]];",
         *cases,
         f"do_{END}: return;",
@@ -192,4 +205,4 @@ RECORD_SOURCE = "\n".join([_HEAD, HELPERS, _evaluation(), _LOOPS])
 
 def kernel_source(tapes: Mapping[str, Tape]) -> str:
     """C source of tapes as functions of their names, for a model that runs many times."""
-    return "\n".join(["#include <math.h>", HELPERS, *(tape.c_function(name) for name, tape in tapes.items())])
+    return "\n".join(["#include <math.h>", HELPERS, *(tape.c_functions(name) for name, tape in tapes.items())])

@@ -3,10 +3,14 @@
 To compile the equations of each model takes a compiler longer than a few runs of a record. A tape is read instead: an
 operation is four numbers, its kind and three places in a memory that holds arguments, results, the numbers of the
 equations, and what is worked out on the way. The same operations as C are for a model that runs many times.
+
+What depends on arguments that rarely change (inputs and parameters of a row) is worked out once for them, by a list of
+its own: a quarter of the operations of a flotation cell, and of its powers.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -33,47 +37,61 @@ class Tape:
 
     Attributes
     ----------
+    held
+        The operations that depend on held arguments alone: kind, place of the result and places of the operands of each
+        (n, 4); the last is `END`.
     code
-        Kind, place of the result and places of the operands of each operation (n, 4); the last is `END`.
+        The other operations in the same way.
     memory
         The memory (places,) as it is at first: zero but for the numbers of the equations.
     arguments, results
         Where each argument and each result of the function begins (int).
     numbers
-        Places of the first number of the equations, and of the first intermediate value.
+        Places of the first number of the equations, and of the first value that is worked out.
     """
 
+    held: NDArray[np.uint16]
     code: NDArray[np.uint16]
     memory: FloatArray
     arguments: NDArray[np.int64]
     results: NDArray[np.int64]
     numbers: tuple[int, int]
 
-    def c_function(self, name: str) -> str:
-        """The same as a C function `void NAME(const double *i, double *o)`: both are the memory.
+    def c_functions(self, name: str) -> str:
+        """The same as C functions `void NAME(const double *i, double *o)` and `NAME_held`: both are the memory.
 
         Numbers stand in the memory, so that two models of the same structure have the same code; but those that are
         part of the form of an equation.
         """
+        return "\n".join([self._c_function(f"{name}_held", self.held), self._c_function(name, self.code)])
+
+    def _c_function(self, name: str, code: NDArray[np.uint16]) -> str:
         first, beyond = self.numbers
+        made = {to for _, to, _, _ in code[:-1].tolist() if to >= beyond}
+        declared, body = dict[int, None](), list[str]()
 
         def read(place: int) -> str:
-            if place >= beyond:
+            if place in made:
                 return f"a{place}"
             value = float(self.memory[place])
-            return repr(value) if place >= first and value in STRUCTURAL else f"i[{place}]"
+            return repr(value) if first <= place < beyond and value in STRUCTURAL else f"i[{place}]"
 
-        body = []
-        for kind, to, one, other in self.code[:-1].tolist():
-            made = f"a{to}" if to >= beyond else f"o[{to}]"
-            body.append(f"{made}={TEMPLATES[OPERATIONS[kind]].format(read(one), read(other))};")
-        places = ", ".join(f"a{place}" for place in range(beyond, len(self.memory)))
-        declared = f"double {places};" if places else ""
-        return "\n".join([f"void {name}(const double *restrict i, double *restrict o) {{", declared, *body, "}"])
+        for kind, to, one, other in code[:-1].tolist():
+            value = TEMPLATES[OPERATIONS[kind]].format(read(one), read(other))
+            if to < beyond:
+                body.append(f"o[{to}]={value};")
+                continue
+            declared[to] = None
+            body.append(f"a{to}={value};")
+            if code is self.held:
+                body.append(f"o[{to}]=a{to};")
+        places = ", ".join(f"a{place}" for place in declared)
+        lines = [f"double {places};" if places else "", *body, "}"]
+        return "\n".join([f"void {name}(const double *restrict i, double *restrict o) {{", *lines])
 
 
-def tape_of(function: ca.Function) -> Tape:
-    """The tape of an SX function.
+def tape_of(function: ca.Function, held: Sequence[int] = ()) -> Tape:
+    """The tape of an SX function, with the places of the arguments that are held from one call to the next.
 
     Raises
     ------
@@ -91,50 +109,74 @@ def tape_of(function: ca.Function) -> Tape:
         raise CompileError(f"{name} has an argument or result that is not dense")
     arguments = np.concatenate([[0], np.cumsum(given)]).astype(np.int64)
     results = (arguments[-1] + np.concatenate([[0], np.cumsum(made)])).astype(np.int64)
-    steps, numbers = _steps(function, arguments, results)
+    once, steps, numbers, left = _steps(function, arguments, results, held)
     first = int(results[-1]) + len(numbers)  # of the places that the function itself works in
-    code = np.array([(kind, *(_place(at, first) for at in places)) for kind, *places in steps], dtype=np.int64)
-    places = max(int(code[:, 1:].max(initial=0)), first) + 1
+    held_code, code = (
+        np.array([(kind, *(_place(at, first, left) for at in places)) for kind, *places in part], dtype=np.int64)
+        for part in (once, steps)
+    )
+    places = max(int(code[:, 1:].max(initial=0)), first + left) + 1
     if places > MOST_PLACES:
         raise CompileError(f"{name} is too large: {places} places")
     memory = np.zeros(places)
     memory[results[-1] : first] = numbers
     where = int(results[-1]), first
-    return Tape(np.ascontiguousarray(code, dtype=np.uint16), memory, arguments[:-1], results[:-1], where)
+    before, written = (np.ascontiguousarray(part, dtype=np.uint16) for part in (held_code, code))
+    return Tape(before, written, memory, arguments[:-1], results[:-1], where)
 
 
 Step = tuple[int, int, int, int]
+HELD = 2**20
+"""From this number on a place is that of a value which is left by the operations on held arguments."""
 
 
 def _steps(
-    function: ca.Function, arguments: NDArray[np.int64], results: NDArray[np.int64]
-) -> tuple[list[Step], list[float]]:
-    """Each operation with its places, and the numbers of the equations. Intermediate values count from -1 down.
+    function: ca.Function, arguments: NDArray[np.int64], results: NDArray[np.int64], held: Sequence[int]
+) -> tuple[list[Step], list[Step], list[float], int]:
+    """Operations on held arguments alone, the others, the numbers of the equations, how many values the first leave.
 
-    What only fetches an argument or a number is no operation: whoever uses it reads it where it is.
+    Those values count from HELD up, intermediate ones from -1 down. What only fetches an argument or a number is no
+    operation: whoever uses it reads it where it is.
     """
     number = {kind: k for k, kind in enumerate(OPERATIONS)}
     numbers: list[float] = []
     at: dict[int, int] = {}
+    still: set[int] = set()
+    once: list[Step] = []
     steps: list[Step] = []
+    left = 0
     for k in range(function.n_instructions()):
         operation = CODES.get(function.instruction_id(k), "?")
         i, o = function.instruction_input(k), function.instruction_output(k)
         if operation == "INPUT":
             at[o[0]] = int(arguments[i[0]]) + i[1]
+            if i[0] in held:
+                still.add(at[o[0]])
         elif operation == "CONST":
             at[o[0]] = int(results[-1]) + len(numbers)
+            still.add(at[o[0]])
             numbers.append(function.instruction_constant(k))
         elif operation == "OUTPUT":
-            steps.append((number["ASSIGN"], int(results[o[0]]) + o[1], at[i[0]], 0))
+            part = once if at[i[0]] in still else steps
+            part.append((number["ASSIGN"], int(results[o[0]]) + o[1], at[i[0]], 0))
         elif operation in number:
             operands = [at[j] for j in i]
+            if held and still.issuperset(operands):
+                at[o[0]] = HELD + left
+                left += 1
+                still.add(at[o[0]])
+                once.append((number[operation], at[o[0]], operands[0], operands[-1]))
+                continue
             at[o[0]] = -1 - o[0]
             steps.append((number[operation], at[o[0]], operands[0], operands[-1]))
         else:
             raise CompileError(f"{function.name()} has the operation {operation}, which has no form in C")
-    return [*steps, (number[END], 0, 0, 0)], numbers
+    end = (number[END], 0, 0, 0)
+    return [*once, end], [*steps, end], numbers, left
 
 
-def _place(at: int, first: int) -> int:
-    return at if at >= 0 else first - 1 - at
+def _place(at: int, first: int, left: int) -> int:
+    """The place in memory: after numbers that begin before `first` come `left` held values, then intermediate ones."""
+    if at >= HELD:
+        return first + at - HELD
+    return at if at >= 0 else first + left - 1 - at
