@@ -11,13 +11,13 @@ candidates/   What could be missing: catalogue, first-order responses, the score
 results/      What the stages come to, as plain data: everything else may read it.
 assessment/   What a fit is worth: residual tests, verification on rows to which nothing was fitted.
 search/       Which combination it is: successive halving, rounds, joint search, common nuisance.
+background/   What is always a little wrong: a feed that wanders, constants. It is then a part of every fit.
 test_design/  Which input moves would tell the leading alternatives apart.
 verdict/      The word, its reasons, and how they are put.
 hypotheses/   Named hypotheses about several records: what has changed since a reference.
 innovations/  A second opinion with process noise: when something happened, and what it may be.
 discover.py   What is called for one record: the stages, one after the other.
 stages.py     The stages, from the data to the proposed test.
-wandering.py  Whether a feed that nobody measures wanders; its course is then a part of every fit.
 changes.py    What has changed since a reference, events too.
 
 Where a statistic is computed
@@ -26,7 +26,7 @@ score statistic            candidates/score_test.py   Scorer
 null law of the search     candidates/score_test.py   Scorer.null_gains
 likelihood, BIC            fitting/fit.py             loss_of, Fit.bic
 noise model                record/noise.py            fit_noise
-marginal likelihood, feed  wandering.py               _best, fitting/fit.py
+marginal likelihood        background/evidence.py     Evidence, fitting/fit.py
 effective sample size      record/effective_samples.py  correlation_times
 Ljung-Box, Holm            assessment/detect.py       detect
 block bootstrap            assessment/verification.py verify

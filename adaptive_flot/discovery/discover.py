@@ -13,6 +13,7 @@ from adaptive_flot.discovery.innovations.second_opinion import second_opinion
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.discovery.stages import (
+    allow_for_background,
     check_explained,
     check_sufficient,
     compare_with_common_nuisance,
@@ -21,13 +22,12 @@ from adaptive_flot.discovery.stages import (
     fit_without_report,
     heed_report,
     judge_alternatives,
-    let_feed_wander,
     plan_test,
     screen_record,
     search_at_once,
     search_one_by_one,
     split_rows,
-    tell_wandering,
+    tell_background,
 )
 from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import conclude
@@ -111,10 +111,10 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     fit_model_as_it_is,
     check_explained,
     examine_residual,
-    let_feed_wander,
+    allow_for_background,
     search_one_by_one,
     search_at_once,
-    tell_wandering,
+    tell_background,
     compare_with_common_nuisance,
     judge_alternatives,
     fit_without_report,

@@ -9,7 +9,10 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
-from adaptive_flot.discovery.assessment.verification import changes
+from adaptive_flot.discovery.assessment.verification import changes, drop_beside_background, unknown_of_background
+from adaptive_flot.discovery.background.fitting import fit_with_background, needed
+from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
+from adaptive_flot.discovery.background.wording import background_words, subject
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.base_fit import prepare, split_finer, split_record
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
@@ -36,15 +39,8 @@ from adaptive_flot.discovery.verdict.report_veto import (
     noise_from_row_to_row,
     unexplained,
 )
-from adaptive_flot.discovery.wandering import (
-    course_words,
-    needed,
-    rows_of_block,
-    unmeasured_feeds,
-    wandering,
-    with_course,
-)
 from adaptive_flot.greybox.assumed_start import wrong_start
+from adaptive_flot.greybox.rescaled import factors_of, rescaled
 
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5
 """How long the last fits, and the proposed test, take: about so many times what the fit of the model as it is took."""
@@ -103,26 +99,25 @@ def examine_residual(state: State) -> State:
     return replace(state, detection=detect(*state.fitted))
 
 
-def let_feed_wander(state: State) -> State:
-    """Give a feed that nobody measures a course of its own, where that explains more than any effect."""
+def allow_for_background(state: State) -> State:
+    """Let a feed that nobody measures wander and constants be off, where that explains more than any effect."""
     problem, base = state.fitted
-    if state.responses is None or problem.time_is_up or not unmeasured_feeds(problem, base, state.responses):
+    if state.responses is None or problem.time_is_up or not may_have_background(problem, state.responses):
         return state
-    state.progress("look for a feed that wanders")
+    state.progress("look for a background")
     responses = state.responses
     scored = scorer_of(problem, base, responses)
-    course = wandering(problem, base, responses, scored[0])
-    if course is None:
+    spread = spread_of(problem, base, responses, scored[0])
+    if spread is None:
         return replace(state, scored=scored)  # the search begins with the same
     cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
-    problem = split_finer(problem, cycle, rows_of_block(course, problem.record.dt))
-    for _ in range(2):  # once more along the fit that has it
-        problem = replace(problem, wander=with_course(problem, course, responses))
-        fitted = Fitter(problem).fit(base.model, base.names, like=base, rounds=2)
-        if fitted is None:
-            return state
-        base, responses = fitted, Responses(problem, fitted)
-    return replace(state, problem=problem, base=base, responses=responses)
+    if (least := rows_of_block(spread, problem.record.dt)) is not None:
+        problem = split_finer(problem, cycle, least)
+    fitted = fit_with_background(problem, spread, base, responses)
+    if fitted is None:
+        return state
+    problem, base = fitted
+    return replace(state, problem=problem, base=base, responses=Responses(problem, base))
 
 
 def search_one_by_one(state: State) -> State:
@@ -131,7 +126,8 @@ def search_one_by_one(state: State) -> State:
     state.progress("score")
     scored = state.scored or scorer_of(problem, base, state.responses)
     state = replace(state, responses=None, scored=None)
-    found = search(problem, base, state.model, scored=scored, processes=state.processes, progress=state.progress)
+    nominal = rescaled(state.model, factors_of(base.model))
+    found = search(problem, base, nominal, scored=scored, processes=state.processes, progress=state.progress)
     return replace(state, search=found)
 
 
@@ -144,17 +140,17 @@ def search_at_once(state: State) -> State:
     return replace(state, problem=problem, base=result.base, search=result)
 
 
-def tell_wandering(state: State) -> State:
-    """Say that a feed wanders, where the best alternative needs it."""
+def tell_background(state: State) -> State:
+    """Say that a feed wanders, and how far constants are off, where the best alternative needs it."""
     problem, result = state.searched
-    wander = problem.wander
-    if wander is None:
+    background = problem.background
+    if background is None:
         return state
     fit = result.alternatives[0].fit if result.alternatives else result.base
     if needed(problem, fit):
-        unit = next(site.unit for site in fit.model.sites if site.name == wander.site) or ""
-        return replace(state, wandering=course_words(wander, unit))
-    said = f"a course of {wander.site} was estimated beside every alternative; beside the best one it is not needed"
+        units = {site.name: site.unit or "" for site in fit.model.sites}
+        return replace(state, background=background_words(background, units))
+    said = f"{subject(background)} estimated beside every alternative; beside the best one it is not needed"
     return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
@@ -204,7 +200,12 @@ def heed_report(state: State) -> State:
     problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
-    against = contradiction(judgement, error, noise)
+    unknown = np.zeros(len(error))
+    if state.report_record is None:
+        each = unknown_of_background(problem, after, ("estimate", "confirm"), "report")
+        names = [after.model.outputs[c].name for c in problem.columns]
+        unknown = each[[names.index(c.output) for c in error]]
+    against = contradiction(judgement, error, noise, unknown, drop_beside_background(problem, before, after, "report"))
     if not against and state.report_record is None:
         last = last_report_rows(problem)
         at_the_end = changes(last, before, after, "report")
@@ -212,7 +213,7 @@ def heed_report(state: State) -> State:
     if against:
         judgement = replace(judgement, word="abstain", members=(), part=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
-    if judgement.word == "none" and (left := unexplained(error, noise)):
+    if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
     return replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
 

@@ -12,6 +12,7 @@ function_cache.py    Functions derived from a model, each made once.
 forms/               Forms of an effect, their coefficients and what each coefficient does (its role).
 effects.py           Effect: a form at a site, with a driver and values.
 sensors.py           A model without the errors of its sensors.
+rescaled.py          A model whose constants are a little different.
 stepping/            Simulation of one sampling interval and of whole records, with exact sensitivities.
 ensemble/            The same for many members side by side.
 filtering/           A model in innovations form: extended Kalman filter, smoother, k-step prediction, likelihood.

@@ -52,6 +52,8 @@ class Scope:
         Symbol of the time [s].
     derivatives, decays, outputs, signals, residuals, sites, site_values
         What the equations have given so far, by name.
+    factors
+        Factor of the value at a site, by its name; none by default. Effects act on the value with its factor.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class Scope:
         self.residuals: dict[str, tuple[ca.SX, ca.SX]] = {}
         self.sites: dict[str, Site] = {}
         self.site_values: dict[str, ca.SX] = {}
+        self.factors: Mapping[str, float] = {}
 
     def _symbol(self, kind: Kind, name: str) -> ca.SX:
         table = self._symbols[kind]
@@ -105,6 +108,7 @@ class Scope:
         """
         before = self.sites.get(name, Site(name, role, mode, 0, unit, tuple(self.signals)))
         self.sites[name] = replace(before, passed=before.passed + 1)
+        value = value * self.factors[name] if name in self.factors else value
         self.site_values.setdefault(name, value)
         at_site = (effect for effect in self._effects if effect.site == name)
         for effect in sorted(at_site, key=lambda e: e.family.is_beside):

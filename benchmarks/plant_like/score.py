@@ -22,6 +22,7 @@ NAMES = ("named", "class")
 def outcome(answer: Answer, verdict: SubmittedVerdict) -> str:
     """Outcome of one verdict."""
     background = {(t["site"], t["driver"]) for t in answer["tolerated"]}
+    background -= {(e["site"], e["driver"]) for e in answer["effects"]}  # the same name: it is what is asked for
     effects = [n for n in verdict.effects if n.pair() not in background]
     members = [n for n in verdict.members if n.pair() not in background]
     said = members if verdict.verdict == "class" else effects

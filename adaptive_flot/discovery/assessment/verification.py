@@ -24,6 +24,13 @@ MANY_BLOCKS = 8
 DRAWS = 500
 WORSE = 0.02
 """Share by which no output's error may grow."""
+MUCH_WORSE = 0.1
+"""Share by which an error is worse whatever its interval: a wide interval does not excuse it."""
+AT_NOISE = 1.25
+"""An error of so many times the noise is the noise: what it does there contradicts nothing."""
+EVIDENCE = 10.0
+"""Drop of minus two log-likelihood for each effective sample that counts as very strong evidence."""
+CLIPPED_TURNS = 3
 LAGS = 20
 
 
@@ -31,18 +38,85 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     """Compare two fits of the estimation split on the confirm split, in units of the noise of the better one.
 
     Confirmed where the 95 % interval of the reduction (see `_reduction`) lies above zero and no output is worse: its
-    error grew by more than WORSE, and the interval of its own reduction lies below zero.
+    error grew by more than WORSE, and the interval of its own reduction lies below zero. An error that grew by less
+    than MUCH_WORSE, and is within what noise and background leave unknown, is not worse (see `unknown_of_background`).
+
+    A background may take up what an effect does, so that both predict alike. Then these rows confirm it where they say
+    that the background alone is less likely: by EVIDENCE for each effective sample (see `drop_beside_background`).
     """
     rows, block = problem.rows("confirm"), block_rows(problem, before, after)
     size = problem.weights * after.noise.stationary_std()
     old, new = squared_errors(problem, before, size, rows), squared_errors(problem, after, size, rows)
     reduction, interval = _reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
+    unknown = unknown_of_background(problem, after, ("estimate",), "confirm") / np.sqrt(
+        np.nanmean(size[rows] ** 2, axis=0)
+    )
     worse = []
     for j, c in enumerate(problem.columns):
-        ratio = float(np.sqrt(np.nanmean(new[:, j]) / np.maximum(np.nanmean(old[:, j]), 1e-300)))
-        if ratio > 1 + WORSE and _reduction(old[:, j], new[:, j], block)[1][1] < 0:
+        left = float(np.nanmean(new[:, j]))
+        ratio = float(np.sqrt(left / np.maximum(np.nanmean(old[:, j]), 1e-300)))
+        within = unknown[j] > 0 and ratio < 1 + MUCH_WORSE and left < AT_NOISE**2 * (1 + unknown[j] ** 2)
+        if ratio > 1 + WORSE and not within and _reduction(old[:, j], new[:, j], block)[1][1] < 0:
             worse.append(after.model.outputs[c].name)
-    return Verification(reduction, interval, tuple(worse), interval[0] > 0 and not worse)
+    drop = drop_beside_background(problem, before, after, "confirm")
+    likelier = drop > EVIDENCE * rows_per_effective_sample(problem, before, after)
+    confirmed = not worse and bool(interval[0] > 0 or likelier)
+    return Verification(reduction, interval, tuple(worse), confirmed, likelihood=drop if likelier else 0.0)
+
+
+def drop_beside_background(problem: Problem, before: Fit, after: Fit, split: str) -> float:
+    """By how much minus two log-likelihood of the rows of a split falls, with the background as it is before any fit.
+
+    Parameters, effects and noise are those of each fit. Its background is not: on these rows u ~ N(0, I) again. With
+    the whitened residual e of the run without it, and the whitened responses H, minus two log-likelihood is::
+
+        e'e - e'H (I + H'H)^-1 H'e + log det(I + H'H) + 2 sum of log s
+
+    Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (5.8); values beyond the clip count as
+    the clip. Zero without a background.
+    """
+    if problem.background is None:
+        return 0.0
+    return _beside_background(problem, before, split) - _beside_background(problem, after, split)
+
+
+def _beside_background(problem: Problem, fit: Fit, split: str) -> float:
+    background, rows = problem.background, problem.rows(split)
+    assert background is not None  # asked by the caller
+    plain = fit.predicted - background.change(fit.background)
+    e = fit.noise.whiten((problem.measured - plain) / problem.weights)[rows]
+    H = fit.noise.whiten(background.responses / problem.weights[:, :, None])[rows]
+    present = np.isfinite(e) & np.isfinite(H).all(axis=2)
+    spread = float(2 * np.sum(np.log(fit.noise.std) * present.sum(axis=0)))
+    e, H = e[present], H[present]
+    inside: BoolArray = np.ones(len(e), dtype=bool)
+    for _ in range(CLIPPED_TURNS):  # what is clipped depends on the background, and the other way round
+        A = np.eye(H.shape[1]) + H[inside].T @ H[inside]
+        inside = np.asarray(np.abs(e - H @ np.linalg.solve(A, H[inside].T @ e[inside])) < problem.clip)
+    A = np.eye(H.shape[1]) + H[inside].T @ H[inside]
+    u = np.linalg.solve(A, H[inside].T @ e[inside])
+    left = e[inside] - H[inside] @ u
+    clipped = float(np.sum(~inside)) * problem.clip**2
+    return float(left @ left + u @ u + np.linalg.slogdet(A)[1]) + clipped + spread
+
+
+def unknown_of_background(problem: Problem, fit: Fit, fitted: Sequence[str], split: str) -> FloatArray:
+    """Standard deviation (m,) of what the background of a fit leaves unknown in each output on the rows of a split.
+
+    With the whitened responses H of the rows of the `fitted` splits, and those h_k of an output in row k::
+
+        v^2 = mean over k of h_k (I + H'H)^-1 h_k'
+
+    Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (2.9). Zero without a background.
+    """
+    if problem.background is None:
+        return np.zeros(len(problem.columns))
+    responses, rows = problem.background.responses, problem.rows(*fitted)
+    white = fit.noise.whiten(responses / problem.weights[:, :, None])[rows]
+    H = white[np.isfinite(white).all(axis=2) & np.isfinite(problem.measured[rows])]
+    covariance = np.linalg.inv(np.eye(responses.shape[2]) + H.T @ H)
+    shown = responses[problem.rows(split)]
+    return np.asarray(np.sqrt(np.mean(np.einsum("kji,il,kjl->kj", shown, covariance, shown, optimize=True), axis=0)))
 
 
 def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:

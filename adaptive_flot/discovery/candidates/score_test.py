@@ -13,8 +13,8 @@ M takes out what adapted parameters and initial state can absorb: that is no evi
 residual after *everything in the catalogue at once* (a ridge fit), so that it is neither blind to coloured noise nor
 soaked up by the very effect that is looked for.
 
-Where a disturbance wanders (see `record.wander`), its course u ~ N(0, I) is free as well: Z has the responses to it,
-and for each component of u a further row, with 1 in Z, 0 in X, and -u in e. So M takes out what the course can absorb,
+Where there is a background (see `record.background`), its u ~ N(0, I) is free as well: Z has the responses to it,
+and for each component of u a further row, with 1 in Z, 0 in X, and -u in e. So M takes out what it can absorb,
 at the price of its prior.
 """
 
@@ -87,8 +87,8 @@ class Scorer:
         self._reached = with_rows_before(self.rows)
         weighted = self._weighted_responses(profiles)
         nuisance = responses.nuisance
-        if problem.wander is not None:
-            nuisance = np.concatenate([nuisance, problem.wander.responses], axis=2)
+        if problem.background is not None:
+            nuisance = np.concatenate([nuisance, problem.background.responses], axis=2)
         nuisance = (nuisance / problem.weights[:, :, None])[self._reached]
         residual = without_spikes(fit.residual(problem) / problem.weights)
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in profiles])
@@ -96,9 +96,9 @@ class Scorer:
         e = self.noise.whiten(residual)
         present = np.isfinite(e) & self.rows[:, None]
         self._present = present[self._reached]
-        self._rows_of_course = len(fit.course)
+        self._rows_of_background = len(fit.background)
         output = np.nonzero(self._present)[1]
-        self._output = np.concatenate([output, np.full(len(fit.course), -1)])  # of each value that is present
+        self._output = np.concatenate([output, np.full(len(fit.background), -1)])  # of each value that is present
         self._base = base = np.linalg.qr(self._with_prior(self._whitened(nuisance)))[0]
         columns = self._whitened(weighted)
         del weighted  # each is 150 MB for a whole catalogue
@@ -109,7 +109,7 @@ class Scorer:
             columns[part] -= base[part] @ along
         left = np.einsum("ij,ij->j", columns, columns)
         columns[:, left < ABSORBED**2 * size] = 0.0  # what is left is rounding
-        self.residual = self._project(np.concatenate([np.clip(e[present], -1e3, 1e3), -fit.course]))
+        self.residual = self._project(np.concatenate([np.clip(e[present], -1e3, 1e3), -fit.background]))
         self._columns = columns
         self._along = columns.T @ self.residual
         self._null_gains: dict[tuple[int, int], FloatArray] = {}
@@ -135,18 +135,18 @@ class Scorer:
     def _whitened(self, weighted: FloatArray) -> FloatArray:
         """Whitened responses (values present, r) of weighted ones (rows, m, r), a few at a time to save memory.
 
-        Below them stand the rows of the course, where they are zero.
+        Below them stand the rows of the background, where they are zero.
         """
         count = int(self._present.sum())
-        white = np.empty((count + self._rows_of_course, weighted.shape[2]))
+        white = np.empty((count + self._rows_of_background, weighted.shape[2]))
         white[count:] = 0.0
         for part in _parts(weighted.shape[2]):
             white[:count, part] = self.noise.whiten(weighted[:, :, part])[self._present]
         return white
 
     def _with_prior(self, white: FloatArray) -> FloatArray:
-        """Whitened responses to all that is free, the last ones to the course, with 1 in its rows."""
-        k = self._rows_of_course
+        """Whitened responses to all that is free, the last ones to the background, with 1 in its rows."""
+        k = self._rows_of_background
         if k:
             white[-k:, -k:] = np.eye(k)
         return white

@@ -42,8 +42,8 @@ KEPT, SHAPE_KEPT = 0.5, 0.8
 """Derivatives are kept after a step that gains more than this share of what they promised; those by an onset or a time
 constant change more."""
 
-COURSE_STEPS = 2
-"""Steps that end on the best course of a disturbance that wanders."""
+BACKGROUND_STEPS = 2
+"""Steps that end on the best background."""
 START_FRACTIONS = (1.0, 0.3, 0.1)
 """Fractions of a first-order estimate that are tried as the start."""
 
@@ -65,25 +65,29 @@ class Descent:
     def __init__(self, problem: Problem, rows: BoolArray, model: Model, unknowns: Unknowns) -> None:
         self.problem, self.rows, self.model, self.unknowns = problem, rows, model, unknowns
         self.simulator = RecordSimulator(model, problem.record.dt, nodes_for(problem, model))
-        self._white_course: tuple[Noise, FloatArray] | None = None
+        self._white_background: tuple[Noise, FloatArray] | None = None
 
     def _predict(self, z: FloatArray) -> FloatArray:
         p, x0 = self.unknowns.unpack(z)
-        return self._with_course(z, self.simulator.outputs(self.problem.record, x0, p)[:, self.problem.columns])
+        return self._with_background(z, self.simulator.outputs(self.problem.record, x0, p)[:, self.problem.columns])
 
-    def _with_course(self, z: FloatArray, free: FloatArray) -> FloatArray:
-        """A free run (N, m), and what a disturbance that wanders adds to it."""
-        wander = self.problem.wander
-        return free if wander is None else free + wander.outputs(z[self.unknowns.first_of_course :])
+    def _with_background(self, z: FloatArray, free: FloatArray) -> FloatArray:
+        """A free run (N, m), and what the background adds to it."""
+        background = self.problem.background
+        return (
+            free
+            if background is None
+            else free + background.outputs(z[self.unknowns.first_of_background :], self.model)
+        )
 
     def _jacobian(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Predictions (N, m) and their derivatives (N, m, unknowns) but those by the course, which never change."""
+        """Predictions (N, m) and their derivatives (N, m, unknowns) but those by the background, which never change."""
         p, x0 = self.unknowns.unpack(z)
         gradient = self.unknowns.initial_gradient()
         y, dy, _ = self.simulator.sensitivities(self.problem.record, x0, p, self.unknowns.names, gradient)
         columns = list(self.problem.columns)
         dy[:, :, : self.unknowns.q] *= self.unknowns.scale
-        return self._with_course(z, y[:, columns]), dy[:, columns, :]
+        return self._with_background(z, y[:, columns]), dy[:, columns, :]
 
     def _objective(self, z: FloatArray, predicted: FloatArray, noise: Noise) -> float:
         if not np.all(np.abs(predicted) < 1e100):
@@ -201,11 +205,11 @@ class Descent:
     def _corrected(self, slope: FloatArray, moved: FloatArray, change: FloatArray, weight: FloatArray) -> FloatArray:
         """Derivatives that give the `change` (N, m) of the predictions along the step that made it.
 
-        What the course does is linear: its derivatives are right, and what it has changed is taken off.
+        What the background does is linear: its derivatives are right, and what it has changed is taken off.
         """
-        own, course = np.split(moved, [self.unknowns.first_of_course])
-        if self.problem.wander is not None:
-            change = change - self.problem.wander.outputs(course)
+        own, rest = np.split(moved, [self.unknowns.first_of_background])
+        if self.problem.background is not None:
+            change = change - self.problem.background.change(rest)
         along = weight[: len(own)] * own
         updated: FloatArray = slope + (change - slope @ own)[:, :, None] * (along / max(float(own @ along), 1e-300))
         return updated
@@ -235,21 +239,21 @@ class Descent:
         everywhere = np.zeros(w.shape, dtype=bool)
         everywhere[rows] = inside
         J = noise.whiten_some(slope / w[:, :, None], everywhere)
-        if self.problem.wander is not None:
-            J = np.hstack([J, self._whitened_course(noise)[inside.ravel()]])
+        if self.problem.background is not None:
+            J = np.hstack([J, self._whitened_background(noise)[inside.ravel()]])
         prior = 1 / self.unknowns.prior**2
         A = J.T @ J + np.diag(prior)
         b = J.T @ e - prior * (z - self.unknowns.prior_centre)
         return A, b
 
-    def _whitened_course(self, noise: Noise) -> FloatArray:
-        """Whitened responses (values of the rows, k) to the course, once for each noise model."""
-        if self._white_course is None or self._white_course[0] is not noise:
-            assert self.problem.wander is not None  # asked by the caller
-            responses = self.problem.wander.responses / self.problem.weights[:, :, None]
+    def _whitened_background(self, noise: Noise) -> FloatArray:
+        """Whitened responses (values of the rows, k) to the background, once for each noise model."""
+        if self._white_background is None or self._white_background[0] is not noise:
+            assert self.problem.background is not None  # asked by the caller
+            responses = self.problem.background.responses / self.problem.weights[:, :, None]
             all_of_them = np.broadcast_to(self.rows[:, None], responses.shape[:2])
-            self._white_course = noise, noise.whiten_some(responses, all_of_them)
-        return self._white_course[1]
+            self._white_background = noise, noise.whiten_some(responses, all_of_them)
+        return self._white_background[1]
 
     def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
         """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
@@ -268,18 +272,18 @@ class Descent:
 
         return step
 
-    def _with_best_course(
+    def _with_best_background(
         self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
     ) -> tuple[FloatArray, FloatArray]:
-        """Unknowns and predictions with the best course beside the rest, for a noise model: a linear problem."""
-        if self.problem.wander is None:
+        """Unknowns and predictions with the best background beside the rest, for a noise model: a linear problem."""
+        if self.problem.background is None:
             return z, predicted
-        own = slice(self.unknowns.first_of_course, None)
-        for _ in range(COURSE_STEPS):  # which values are clipped may change
+        own = slice(self.unknowns.first_of_background, None)
+        for _ in range(BACKGROUND_STEPS):  # which values are clipped may change
             A, b = self._system(z, predicted, slope, noise)
             moved = np.zeros(len(z))
             moved[own] = np.linalg.solve(A[own, own], b[own])
-            z, predicted = z + moved, predicted + self.problem.wander.outputs(moved[own])
+            z, predicted = z + moved, predicted + self.problem.background.change(moved[own])
         return z, predicted
 
     def _result(self, z: FloatArray, predicted: FloatArray, slope: FloatArray) -> Fit | None:
@@ -287,14 +291,14 @@ class Descent:
             return None
         problem, rows = self.problem, self.rows
         loss, noise = loss_of(problem, predicted, rows)
-        z, predicted = self._with_best_course(z, predicted, slope, noise)
-        if problem.wander is not None:
+        z, predicted = self._with_best_background(z, predicted, slope, noise)
+        if problem.background is not None:
             loss, noise = loss_of(problem, predicted, rows)
         A, _ = self._system(z, predicted, slope, noise)
-        first = self.unknowns.first_of_course
-        course = z[first:]
-        if problem.wander is not None:
-            loss += float(course @ course) + float(np.linalg.slogdet(A[first:, first:])[1])
+        first = self.unknowns.first_of_background
+        background = z[first:]
+        if problem.background is not None:
+            loss += float(background @ background) + float(np.linalg.slogdet(A[first:, first:])[1])
         inverse = np.linalg.pinv(A, hermitian=True)[: self.unknowns.q, : self.unknowns.q]
         covariance = cast(FloatArray, inverse * np.outer(self.unknowns.scale, self.unknowns.scale))
         p, x0 = self.unknowns.unpack(z)
@@ -314,7 +318,7 @@ class Descent:
             loss,
             loss + float(penalty),
             self.unknowns.directions,
-            course,
+            background,
         )
 
 

@@ -12,7 +12,7 @@ truncated squares for outliers (Hinich & Talwar, *J. Am. Statist. Assoc.* 70 (19
 
 with q free parameters: Schwarz, *Ann. Statist.* 6 (1978) 461.
 
-Where a disturbance wanders (see `record.wander`), the loss is that of the course u integrated out, with the whitened
+Where there is a background (see `record.background`), the loss is that with its u integrated out, with the whitened
 responses H to it (Laplace's method; exact but for the clipping)::
 
     loss + u'u + log det(I + H'H)
@@ -72,8 +72,8 @@ class Fit:
     bic: float
     directions: FloatArray
     """Free combinations of the initial state (nx, r): those the record can tell; the rest keeps its first guess."""
-    course: FloatArray
-    """Course u (k,) of a disturbance that wanders; empty without. What it does is part of `predicted`."""
+    background: FloatArray
+    """Components u (k,) of the background; empty without. What they do is part of `predicted`."""
 
     def residual(self, problem: Problem) -> FloatArray:
         """Measured minus predicted (N, m)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from adaptive_flot.discovery.fitting.descent import Descent
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -16,6 +17,13 @@ NOISE_ROUNDS = 3
 MOST_RESTARTS = 4
 SETTLED = 1.0
 """Gain in minus two log-likelihood of a restart below which a fit is where it stays."""
+
+
+def at_its_constants(problem: Problem, fit: Fit) -> Fit:
+    """The fit with a model that has the constants of its background: beside them, little is left to be linear."""
+    if problem.background is None:
+        return fit
+    return replace(fit, model=problem.background.at_constants(fit.background, fit.model))
 
 
 class Fitter:
@@ -80,6 +88,24 @@ class Fitter:
             if again is None or again.loss > fit.loss - least:
                 return fit
             fit = again
+        return fit
+
+    def at_its_constants(self, fit: Fit, bounds: Mapping[str, tuple[float, float]] | None = None) -> Fit:
+        """The fit along a model that has the constants which it came to, again until they stay.
+
+        Another alternative comes to other constants than those for which the responses were worked out. The run is then
+        exact, and only its derivatives are those of a neighbour.
+        """
+        background = self.problem.background
+        for _ in range(MOST_RESTARTS if background is not None and background.sites else 0):
+            own = at_its_constants(self.problem, fit)
+            again = self.fit(own.model, own.names, like=own, bounds=bounds, rounds=2)
+            if again is None:
+                return fit
+            stays = abs(again.loss - fit.loss) < SETTLED
+            fit = again
+            if stays or self.problem.time_is_up:
+                return fit
         return fit
 
     def with_intervals(self, fit: Fit) -> Fit:

@@ -48,9 +48,9 @@ def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, flo
     every = replace(problem, nodes=None)
     run = RecordSimulator(fit.model, problem.record.dt)
     free = run.outputs(problem.record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
-    if problem.wander is not None:
-        free = free + problem.wander.outputs(fit.course)
-    own = fit.loss if problem.wander is None else loss_of(problem, fit.predicted, fitter.rows)[0]
+    if problem.background is not None:
+        free = free + problem.background.outputs(fit.background, fit.model)
+    own = fit.loss if problem.background is None else loss_of(problem, fit.predicted, fitter.rows)[0]
     if np.isfinite(free).all() and abs(loss_of(problem, free, fitter.rows)[0] - own) < NOTICED:
         return fit
     return Fitter(every, fitter.splits).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit

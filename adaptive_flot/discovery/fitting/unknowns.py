@@ -1,6 +1,6 @@
-"""What a fit is free to move: parameters, those combinations of the initial state that the record can tell, a course.
+"""What a fit is free to move: parameters, combinations of the initial state that the record can tell, the background.
 
-The course is that of a disturbance that wanders, where the problem has one (see `record.wander`).
+The background is that of the problem, where it has one (see `record.background`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LAGGED_SCALES = 0.1
 
 
 class Unknowns:
-    """Unknowns z: q free parameters over their scale, r free directions of the initial state, and the course u (k,).
+    """Unknowns z: q free parameters over their scale, r free directions of the initial state, the background's u (k,).
 
     Attributes
     ----------
@@ -69,18 +69,18 @@ class Unknowns:
         self._range = np.array(low) / self.scale, np.array(high) / self.scale
         self._prior = np.where(unbound, np.inf, PRIOR_SCALES)
         self._prior_centre = np.array([p.value for p in parameters]) / self.scale
-        self._course = self._first_course(like)
+        self._background = self._first_background(like)
         self.turn(self._first_directions(like))
 
     def turn(self, directions: FloatArray) -> None:
         """Make these directions (nx, r) of the initial state the free ones."""
-        r, k = directions.shape[1], len(self._course)
+        r, k = directions.shape[1], len(self._background)
         self.directions = directions
         self.lower = np.concatenate([self._range[0], np.full(r + k, -np.inf)])
         self.upper = np.concatenate([self._range[1], np.full(r + k, np.inf)])
         self.prior = np.concatenate([self._prior, np.full(r, DIRECTION_PRIOR), np.ones(k)])
         self.prior_centre = np.concatenate([self._prior_centre, np.zeros(r + k)])
-        start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r), self._course])
+        start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r), self._background])
         self.centre = np.clip(start, self.lower, self.upper)
 
     def _first_state(self, like: Fit | None) -> FloatArray:
@@ -97,13 +97,13 @@ class Unknowns:
         except RangeError:
             return guess
 
-    def _first_course(self, like: Fit | None) -> FloatArray:
-        """The course (k,) of a fit, or none; empty where the problem has no wander."""
-        wander = self.problem.wander
-        if wander is None:
+    def _first_background(self, like: Fit | None) -> FloatArray:
+        """The background u (k,) of a fit, or none; empty where the problem has none."""
+        background = self.problem.background
+        if background is None:
             return np.zeros(0)
-        k = wander.responses.shape[2]
-        return like.course if like is not None and len(like.course) == k else np.zeros(k)
+        first = background.first(self.model)
+        return like.background if like is not None and len(like.background) == len(first) else first
 
     def _first_directions(self, like: Fit | None) -> FloatArray:
         """Free directions of the initial state (nx, r): those of a fit, in the states that the model has in common.
@@ -137,18 +137,18 @@ class Unknowns:
         """Parameters (np,) and initial state (nx,), kept inside the physical range of each state."""
         p = self.base.copy()
         p[self.where] = z[: self.q] * self.scale
-        x0 = self.x0 + self.directions @ z[self.q : self.first_of_course]
+        x0 = self.x0 + self.directions @ z[self.q : self.first_of_background]
         lower = np.array([s.lower for s in self.model.states])
         upper = np.array([s.upper for s in self.model.states])
         return p, cast(FloatArray, np.clip(x0, lower, upper))
 
     @property
-    def first_of_course(self) -> int:
-        """Where the course begins in z."""
+    def first_of_background(self) -> int:
+        """Where the background begins in z."""
         return self.q + len(self.directions.T)
 
     def initial_gradient(self) -> FloatArray:
-        """Derivative of the initial state by all of z but the course (nx, q + r)."""
+        """Derivative of the initial state by all of z but the background (nx, q + r)."""
         return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.verification import MUCH_WORSE
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
@@ -20,7 +21,7 @@ from adaptive_flot.discovery.innovations.search import Search, is_short
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
-from adaptive_flot.discovery.verdict.report_veto import MUCH_WORSE, contradiction, noise_from_row_to_row
+from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.greybox.effects import Effect
 
 FAR = 3.0

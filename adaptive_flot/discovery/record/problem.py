@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from adaptive_flot.discovery.record.background import Background
 from adaptive_flot.discovery.record.noise import Noise, fit_noise, white_noise
 from adaptive_flot.discovery.record.robust import CLIP
-from adaptive_flot.discovery.record.wander import Wander
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.nodes import Nodes
@@ -54,8 +54,8 @@ class Problem:
         When searches and fits are to end, by `time.monotonic` [s]: they keep what they have come to.
     nodes
         Rows that a search simulates, where that makes no difference to speak of; None for all.
-    wander
-        An unmeasured disturbance whose course every fit estimates beside its other unknowns; None without.
+    background
+        What is always a little wrong with the model; every fit estimates it beside its other unknowns. None without.
     """
 
     record: Dataset
@@ -66,7 +66,7 @@ class Problem:
     floor: FloatArray
     whiten: bool = True
     nodes: Nodes | None = None
-    wander: Wander | None = None
+    background: Background | None = None
     site_sizes: Mapping[str, float] = field(default_factory=dict)
     deadline: float = float("inf")
 

@@ -139,6 +139,9 @@ class Verification:
         Interval above zero and no output worse.
     where
         The rows it was measured on, in words.
+    likelihood
+        Drop of minus two log-likelihood on these rows beside a background that was not fitted to them, where that
+        confirms; zero else.
     """
 
     reduction: float
@@ -146,8 +149,12 @@ class Verification:
     worse: tuple[str, ...]
     confirmed: bool
     where: str = "on the confirm split"
+    likelihood: float = 0.0
 
     def __str__(self) -> str:
         low, high = (100 * r for r in self.reduction95)
         word = "confirmed" if self.confirmed else "not confirmed"
+        if self.confirmed and not low > 0:
+            times = f"{self.likelihood / 2:.0f}"
+            return f"confirmed: constants that are off instead are less likely by a factor of e^{times} {self.where}"
         return f"{word}: error {100 * self.reduction:.0f} % smaller ({low:.0f} to {high:.0f} %) {self.where}"

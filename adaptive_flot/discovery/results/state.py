@@ -60,8 +60,8 @@ class State:
         What these rows say against a name, in words; empty where they do not.
     certain
         What is certain although the record is not told, in words.
-    wandering
-        What is known of a feed that wanders, in words; empty where none does.
+    background
+        What is known of a feed that wanders and of constants that are off, in words; empty where neither is.
     sentence
         What the innovations form names, in words; empty where it has not decided.
     experiment
@@ -90,7 +90,7 @@ class State:
     error: tuple[OutputChange, ...] = ()
     contradiction: str = ""
     certain: str = ""
-    wandering: str = ""
+    background: str = ""
     sentence: str = ""
     experiment: Experiment | None = None
 

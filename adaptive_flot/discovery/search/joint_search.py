@@ -37,7 +37,7 @@ DOMINATES = 3.0
 
 def wants_joint(problem: Problem, result: SearchResult) -> bool:
     """Whether fits are cheap and the error of the best alternative outweighs the noise by far."""
-    if problem.time_is_up or problem.wander is not None:
+    if problem.time_is_up or problem.background is not None:
         return False
     best = result.alternatives[0].fit if result.alternatives else result.base
     steps = len(problem.record) * Stepper(best.model, problem.record.dt).substeps

@@ -224,9 +224,10 @@ def _close(alternatives: list[Alternative]) -> list[Alternative]:
 
 
 def _exact(fitter: Fitter, base: Fit, a: Alternative) -> Alternative:
-    """The alternative as a run at every row has it."""
+    """The alternative as a run at every row has it, and at its own constants where these are uncertain."""
     bounds = {k: b for e in a.effects for k, b in effect_bounds(fitter.problem, a.fit.model, e).items()}
     fit = at_every_row(fitter, a.fit, bounds)
+    fit = fitter.at_its_constants(fit, bounds)
     return replace(a, fit=fit, gain=base.loss - fit.loss, delta_bic=fit.bic - base.bic)
 
 

@@ -72,7 +72,7 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
     if not state.sentence:
         wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong)
-        return " ".join(filter(None, (said, state.certain, state.wandering)))
+        return " ".join(filter(None, (said, state.certain, state.background)))
     errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
     return f"{state.sentence} Error of the free run on held-out rows: {errors}."
 

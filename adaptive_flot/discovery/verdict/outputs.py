@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.verification import AT_NOISE
 from adaptive_flot.discovery.results import Judgement, OutputChange
-from adaptive_flot.discovery.verdict.report_veto import AT_NOISE
 from adaptive_flot.greybox.model import FloatArray
 
 

@@ -12,28 +12,31 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.verification import AT_NOISE, EVIDENCE, MUCH_WORSE, WORSE
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
-WORSE = 0.02
-"""Share by which an error may grow without being worse, where chance could explain it."""
-MUCH_WORSE = 0.1
-"""Share by which an error is worse whatever its interval: a wide interval does not excuse it."""
 FAR_FROM_NOISE = 5.0
 """An error of so many times the noise is not explained, whatever the noise model says. Noise that is allowed to be
 coloured has up to three times what its differences show."""
-AT_NOISE = 1.25
-"""An error of so many times the noise is the noise: what it does there contradicts nothing."""
 
 
-def contradiction(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
+def contradiction(
+    judgement: Judgement,
+    changes: Sequence[OutputChange],
+    noise: FloatArray,
+    unknown: FloatArray | None = None,
+    likelihood: float = 0.0,
+) -> str:
     """What the report rows say against a name; empty where they do not, and where no name is given.
 
     An output is worse where its error after, a, is above ``AT_NOISE s`` and either ``a > (1 + MUCH_WORSE) b`` or
-    ``a > (1 + WORSE) b`` with a 95 % interval of the reduction below zero; b is its error before and s its noise.
+    ``a > (1 + WORSE) b`` with a 95 % interval of the reduction below zero; b is its error before and s its noise. The
+    second does not count below ``AT_NOISE sqrt(s^2 + v^2)``, where v is what the background leaves unknown there: so
+    small a difference is the course of a feed, which these rows did not fit.
 
     Parameters
     ----------
@@ -43,14 +46,20 @@ def contradiction(judgement: Judgement, changes: Sequence[OutputChange], noise: 
         Error of each output on the report rows, before and after.
     noise
         Noise of each of these outputs from row to row, which no model has fitted (m,).
+    unknown
+        Standard deviation of what the background leaves unknown in each of them (m,), see `unknown_of_background`.
+    likelihood
+        By how much minus two log-likelihood falls on these rows beside a background, see `drop_beside_background`: it
+        may take up what the effect does, so that no error gets smaller.
     """
     if judgement.word not in ("named", "class"):
         return ""
-    worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
+    both = noise if unknown is None else np.hypot(noise, unknown)
+    worse = [c for c, s, v in zip(changes, noise, both, strict=True) if _is_worse(c, float(s), float(v))]
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
         return f"on held-out rows it makes the error larger ({said})"
-    if not any(c.reduction95[0] > 0 for c in changes):
+    if not any(c.reduction95[0] > 0 for c in changes) and not likelihood > EVIDENCE:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""
@@ -60,18 +69,18 @@ def unexplained(changes: Sequence[OutputChange], noise: FloatArray) -> str:
     """Outputs whose error after is far from their noise from row to row, in words; empty where none is.
 
     A record is not explained because its noise model has swallowed what is wrong: the noise by differences knows no
-    model. Arguments are as in `contradiction`.
+    model. Arguments are as in `contradiction`; the noise takes in what the background leaves unknown.
     """
     far = [(c, s) for c, s in zip(changes, noise, strict=True) if s > 0 and c.after > FAR_FROM_NOISE * s]
     said = ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({c.after / s:.0f} times)" for c, s in far)
     return f"The error is far above the noise from row to row: {said}." if far else ""
 
 
-def _is_worse(change: OutputChange, noise: float) -> bool:
+def _is_worse(change: OutputChange, noise: float, with_background: float = 0.0) -> bool:
     if change.after <= AT_NOISE * noise:
         return False
     surely = change.after > (1 + WORSE) * change.before and change.reduction95[1] < 0
-    return surely or change.after > (1 + MUCH_WORSE) * change.before
+    return (surely and change.after > AT_NOISE * with_background) or change.after > (1 + MUCH_WORSE) * change.before
 
 
 def contradiction_at_the_end(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:

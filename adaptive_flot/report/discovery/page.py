@@ -7,11 +7,12 @@ from pathlib import Path
 
 from adaptive_flot.charts.palette import GREY
 from adaptive_flot.charts.plotdata import Chart, Role
+from adaptive_flot.discovery.assessment.verification import AT_NOISE
+from adaptive_flot.discovery.background.wording import estimated
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.report_veto import AT_NOISE
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
 from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
@@ -147,8 +148,8 @@ def _measured_against_model(discovery: Discovery, problem: Problem, before: Fit,
     found = "and with what was found" if after is not before else ""
     runs = f"Measured values, and free runs of the model as it is {found}".rstrip()
     caption = f"{runs}: simulated from the inputs alone, never corrected by a measurement."
-    if problem.wander is not None:  # its course was estimated from the measurements
-        caption = f"{runs}: simulated from the inputs and the estimated course of {problem.wander.site}."
+    if problem.background is not None:  # it was estimated from the measurements
+        caption = f"{runs}: simulated from the inputs, with {estimated(problem.background)}."
     panels = run_panels(problem, before, after)
     shown = _telling(discovery, problem)
     if len(shown) < len(panels):

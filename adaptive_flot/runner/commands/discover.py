@@ -10,6 +10,7 @@ from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.tables import Source
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.rescaled import factors_as_effects
 from adaptive_flot.processes.model_file import is_model_file
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.processes.registry import read_measurements
@@ -110,5 +111,5 @@ def save_discovered(
     if discovery.before is None:
         return False
     note = f"discovered in {data.name}: {discovery.verdict.word}"
-    save_model(discovery.model, path, base=base, cell=cell, folder=folder, note=note)
+    save_model(factors_as_effects(discovery.model), path, base=base, cell=cell, folder=folder, note=note)
     return True

@@ -9,15 +9,24 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
+from adaptive_flot.discovery.background.evidence import Spread, drops
+from adaptive_flot.discovery.background.fitting import background_of
+from adaptive_flot.discovery.background.spread import spread_of
+from adaptive_flot.discovery.background.wording import background_words
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.background import (
+    Background,
+    Course,
+    knots_of_course,
+    lines_between,
+    root_of_covariance,
+)
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.record.robust import without_spikes
-from adaptive_flot.discovery.record.wander import Wander, knots_of_course, lines_between, root_of_covariance
 from adaptive_flot.discovery.search.rounds import scorer_of
-from adaptive_flot.discovery.wandering import Course, _drops, course_words, wandering, with_course
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Scope
 from tests.discovery.heated import CAPACITY, DT, ROOM, heated_tank, moves
@@ -66,12 +75,17 @@ def _fitted(record: Dataset) -> tuple[Problem, Fit, Responses]:
     return problem, fit, Responses(problem, fit)
 
 
+def of_the_room(std: float, problem: Problem, responses: Responses) -> Background:
+    """A background whose course is that of the room, with its correlation time."""
+    return background_of(problem, Spread(Course("room", std, TIME, True), 0.0, 0.0), responses)
+
+
 def test_the_drop_is_that_of_a_gaussian_with_the_covariance_of_the_course() -> None:
     """Against the density of e ~ N(0, I + X K X') from SciPy, which knows nothing of the lemma."""
     rng = np.random.default_rng(0)
     X, e = rng.standard_normal((40, 5)), 2 * rng.standard_normal(40)
     root = root_of_covariance(np.linspace(0, 4000, 5), 900.0)
-    for std, drop in _drops(X.T @ X, X.T @ e, root):
+    for std, drop in drops(X.T @ X, X.T @ e, root):
         covariance = np.eye(40) + std**2 * X @ root @ root.T @ X.T
         expected = 2 * multivariate_normal(cov=covariance).logpdf(e) - 2 * multivariate_normal(cov=np.eye(40)).logpdf(e)
         assert drop == pytest.approx(expected, abs=1e-6)
@@ -87,12 +101,15 @@ def test_lines_between_knots_are_what_numpy_interpolates() -> None:
 
 def test_a_room_that_wanders_is_found_with_its_size() -> None:
     problem, fit, responses = _fitted(record_in_a_room(STD))
-    course = wandering(problem, fit, responses)
+    spread = spread_of(problem, fit, responses)
+    assert spread is not None
+    course = spread.course
     assert course is not None
     assert course.site == "room"
+    assert not spread.constants  # both are estimated in this model
     rate = course.std / np.sqrt(course.time)  # what a record much longer than the samples apart tells best
     assert 1 / 1.5 < rate / (STD / np.sqrt(TIME)) < 1.5
-    said = course_words(with_course(problem, course, responses), "K")
+    said = background_words(background_of(problem, spread, responses), {"room": "K"})
     assert said.startswith("The room wanders: standard deviation about ")
     assert " K, " in said
 
@@ -101,30 +118,30 @@ def test_a_room_that_wanders_is_found_with_its_size() -> None:
 def test_a_room_at_rest_does_not_wander(exponent: float) -> None:
     """Neither where nothing is missing nor where an effect is."""
     problem, fit, responses = _fitted(record_in_a_room(0.0, exponent))
-    assert wandering(problem, fit, responses) is None
+    assert spread_of(problem, fit, responses) is None
 
 
 def test_a_record_shorter_than_two_hours_is_not_asked() -> None:
     problem, fit, responses = _fitted(record_in_a_room(STD))
     first = replace(problem.record, time=problem.record.time / 10)
-    assert wandering(replace(problem, record=first), fit, responses) is None
+    assert spread_of(replace(problem, record=first), fit, responses) is None
 
 
 def test_a_course_that_may_not_move_changes_no_fit() -> None:
     """Reduction: a standard deviation next to zero gives the fit without a course."""
     problem, fit, responses = _fitted(record_in_a_room(0.0))
-    still = replace(problem, wander=with_course(problem, Course("room", 1e-9, TIME, True, 0.0), responses))
+    still = replace(problem, background=of_the_room(1e-9, problem, responses))
     again = Fitter(still).fit(fit.model, fit.names, like=fit, rounds=2)
     assert again is not None
     np.testing.assert_allclose(again.values, fit.values, rtol=1e-4)
     assert again.loss == pytest.approx(fit.loss, abs=0.5)
-    np.testing.assert_allclose(again.course, 0.0, atol=1e-4)
+    np.testing.assert_allclose(again.background, 0.0, atol=1e-4)
 
 
 def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None:
     problem, fit, responses = _fitted(record_in_a_room(STD))
-    wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
-    allowed = Fitter(replace(problem, wander=wander)).fit(fit.model, fit.names, like=fit, rounds=2)
+    background = of_the_room(STD, problem, responses)
+    allowed = Fitter(replace(problem, background=background)).fit(fit.model, fit.names, like=fit, rounds=2)
     assert allowed is not None
     rows = problem.rows("estimate")
     assert np.std(allowed.residual(problem)[rows]) < 1.5 * 0.05 < 0.1 * np.std(fit.residual(problem)[rows])
@@ -135,16 +152,16 @@ def test_a_fit_with_a_course_follows_the_room_and_finds_the_parameters() -> None
 def test_the_loss_is_that_of_the_course_integrated_out() -> None:
     """Minus two log-likelihood of N(0, I + H H') for the residual without its course, but for the innovations' size."""
     problem, fit, responses = _fitted(record_in_a_room(STD))
-    wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
-    problem = replace(problem, wander=wander)
+    background = of_the_room(STD, problem, responses)
+    problem = replace(problem, background=background)
     allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
     assert allowed is not None
     rows = problem.rows("estimate")
     e = allowed.noise.whiten(allowed.residual(problem))[rows][:, 0]
-    H = allowed.noise.whiten(wander.responses)[rows][:, 0]
+    H = allowed.noise.whiten(background.responses)[rows][:, 0]
     kept = np.isfinite(e) & (np.abs(e) < problem.clip)
     clipped = float(np.sum(np.isfinite(e) & ~kept)) * problem.clip**2
-    e, H = (e + H @ allowed.course)[kept], H[kept]
+    e, H = (e + H @ allowed.background)[kept], H[kept]
     covariance = np.eye(len(e)) + H @ H.T
     expected = float(e @ np.linalg.solve(covariance, e) + np.linalg.slogdet(covariance)[1])
     sizes = 2 * float(np.log(allowed.noise.std[0])) * int(rows.sum())
@@ -154,8 +171,8 @@ def test_the_loss_is_that_of_the_course_integrated_out() -> None:
 def test_a_score_beside_a_course_is_that_of_generalised_least_squares() -> None:
     """With the covariance I + H H' written out, which the scorer never builds."""
     problem, fit, responses = _fitted(record_in_a_room(STD, exponent=0.6))
-    wander = with_course(problem, Course("room", STD, TIME, True, 0.0), responses)
-    problem = replace(problem, wander=wander)
+    background = of_the_room(STD, problem, responses)
+    problem = replace(problem, background=background)
     allowed = Fitter(problem).fit(fit.model, fit.names, like=fit, rounds=2)
     assert allowed is not None
     responses = Responses(problem, allowed)
@@ -165,9 +182,9 @@ def test_a_score_beside_a_course_is_that_of_generalised_least_squares() -> None:
     def white(series: FloatArray) -> FloatArray:
         return scorer.noise.whiten(series)[rows][:, 0]
 
-    e, H = white(without_spikes(allowed.residual(problem))), white(wander.responses)
+    e, H = white(without_spikes(allowed.residual(problem))), white(background.responses)
     kept = np.isfinite(e)
-    e, H, Z = (e + H @ allowed.course)[kept], H[kept], white(responses.nuisance)[kept]
+    e, H, Z = (e + H @ allowed.background)[kept], H[kept], white(responses.nuisance)[kept]
     flat = np.linalg.inv(np.linalg.cholesky(np.eye(len(e)) + H @ H.T))
     Z, e = flat @ Z, flat @ e
     e -= Z @ np.linalg.lstsq(Z, e, rcond=None)[0]
@@ -183,8 +200,11 @@ def test_a_score_beside_a_course_is_that_of_generalised_least_squares() -> None:
 
 
 def test_the_outputs_of_a_course_are_linear_in_it() -> None:
-    wander = Wander("room", 1.0, 900.0, True, np.arange(12.0).reshape(3, 2, 2))
-    np.testing.assert_array_equal(wander.outputs(np.array([1.0, 2.0])), wander.responses @ [1.0, 2.0])
+    responses = np.arange(12.0).reshape(3, 2, 2)
+    background = Background(Course("room", 1.0, 900.0, True), 0.0, responses)
+    np.testing.assert_array_equal(
+        background.outputs(np.array([1.0, 2.0]), tank_in_a_room()), background.responses @ [1.0, 2.0]
+    )
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -1,0 +1,103 @@
+"""The fit that has a background, and whether a fit needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.background.evidence import LEAST_EVIDENCE, Evidence, Spread, price
+from adaptive_flot.discovery.background.linear import (
+    lines_of_course,
+    uncertain_constants,
+    uncertain_profiles,
+)
+from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter, at_its_constants
+from adaptive_flot.discovery.record.background import Background, root_of_covariance
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.greybox.rescaled import as_it_came
+
+RELINEARISED = 2
+"""How often a background is fitted to be linearised anew."""
+
+
+def fit_with_background(
+    problem: Problem, spread: Spread, base: Fit, responses: Responses, turns: int = RELINEARISED
+) -> tuple[Problem, Fit] | None:
+    """The problem with a background, and its fit, linearised where that fit is; None when it can not be simulated.
+
+    First along the base fit. Then once more, along a model that has the constants which were found: what is ten per
+    cent off is not linear.
+
+    Parameters
+    ----------
+    problem, base, responses
+        The record, the fit without a background, and the responses along it.
+    spread
+        The numbers of the background.
+    turns
+        How often it is fitted to be linearised anew.
+    """
+    for _ in range(turns):
+        problem = replace(problem, background=background_of(problem, spread, responses))
+        fitted = Fitter(problem).fit(base.model, base.names, like=base, rounds=2)
+        if fitted is None:
+            return None
+        base = at_its_constants(problem, fitted)
+        responses = Responses(problem, base)
+    problem = replace(problem, background=background_of(problem, spread, responses))
+    again = Fitter(problem).fit(base.model, base.names, like=base, rounds=2)
+    return None if again is None else (problem, again)
+
+
+def fitted_beside(problem: Problem, spread: Spread, fit: Fit, responses: Responses) -> Fit | None:
+    """A fit once more, with a background linearised along it; None when it can not be simulated."""
+    beside = replace(problem, background=background_of(problem, spread, responses))
+    return Fitter(beside).fit(fit.model, fit.names, like=fit, rounds=2)
+
+
+def spread_along(problem: Problem, spread: Spread, fit: Fit, responses: Responses, feeds: Sequence[str]) -> Spread:
+    """The numbers of a background once more, along a fit that has it: far from there the responses say little.
+
+    Parameters
+    ----------
+    problem, fit, responses
+        The record without a background, a fit without it, and the responses along that.
+    spread
+        The numbers that were found along that fit.
+    feeds
+        Sites at which a course is tried.
+    """
+    found = fit_with_background(problem, spread, fit, responses, turns=1)
+    if found is None:
+        return spread
+    beside, there = found
+    background = beside.background
+    assert background is not None
+    added = background.outputs(there.background, there.model)
+    bare = replace(there, predicted=there.predicted - added, background=np.zeros(0))
+    responses = Responses(problem, bare)
+    evidence = Evidence(problem, scorer_of(problem, bare, responses)[0], responses, feeds)
+    return evidence.but_for_what_stands_out(evidence.best)
+
+
+def background_of(problem: Problem, spread: Spread, responses: Responses) -> Background:
+    """The background, with its responses along the fit of these `responses`."""
+    parts, course = [], spread.course
+    if course is not None:
+        knots, lines = lines_of_course(problem, course.site, course.offset)
+        parts.append(responses.of(lines) @ (course.std * root_of_covariance(knots, course.time)))
+    if spread.constants:
+        parts.append(spread.constants * responses.of(uncertain_profiles(problem, responses)))
+    sites = uncertain_constants(responses) if spread.constants else ()
+    return Background(course, spread.constants, np.concatenate(parts, axis=2), sites)
+
+
+def needed(problem: Problem, fit: Fit) -> bool:
+    """Whether a fit with the background is better than the same without, by more than the price of its numbers."""
+    plain = Fitter(replace(problem, background=None)).fit(as_it_came(fit.model), fit.names, like=fit, rounds=2)
+    return plain is None or plain.loss - fit.loss > 2 * price(problem) + LEAST_EVIDENCE

@@ -1,0 +1,94 @@
+"""Whether there is a background, and its numbers: it competes with the effects."""
+
+from __future__ import annotations
+
+from adaptive_flot.discovery.background.evidence import LARGEST, LEAST_EVIDENCE, Evidence, Spread
+from adaptive_flot.discovery.background.fitting import fitted_beside, spread_along
+from adaptive_flot.discovery.background.linear import feeds_unseen, uncertain_constants
+from adaptive_flot.discovery.candidates.responses import Responses
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
+from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.search.alternatives import fit_variant, shortlist
+from adaptive_flot.discovery.search.rounds import scorer_of
+
+LEAST_SPAN_S = 7200.0
+"""In a shorter record what wanders over a quarter of an hour is no more than a trend, or an event; and it says too
+little to tell a dozen constants beside an effect."""
+MOST_BEFORE, FITTED = 3, 2
+"""Effects that are fitted one on top of the other before a background is looked for, and how many are tried for
+each."""
+LEAST_BLOCK_ROWS = 60
+"""Least rows of a split: more than noise remembers, and than a plant takes to settle."""
+
+
+def may_have_background(problem: Problem, responses: Responses) -> bool:
+    """Whether a record is long enough, and its model has a feed that may wander or constants that may be off."""
+    time = problem.record.time
+    long = time[-1] - time[0] >= LEAST_SPAN_S
+    return long and bool(feeds_unseen(problem, responses) or uncertain_constants(responses))
+
+
+def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer | None = None) -> Spread | None:
+    """The background of a record, where that explains the residual better than any effect; else None.
+
+    It competes with the effects, by first order (see `evidence`). Where one of these explains more, the best is fitted
+    first, and the background is looked for in what that leaves; MOST_BEFORE at most, and one at least: an effect
+    that is far from linear must not be taken for a background. Of the backgrounds that were found beside more or fewer
+    effects, that one counts whose fit together with them is best: a wrong effect leaves more for the background.
+
+    Parameters
+    ----------
+    problem, base
+        The record, and the fit of the model as it is.
+    responses, scorer
+        Responses along that fit, and scores along it where they are known already.
+    """
+    if not may_have_background(problem, responses):
+        return None
+    feeds, found = feeds_unseen(problem, responses), list[tuple[float, Spread, Fit, Responses]]()
+    fit, scorer = base, scorer or scorer_of(problem, base, responses)[0]
+    for before in range(MOST_BEFORE + 1):
+        evidence = Evidence(problem, scorer, responses, feeds)
+        best = evidence.best
+        # a free curve in time at any site that acts on the same output is what a course would be taken for: no rival
+        rival = max((s.penalised for s in scorer.scores() if not _free_in_time(s)), default=0.0)
+        explains = best.evidence > max(LEAST_EVIDENCE, rival)
+        if explains:
+            best = evidence.but_for_what_stands_out(best)
+            together = fitted_beside(problem, best, fit, responses)
+            found += [(together.bic, best, fit, responses)] if together else []
+        if best.evidence <= LEAST_EVIDENCE or (explains and before):
+            break
+        extended = _with_best_effect(problem, fit, scorer) if before < MOST_BEFORE else None
+        if extended is None:
+            break
+        fit, responses = extended, Responses(problem, extended)
+        scorer = scorer_of(problem, fit, responses)[0]
+    if not explains or not found:
+        return None
+    _, best, fit, responses = min(found, key=lambda f: f[0])
+    best = spread_along(problem, best, fit, responses, feeds)
+    # what fits best as far as the last of the sizes is something else
+    return best if best.share < LARGEST and (best.course is not None or best.constants) else None
+
+
+def _with_best_effect(problem: Problem, fit: Fit, scorer: Scorer) -> Fit | None:
+    """The fit with the best of the few effects that score best on top; None where none brings evidence."""
+    fitter = Fitter(problem)
+    fits = [fit_variant(fitter, fit, score, MOST_STEPS) for score in shortlist(scorer, FITTED)]
+    good = [again for again in fits if again is not None and again.bic < fit.bic - LEAST_EVIDENCE]
+    return min(good, key=lambda again: again.bic, default=None)
+
+
+def _free_in_time(score: Score) -> bool:
+    return score.candidate.driver == "time" and score.variant.effect.family.is_curve
+
+
+def rows_of_block(spread: Spread, dt: float) -> int | None:
+    """Least rows of a split: short against the course, so that held-out rows say more of an effect than of the feed.
+
+    None without a course: constants are the same in every split.
+    """
+    return None if spread.course is None else max(LEAST_BLOCK_ROWS, round(spread.course.time / dt / 2))

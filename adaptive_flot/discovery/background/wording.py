@@ -1,0 +1,35 @@
+"""What is told of a background."""
+
+from __future__ import annotations
+
+from adaptive_flot.discovery.record.background import Background
+
+
+def background_words(background: Background, units: dict[str, str]) -> str:
+    """What wanders and how, and how far the constants are off, in sentences; `units` are those of the sites."""
+    said, course = [], background.course
+    if course is not None:
+        size = f"{course.std:.3g} {units[course.site]}".rstrip() if course.offset else f"{100 * course.std:.2g} %"
+        said.append(
+            f"The {course.site} wanders: standard deviation about {size}, correlation time about {course.time:.0f} s. "
+            "Its course was estimated beside every alternative, and is in the errors before and after. What acts as "
+            "this feed does, and changes as slowly, would look the same."
+        )
+    if background.constants:
+        said.append(
+            "Constants of the process are not quite those of the model: they differ by about "
+            f"{100 * background.constants:.0f} % each. All of them were estimated beside every alternative."
+        )
+    return " ".join(said)
+
+
+def estimated(background: Background) -> str:
+    """What was estimated beside every alternative, as a phrase."""
+    course = () if background.course is None else (f"the estimated course of {background.course.site}",)
+    return " and ".join((*course, *(("estimated constants of the process",) if background.constants else ())))
+
+
+def subject(background: Background) -> str:
+    """The same as the subject of a sentence, with its verb."""
+    said = estimated(background).replace("the estimated", "a").replace("estimated ", "")
+    return f"{said} {'were' if background.constants else 'was'}"
