@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.stats import chi2
+from scipy.stats import f as f_distribution
 
 from adaptive_flot.discovery.hypotheses.comparison import (
     EXPLAINED,
@@ -27,6 +28,9 @@ CHANCE = 0.95
 DRAWS = 999
 FEWEST_ROWS = 60
 """Rows that the new records, and the reference, must have."""
+UNSURE = 3.4
+"""Rows more that count as one, since sizes come from medians of differences. Over n rows these have a relative standard
+error of about 1.3 / sqrt(n), and their squares a relative variance of 6.8 / n, that of a mean over n / 3.4 squares."""
 LARGEST_CLASS = 3
 """Parts that a class may hold at most."""
 
@@ -38,29 +42,43 @@ class UsualLoss:
     Attributes
     ----------
     losses
-        Mean loss of a row in each block of the reference records (b,).
+        Mean loss of a row in each block of the reference records (b,), by fits that did not see it.
     constants
         Number of constants and initial states that have a prior.
     rows
         Rows of the reference that count.
+    memory
+        Rows of a reference that count as one, for a mean of squares, see `memory_of_squares`.
     """
 
     losses: FloatArray
     constants: int
     rows: int
+    memory: float = 1.0
 
     def exceeded(self, tested: Tested, count: int, blocks: int) -> str | None:
         """What is larger on new rows than it would be by chance, in words; None where nothing is.
 
-        Chance: means of as many blocks, drawn from the reference (bootstrap), and constants that differ by what the
-        reference leaves open (chi-squared).
+        Constants may differ by what the reference leaves open (chi-squared).
         """
-        draws = np.random.default_rng(0).choice(self.losses, (DRAWS, max(blocks, 1))).mean(axis=1)
-        if (tested.total - tested.prior) / count > float(np.quantile(draws, CHANCE)):
+        if self.larger((tested.total - tested.prior) / count, count, blocks):
             return "its errors are larger than on the reference"
         if tested.prior > float(chi2.ppf(CHANCE, self.constants)):
             return "it needs constants that the reference excludes"
         return None
+
+    def larger(self, level: float, count: int, blocks: int) -> bool:
+        """Whether a mean loss over new rows is larger than chance makes it, for the reference is a sample too.
+
+        Two tests must say so. One draws the difference of two means from the reference's blocks (bootstrap). With few
+        blocks that is too sure. So the ratio of the means must also be beyond the F distribution, with as many degrees
+        of freedom as there are rows that do not remember one another.
+        """
+        rng, least = np.random.default_rng(0), float(self.losses.mean())
+        new, old = (rng.choice(self.losses, (DRAWS, max(n, 1))).mean(axis=1) for n in (blocks, len(self.losses)))
+        memory = self.memory + UNSURE
+        most = float(f_distribution.ppf(CHANCE, count / memory, self.rows / memory))
+        return level - least > float(np.quantile(new - old, CHANCE)) and level > most * least
 
 
 @dataclass(frozen=True)
