@@ -165,6 +165,9 @@ def _candidates(calibration: Calibration, base: JointFit, rows: Rows, reference:
 def _usual_losses(calibration: Calibration) -> UsualLoss:
     rows, errors = calibration.rows, calibration.fit.errors
     blocks = blocks_of(rows, errors)
-    sums = blocks.sums([loss.sum(axis=1) for loss in calibration.losses])
     lengths = np.array([b - a for _, a, b in blocks.edges])
-    return UsualLoss(sums / lengths, len(calibration.constants.names), rows.count, calibration.square_memory)
+    fitted, fresh = (
+        blocks.sums([loss.sum(axis=1) for loss in losses]) / lengths
+        for losses in (rows.losses(errors), calibration.losses)
+    )
+    return UsualLoss(fitted, len(calibration.constants.names), rows.count, fresh, calibration.square_memory)

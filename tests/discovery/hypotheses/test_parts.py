@@ -141,8 +141,8 @@ def test_errors_that_remember_are_rarely_larger_by_chance() -> None:
     slow = lfilter([np.sqrt(1 - 0.95**2)], [1.0, -0.95], rng.normal(size=(400, rows)), axis=1)
     called, seen = 0, 0
     for old, new in zip(slow[::2], slow[1::2], strict=True):
-        blocks = old.reshape(10, -1) ** 2
-        usual = UsualLoss(blocks.mean(axis=1), 1, rows, memory_of_squares(old[:, None]))
+        blocks = np.mean(old.reshape(10, -1) ** 2, axis=1)
+        usual = UsualLoss(blocks, 1, rows, blocks, memory_of_squares(old[:, None]))
         called += usual.larger(float(np.mean(new**2)), rows, 10)
         seen += usual.larger(5 * float(np.mean(new**2)), rows, 10)
     assert called <= 20 and seen >= 180
