@@ -17,11 +17,11 @@ from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
+from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
-from adaptive_flot.discovery.innovations.thinning import searchable
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, is_short
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
@@ -47,11 +47,11 @@ def find_changes(
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
     if not references or len(records) != 1 or compared.verdict.word == "insufficient":
         return compared
-    record, reference = searchable(records[0], model), searchable(max(references, key=len), model)
-    if record is None or reference is None:
+    if not is_short(records[0], model):
         return compared
+    reference = max(references, key=len)
     with np.errstate(all="ignore"):
-        search, told = _events(compared, record, reference, processes, progress)
+        search, told = _events(compared, records[0], reference, processes, progress)
     if told.word not in ("named", "class") or not _has_event(told):
         return compared
     return with_event(compared, search, told, time.perf_counter() - began)
@@ -63,7 +63,7 @@ def _events(
     """Events in a record, by a model that has what the reference lacks."""
     calibration, columns = compared.calibration, compared.rows.columns
     constants, model = calibration.constants, calibration.model
-    floor = calibration.noise
+    floor = noise_floor([reference], columns)
     progress("what the reference lacks")
     before = Search(model, reference, columns, floor, constants.names, constants, processes, LACKING)
     start = before.base(model.parameter_values)

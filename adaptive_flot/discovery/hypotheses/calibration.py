@@ -7,14 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.cross_validation import Fitted, stretches, test_on_stretches
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit, JointFitter
-from adaptive_flot.discovery.hypotheses.joint.known_before import (
-    Constants,
-    first_states,
-    loose_constants,
-    scattered_starts,
-)
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, loose_constants, scattered_starts
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor, rows_of, spread
 from adaptive_flot.discovery.hypotheses.joint.usual_errors import UsualErrors, overall_sizes, usual_errors
 from adaptive_flot.discovery.hypotheses.seen import seen_values
@@ -43,9 +37,6 @@ class Calibration:
         Records and rows it was fitted to, with the usual sizes of the errors.
     usual
         Usual errors by where the plant is.
-    losses, square_memory
-        Criterion of each row and output (N, m), a record, as for a new record, see `_as_new`, and rows that count as
-        one for a mean of them; none where there is no reference.
     constants
         What the records say of the constants.
     noise
@@ -58,23 +49,10 @@ class Calibration:
     fit: JointFit
     rows: Rows
     usual: UsualErrors
-    losses: tuple[FloatArray, ...]
-    square_memory: float
     constants: Constants
     noise: FloatArray
     seen: Mapping[str, FloatArray]
     drivers: Mapping[str, FloatArray]
-
-    def sizes(self, record: Dataset) -> FloatArray:
-        """Usual size of each output's error in every row of a new record (N, m).
-
-        A sensor that is noisier from row to row than on the reference says nothing of the process. With v the variance
-        of that noise, on the new record and on the reference::
-
-            size^2 = usual^2 + max(v_new - v_reference, 0)
-        """
-        more = np.maximum(noise_floor([record], self.rows.columns) ** 2 - self.noise**2, 0.0)
-        return np.asarray(np.sqrt(self.usual.sizes(record) ** 2 + more))
 
 
 def calibrate(
@@ -130,27 +108,7 @@ def calibrate(
     rows = rows.with_sizes(rows.sizes, memory_of(rows, best.errors))
     fitted = model.with_parameters(best.values)
     seen, drivers = seen_values(fitted, best, records)
-    losses, memory = _as_new(model, rows, loose, best, floor, others) if local else ((), 1.0)
-    return Calibration(fitted, best, rows, usual, losses, memory, _told(loose, best, rows), floor, seen, drivers)
-
-
-def _as_new(
-    model: Model, rows: Rows, loose: Constants, fit: JointFit, floor: FloatArray, others: Sequence[Dataset]
-) -> tuple[tuple[FloatArray, ...], float]:
-    """Criterion of each row by constants and usual sizes that did not see its stretch.
-
-    A new record fits neither. A row that is its own neighbour, in a fit to itself, costs less than the same row would
-    on another day. With it, the rows that count as one for a mean of squares.
-    """
-    whole = Fitted(None, loose, first_states(model, rows.records), fit)
-    fresh = test_on_stretches(model, rows, whole, hold_constants=False).fresh
-    sizes = [size.copy() for size in rows.sizes]
-    for left_out in stretches(rows):
-        elsewhere = usual_errors(rows.without(left_out), fit.errors, floor, others)
-        for size, record, mask in zip(sizes, rows.records, left_out, strict=True):
-            size[mask] = elsewhere.sizes(record)[mask]
-    again = rows.with_sizes(sizes, rows.memory)
-    return again.losses(fresh), max(memory_of_squares(again.scaled(i, e)) for i, e in enumerate(fresh))
+    return Calibration(fitted, best, rows, usual, _told(loose, best, rows), floor, seen, drivers)
 
 
 def _fit_from(model: Model, rows: Rows, loose: Constants, start: FloatArray) -> JointFit:
@@ -185,22 +143,3 @@ def memory_of(rows: Rows, errors: Sequence[FloatArray]) -> FloatArray:
     """
     times = [correlation_times(np.clip(rows.scaled(i, e), -3.0, 3.0)) for i, e in enumerate(errors)]
     return np.full(len(rows.columns), float(np.nanmax(np.array(times), initial=1.0)))
-
-
-def memory_of_squares(scaled: FloatArray) -> float:
-    """Rows that count as one for a mean of squares of errors (N, m): the longest of the outputs.
-
-    With the autocorrelations rho of the errors about zero, up to the lag K before the first that is not positive::
-
-        1 + 2 sum_(k=1..K) rho_k^2
-
-    Bartlett, *J. R. Statist. Soc. Suppl.* 8 (1946) 27: the variance of a mean of squares of a normal series.
-    """
-    times = []
-    for e in np.clip(scaled, -3.0, 3.0).T:
-        spectrum = np.fft.rfft(e, 2 * len(e))
-        products = np.fft.irfft(spectrum * spectrum.conj())[: max(len(e) // 2, 1)]
-        rho = products / products[0] if products[0] > 0 else np.zeros(1)
-        below = np.flatnonzero(~(rho > 0))
-        times.append(1 + 2 * float(np.sum(rho[1 : below[0] if below.size else len(rho)] ** 2)))
-    return max(times)

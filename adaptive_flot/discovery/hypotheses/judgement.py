@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from scipy.stats import chi2
-from scipy.stats import f as f_distribution
 
 from adaptive_flot.discovery.hypotheses.comparison import (
     EXPLAINED,
@@ -28,9 +27,6 @@ CHANCE = 0.95
 DRAWS = 999
 FEWEST_ROWS = 60
 """Rows that the new records, and the reference, must have."""
-UNSURE = 3.4
-"""Rows more that count as one, since sizes come from medians of differences. Over n rows these have a relative standard
-error of about 1.3 / sqrt(n), and their squares a relative variance of 6.8 / n, that of a mean over n / 3.4 squares."""
 LARGEST_CLASS = 3
 """Parts that a class may hold at most."""
 
@@ -42,54 +38,29 @@ class UsualLoss:
     Attributes
     ----------
     losses
-        Mean loss of a row in each block of the reference records (b,), which fitted it.
+        Mean loss of a row in each block of the reference records (b,).
     constants
         Number of constants and initial states that have a prior.
     rows
         Rows of the reference that count.
-    fresh
-        The same as `losses` by fits and usual sizes that did not see the row: what a new record costs (b,).
-    memory
-        Rows of a reference that count as one, for a mean of squares, see `memory_of_squares`.
     """
 
     losses: FloatArray
     constants: int
     rows: int
-    fresh: FloatArray
-    memory: float
 
     def exceeded(self, tested: Tested, count: int, blocks: int) -> str | None:
-        """What is larger on new rows than on the rows that fitted the reference, in words; None where nothing is.
+        """What is larger on new rows than it would be by chance, in words; None where nothing is.
 
         Chance: means of as many blocks, drawn from the reference (bootstrap), and constants that differ by what the
-        reference leaves open (chi-squared). A new record fits neither constants nor usual sizes, so this asks too
-        often. It says whether hypotheses are looked at, and not that something has changed.
+        reference leaves open (chi-squared).
         """
         draws = np.random.default_rng(0).choice(self.losses, (DRAWS, max(blocks, 1))).mean(axis=1)
         if (tested.total - tested.prior) / count > float(np.quantile(draws, CHANCE)):
             return "its errors are larger than on the reference"
-        return "it needs constants that the reference excludes" if self._excluded(tested) else None
-
-    def surely_exceeded(self, tested: Tested, count: int, blocks: int) -> bool:
-        """Whether something has changed, though no hypothesis says what."""
-        return self.larger((tested.total - tested.prior) / count, count, blocks) or self._excluded(tested)
-
-    def larger(self, level: float, count: int, blocks: int) -> bool:
-        """Whether a mean loss over new rows is larger than chance makes it, for the reference is a sample too.
-
-        Two tests must say so. One draws the difference of two means from the reference's blocks (bootstrap). With few
-        blocks that is too sure. So the ratio of the means must also be beyond the F distribution, with as many degrees
-        of freedom as there are rows that do not remember one another.
-        """
-        rng, least = np.random.default_rng(0), float(self.fresh.mean())
-        new, old = (rng.choice(self.fresh, (DRAWS, max(n, 1))).mean(axis=1) for n in (blocks, len(self.fresh)))
-        memory = self.memory + UNSURE
-        most = float(f_distribution.ppf(CHANCE, count / memory, self.rows / memory))
-        return level - least > float(np.quantile(new - old, CHANCE)) and level > most * least
-
-    def _excluded(self, tested: Tested) -> bool:
-        return tested.prior > float(chi2.ppf(CHANCE, self.constants))
+        if tested.prior > float(chi2.ppf(CHANCE, self.constants)):
+            return "it needs constants that the reference excludes"
+        return None
 
 
 @dataclass(frozen=True)
@@ -168,8 +139,6 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
             return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
     ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
     standing = [t for t in ranked if stands(rows, blocks, null, t)]
-    if not standing and usual is not None and not usual.surely_exceeded(null, count, len(blocks.edges)):
-        return Judged("none", None, (), "its errors are no larger than chance makes them", float("nan")), blocks
     if not standing:
         why = "no single hypothesis makes the errors smaller on rows that did not fit it"
         return Judged("abstain", None, tuple(ranked[:3]), why, float("nan")), blocks

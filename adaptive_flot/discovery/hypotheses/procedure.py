@@ -113,7 +113,7 @@ def compare(
     columns = measured_columns(model, (*records, *references))
     progress("fit the constants")
     calibration = calibrate(model, references or records, free, columns, records, local=bool(references))
-    sizes = [calibration.sizes(r) for r in records] if references else calibration.rows.sizes
+    sizes = [calibration.usual.sizes(r) for r in records] if references else calibration.rows.sizes
     rows = rows_of(records, columns, sizes, calibration.rows.memory)
     constants = calibration.constants if references else loose_constants(calibration.model, free)
     refresh = REFRESH if references else 1
@@ -165,9 +165,6 @@ def _candidates(calibration: Calibration, base: JointFit, rows: Rows, reference:
 def _usual_losses(calibration: Calibration) -> UsualLoss:
     rows, errors = calibration.rows, calibration.fit.errors
     blocks = blocks_of(rows, errors)
+    sums = blocks.sums([loss.sum(axis=1) for loss in rows.losses(errors)])
     lengths = np.array([b - a for _, a, b in blocks.edges])
-    fitted, fresh = (
-        blocks.sums([loss.sum(axis=1) for loss in losses]) / lengths
-        for losses in (rows.losses(errors), calibration.losses)
-    )
-    return UsualLoss(fitted, len(calibration.constants.names), rows.count, fresh, calibration.square_memory)
+    return UsualLoss(sums / lengths, len(calibration.constants.names), rows.count)

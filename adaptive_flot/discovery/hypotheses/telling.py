@@ -10,7 +10,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
-from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
@@ -18,8 +18,6 @@ from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
-NOISIER = 1.5
-"""Noise from row to row so many times that of the reference is told."""
 FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
 MOVED = 1.0
@@ -66,7 +64,6 @@ def verdict_of(
             *_stopped(model, rows),
             *(_left(calibration, error, reference) if told else ()),
             *(_moved(calibration, after) if reference else ()),
-            *(_noisier(calibration, rows) if reference else ()),
         ),
         seconds=seconds,
     )
@@ -100,18 +97,6 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
     if not moved:
         return ()
     return (f"The new records want other constants, which the reference leaves open: {', '.join(moved)}.",)
-
-
-def _noisier(calibration: Calibration, rows: Rows) -> tuple[str, ...]:
-    """Outputs whose sensor is noisier than on the reference: that counts as no change of the process."""
-    notes = []
-    for record in rows.records:
-        ratio = noise_floor([record], rows.columns) / calibration.noise
-        for c, r in zip(rows.columns, ratio, strict=True):
-            if r > NOISIER:
-                name = calibration.model.outputs[c].name.replace("_", " ")
-                notes.append(f"{record.name}: the noise of {name} from row to row is {r:.2g} times the reference's.")
-    return tuple(notes)
 
 
 def _left(calibration: Calibration, error: Sequence[OutputChange], reference: bool) -> tuple[str, ...]:

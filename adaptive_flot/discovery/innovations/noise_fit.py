@@ -19,9 +19,8 @@ THETA = (1e-6, 10.0)
 """Range of process noise, in scales of the states per square root of the time that the record samples."""
 RHO = (0.3, 10.0)
 """Range of measurement noise, in that from row to row."""
-COARSE, ROUNDS, PRECISION, STEPS = 7, 2, 0.05, 3
-"""Grid of the first search, rounds of the two in turn, width at which a search in the logarithm ends, and steps that
-three points move on at most."""
+COARSE, ROUNDS, PRECISION = 7, 2, 0.05
+"""Grid of the first search, rounds of the two in turn, and width at which a search in the logarithm ends."""
 
 
 def noise_of(
@@ -41,21 +40,16 @@ def noise_of(
 def search_noise(
     cost: Callable[[float, float], float], start: tuple[float, float] | None = None
 ) -> tuple[float, float]:
-    """Find theta and rho that minimise a cost: on a grid and by golden sections, or, from a start, by parabolas."""
+    """Find theta and rho that minimise a cost: on a grid and by golden sections, or, from a start, near it."""
     if start is None:
         grid = np.geomspace(*THETA, COARSE)
         theta = float(min(grid, key=lambda t: cost(float(t), 1.0)))
         rho, width = 1.0, float(np.log(grid[1] / grid[0]))
-        for _ in range(ROUNDS):
-            theta = _golden(partial(_first, cost, rho), theta, width, THETA)
-            rho = _golden(partial(cost, theta), rho, width / 2, RHO)
-            width /= 3
-        return theta, rho
-    (theta, rho), width = start, 1.0
-    value = cost(theta, rho)
+    else:
+        (theta, rho), width = start, 1.0
     for _ in range(ROUNDS):
-        theta, value = _parabola(partial(_first, cost, rho), theta, value, width, THETA)
-        rho, value = _parabola(partial(cost, theta), rho, value, width / 2, RHO)
+        theta = _golden(partial(_first, cost, rho), theta, width, THETA)
+        rho = _golden(partial(cost, theta), rho, width / 2, RHO)
         width /= 3
     return theta, rho
 
@@ -71,36 +65,3 @@ def _golden(cost: Callable[[float], float], at: float, width: float, ends: tuple
     )
     best: float = float(np.exp(found.x))
     return best if found.fun <= cost(at) else at
-
-
-def _parabola(
-    cost: Callable[[float], float], at: float, value: float, width: float, ends: tuple[float, float]
-) -> tuple[float, float]:
-    """The lowest of a point, its neighbours at a width in the logarithm, and the parabola through three of them.
-
-    Where a neighbour is lower, the points move on in its direction, as long as that goes down. A run of the filter is
-    what costs: this takes three or four, a golden section eight.
-    """
-    low, high = float(np.log(ends[0])), float(np.log(ends[1]))
-    middle = float(np.clip(np.log(at), low, high))
-    tried = {middle: value}
-
-    def look(x: float) -> float:
-        x = float(np.clip(x, low, high))
-        if x not in tried:
-            tried[x] = cost(float(np.exp(x)))
-        return x
-
-    left, right = look(middle - width), look(middle + width)
-    for _ in range(STEPS):
-        best = min((left, middle, right), key=tried.__getitem__)
-        if best == middle or best in (low, high):
-            break
-        left, middle, right = (look(best - width), best, look(best + width))
-    if left < middle < right and tried[middle] <= min(tried[left], tried[right]):
-        down, up = tried[left] - tried[middle], tried[right] - tried[middle]
-        a, b = middle - left, right - middle
-        if down * b + up * a > 0:
-            look(middle + (down * b * b - up * a * a) / (2 * (down * b + up * a)))
-    x = min(tried, key=tried.__getitem__)
-    return float(np.exp(x)), tried[x]

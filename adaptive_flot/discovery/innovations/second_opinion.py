@@ -11,23 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import MUCH_WORSE, changes
+from adaptive_flot.discovery.assessment.verification import MUCH_WORSE
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Search
-from adaptive_flot.discovery.innovations.thinning import searchable
+from adaptive_flot.discovery.innovations.search import Search, is_short
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
-from adaptive_flot.discovery.verdict.report_veto import (
-    contradiction,
-    contradiction_at_the_end,
-    last_report_rows,
-    noise_from_row_to_row,
-)
+from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.greybox.effects import Effect
 
 FAR = 3.0
@@ -46,14 +40,12 @@ def second_opinion(state: State) -> State:
     problem, (before, _) = state.known_problem, state.refitted
     silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
     asked = silent or _follows_time(state) or _leaves_too_much(state)
-    if not asked:
+    if not asked or not is_short(problem.record, before.model):
         return state
-    record = searchable(replace(problem.record, initial_state=before.initial_state), before.model)
-    if record is None:
-        return _unasked(state)
     state.progress("ask the innovations form")
+    record = replace(problem.record, initial_state=before.initial_state)
     search = Search(
-        before.model, record, problem.columns, noise_floor([problem.record], problem.columns), problem.adapted, None,
+        before.model, record, problem.columns, noise_floor([record], problem.columns), problem.adapted, None,
         state.processes,
     )  # fmt: skip
     with np.errstate(all="ignore"):
@@ -82,18 +74,6 @@ def _kept(state: State, told: Told) -> State:
             f"row to row, and {told.why}.",
         )
     return state
-
-
-def _unasked(state: State) -> State:
-    """The verdict where the model is too large to ask: a free curve in time must hold beyond what it was fitted to."""
-    problem, (before, after) = state.known_problem, state.refitted
-    if not _follows_time(state) or state.report_record is not None:
-        return state
-    last = last_report_rows(problem)
-    error = changes(last, before, after, "report")
-    noise = noise_from_row_to_row(last, before.model, error)
-    against = contradiction_at_the_end(state.judged, error, noise, anywhere=True)
-    return _taken_back(state, against) if against else state
 
 
 def _leaves_too_much(state: State) -> bool:

@@ -83,18 +83,16 @@ def _is_worse(change: OutputChange, noise: float, with_background: float = 0.0) 
     return (surely and change.after > AT_NOISE * with_background) or change.after > (1 + MUCH_WORSE) * change.before
 
 
-def contradiction_at_the_end(
-    judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray, *, anywhere: bool = False
-) -> str:
-    """What the last report rows say against a free curve in time at a sensor, or anywhere; empty where nothing.
+def contradiction_at_the_end(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """What the last report rows say against a sensor whose error is a free curve in time; empty where nothing.
 
     Arguments are as in `contradiction`, for the rows of `last_report_rows` alone.
     """
     best = judgement.best
     if judgement.word not in ("named", "class") or best is None:
         return ""
-    asked = {site.name for site in best.fit.model.sites if anywhere or site.role == "sensor"}
-    if not any(e.driver == "time" and e.family.is_curve and e.site in asked for e in best.effects):
+    sensors = {site.name for site in best.fit.model.sites if site.role == "sensor"}
+    if not any(e.driver == "time" and e.family.is_curve and e.site in sensors for e in best.effects):
         return ""
     worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
     if not worse:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
 
 from adaptive_flot.greybox import Dataset, Effect, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.model import FloatArray
@@ -41,20 +40,16 @@ def tank(zero: float = 0.0) -> Model:
     )
 
 
-def record(
-    name: str, seed: int, *effects: Effect, zero: float = 0.0, start: float = 300.0, wander: float = 0.0
-) -> Dataset:
-    """A noisy record of the tank with effects that the model does not have, and a wandering heat of so many watts."""
+def record(name: str, seed: int, *effects: Effect, zero: float = 0.0, start: float = 300.0) -> Dataset:
+    """A noisy record of the tank with effects that the model does not have."""
     rng = np.random.default_rng(seed)
     levels = rng.choice([0.0, 800.0, 1600.0, 2400.0], ROWS // 25)
     power: FloatArray = np.repeat(levels, 25).astype(np.float64)
     plant = tank().with_parameters({"efficiency": 0.9, "loss": 80.0}).with_effects(effects)
-    time = DT * np.arange(ROWS, dtype=np.float64)
-    heat = lfilter([1.0], [1.0, -0.95], rng.normal(size=ROWS)) * np.sqrt(1 - 0.95**2) * wander / 0.9 if wander else 0.0
-    data = Dataset(name, time, DT, (power + heat)[:, None], np.zeros((ROWS, 1)))
+    data = Dataset(name, DT * np.arange(ROWS, dtype=np.float64), DT, power[:, None], np.zeros((ROWS, 1)))
     x0 = np.concatenate([[start], np.ones(len(plant.states) - 1)])
     true = RecordSimulator(plant, DT).outputs(data, x0, plant.parameter_values)
-    return replace(data, inputs=power[:, None], outputs=true - zero + NOISE * rng.normal(size=(ROWS, 1)))
+    return replace(data, outputs=true - zero + NOISE * rng.normal(size=(ROWS, 1)))
 
 
 STUCK = Effect("heater", "own_value", "stuck", {"amplitude": 1.0, "level": 1200.0})

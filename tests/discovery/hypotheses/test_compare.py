@@ -32,23 +32,6 @@ def test_nothing_is_told_where_nothing_has_changed() -> None:
     assert told().verdict.word == "none"
 
 
-def test_what_always_wanders_has_not_changed() -> None:
-    """Both records wander as slowly and as far: the reference is one draw of that, and the new record another."""
-    new, old = (record(n, s, wander=60.0) for n, s in (("new", 5), ("old", 25)))
-    assert compare(tank(), [new], [old]).verdict.word == "none"
-
-
-def test_a_noisier_sensor_has_not_changed_the_process() -> None:
-    """It is told as a note. A leak beside it is named all the same."""
-    noise = 0.3 * np.random.default_rng(9).normal(size=(ROWS, 1))
-    new, old = record("new", 1), record("old", 2)
-    verdict = compare(tank(), [replace(new, outputs=new.outputs + noise)], [old]).verdict
-    assert verdict.word == "none"
-    assert any("the noise of temperature from row to row" in note for note in verdict.notes)
-    leaks = record("new", 1, LEAKS)
-    assert compare(tank(), [replace(leaks, outputs=leaks.outputs + noise)], [old]).verdict.word == "named"
-
-
 @pytest.mark.parametrize(
     ("change", "parts"),
     [

@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import lfilter
 
-from adaptive_flot.discovery.hypotheses.calibration import memory_of_squares
 from adaptive_flot.discovery.hypotheses.comparison import blocks_of, reduction
 from adaptive_flot.discovery.hypotheses.cross_validation import stretches
 from adaptive_flot.discovery.hypotheses.families import hypotheses
 from adaptive_flot.discovery.hypotheses.joint.known_before import loose_constants, scattered_starts
 from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, Rows, noise_floor, rows_of
 from adaptive_flot.discovery.hypotheses.joint.usual_errors import usual_errors
-from adaptive_flot.discovery.hypotheses.judgement import UsualLoss
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from tests.discovery.hypotheses.tank import tank
@@ -133,22 +130,3 @@ def test_constants_start_from_their_own_values_too() -> None:
     loose = loose_constants(model.with_parameters({"loss": 200.0}), ["efficiency", "loss"])
     first = scattered_starts(model, loose)[0]
     assert loose.mean + loose.root @ first == pytest.approx([0.8, 60.0])
-
-
-def test_errors_that_remember_are_rarely_larger_by_chance() -> None:
-    """Two draws of one slow series are called different in about one of twenty; five times the variance is seen."""
-    rng, rows = np.random.default_rng(0), 500
-    slow = lfilter([np.sqrt(1 - 0.95**2)], [1.0, -0.95], rng.normal(size=(400, rows)), axis=1)
-    called, seen = 0, 0
-    for old, new in zip(slow[::2], slow[1::2], strict=True):
-        blocks = np.mean(old.reshape(10, -1) ** 2, axis=1)
-        usual = UsualLoss(blocks, 1, rows, blocks, memory_of_squares(old[:, None]))
-        called += usual.larger(float(np.mean(new**2)), rows, 10)
-        seen += usual.larger(5 * float(np.mean(new**2)), rows, 10)
-    assert called <= 20 and seen >= 180
-
-
-def test_rows_that_count_as_one_are_those_of_a_first_order_series() -> None:
-    """For a memory a they are (1 + a^2) / (1 - a^2)."""
-    slow = lfilter([1.0], [1.0, -0.8], np.random.default_rng(0).normal(size=(20_000, 1)), axis=0)
-    assert memory_of_squares(slow / slow.std()) == pytest.approx((1 + 0.64) / (1 - 0.64), rel=0.1)

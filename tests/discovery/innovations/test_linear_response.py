@@ -55,22 +55,3 @@ def test_the_noise_search_finds_the_minimum_of_a_known_cost() -> None:
 
     theta, rho = search_noise(cost)
     assert theta == pytest.approx(0.02, rel=0.1) and rho == pytest.approx(1.5, rel=0.1)
-
-
-@pytest.mark.parametrize("start", [(0.02, 0.8), (0.5, 2.0), (0.005, 0.4)])
-def test_from_a_start_near_it_the_noise_is_found_by_few_runs(start: tuple[float, float]) -> None:
-    """The cost of a normal series with two variances, whose minimum is known: (0.05, 1)."""
-    runs = 0
-
-    def cost(theta: float, rho: float) -> float:
-        nonlocal runs
-        runs += 1
-        slow, fast = (theta / 0.05) ** 2, rho**2
-        return 50 * (math.log(slow) + 1 / slow) + 200 * (math.log(fast) + 1 / fast)
-
-    first = cost(*start)
-    theta, rho = search_noise(cost, start)
-    assert cost(theta, rho) < first
-    assert runs <= 25
-    again = search_noise(cost, (theta, rho))
-    assert again == pytest.approx((0.05, 1.0), rel=0.1)
