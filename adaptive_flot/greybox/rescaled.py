@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Scope
 
 
@@ -37,6 +37,12 @@ def as_it_came(model: Model) -> Model:
 def factors_of(model: Model) -> Mapping[str, float]:
     """Factors of a model by site; empty where it has none."""
     return model.equations.factors if isinstance(model.equations, _Rescaled) else {}
+
+
+def logarithms_of_factors(model: Model, sites: Sequence[str]) -> FloatArray:
+    """Logarithm of the factor at each of some sites (k,); zero where there is none."""
+    factors = factors_of(model)
+    return np.log([factors.get(site, 1.0) for site in sites])
 
 
 def factors_as_effects(model: Model) -> Model:

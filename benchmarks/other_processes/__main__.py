@@ -6,7 +6,6 @@ import json
 import os
 import shlex
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,9 @@ from adaptive_flot.files import replace_file, write_text
 from benchmarks.hidden_effects.__main__ import progress
 from benchmarks.hidden_effects.score.commands import run_command
 from benchmarks.other_processes.record import make_record
-from benchmarks.other_processes.score import by_process, figures, results
+from benchmarks.other_processes.score import by_process, told
+from benchmarks.plant_like.__main__ import make_missing
+from benchmarks.plant_like.score import figures, results
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False)
 Jobs = Annotated[int, typer.Option(min=1, max=64, help="Processes.")]
@@ -46,11 +47,7 @@ def generate(
     jobs: Jobs = 2,
 ) -> None:
     """Write records and answers."""
-    todo = [(out, seed, k) for k in range(count) if not (out / "answers" / f"record_{k:04d}.json").is_file()]
-    with progress() as bar, ProcessPoolExecutor(jobs) as pool:
-        task = bar.add_task("records", total=len(todo))
-        for _ in pool.map(_make, todo):
-            bar.advance(task)
+    make_missing(_make, out, seed, count, jobs)
 
 
 @app.command()
@@ -59,11 +56,11 @@ def discover(
     json_: Annotated[Path, typer.Option("--json", help="Write the verdict here.")],
 ) -> None:
     """Judge one record with the model, and the reference where there is one, that its user has."""
-    told = json.loads(record.with_suffix(".json").read_text())
+    model = json.loads(record.with_suffix(".json").read_text())
     old = record.with_name(record.name.replace("record", "reference"))
     out = json_.with_suffix("")
-    options = ["--model", told["model"], "--json", str(json_), "--processes", "1", "--no-report", "--out", str(out)]
-    options += ["--reference", str(old)] if told["reference"] else []
+    options = ["--model", model["model"], "--json", str(json_), "--processes", "1", "--no-report", "--out", str(out)]
+    options += ["--reference", str(old)] if model["reference"] else []
     words = [sys.executable, "-m", "adaptive_flot", "discover", str(record), *options]
     os.execv(sys.executable, words)
 
@@ -82,7 +79,7 @@ def score(
     with progress() as bar:
         task = bar.add_task(label, total=total)
         run_command(folder, label, command, jobs, timeout, lambda: bar.advance(task), count)
-    table = results(folder, label)
+    table = results(folder, label, told)
     with replace_file(folder / "runs" / label / "results.csv") as stream:
         table.to_csv(stream, index=False, lineterminator="\n")
     for part in (table, by_process(table), figures(table)):

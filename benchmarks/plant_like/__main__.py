@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated
@@ -34,6 +35,15 @@ def _make(job: tuple[Path, int, int]) -> None:
     write_text(folder / "answers" / f"record_{k:04d}.json", json.dumps(made.answer, indent=1) + "\n")
 
 
+def make_missing(make: Callable[[tuple[Path, int, int]], None], out: Path, seed: int, count: int, jobs: int) -> None:
+    """Make the records 0 to count - 1 of a seed that a folder does not hold yet; `make` takes (folder, seed, k)."""
+    todo = [(out, seed, k) for k in range(count) if not (out / "answers" / f"record_{k:04d}.json").is_file()]
+    with progress() as bar, ProcessPoolExecutor(jobs) as pool:
+        task = bar.add_task("records", total=len(todo))
+        for _ in pool.map(make, todo):
+            bar.advance(task)
+
+
 @app.command()
 def generate(
     out: Annotated[Path, typer.Option(help="Folder of the records; what it holds already is kept.")],
@@ -42,11 +52,7 @@ def generate(
     jobs: Jobs = 2,
 ) -> None:
     """Write records and answers."""
-    todo = [(out, seed, k) for k in range(count) if not (out / "answers" / f"record_{k:04d}.json").is_file()]
-    with progress() as bar, ProcessPoolExecutor(jobs) as pool:
-        task = bar.add_task("records", total=len(todo))
-        for _ in pool.map(_make, todo):
-            bar.advance(task)
+    make_missing(_make, out, seed, count, jobs)
 
 
 @app.command()

@@ -7,7 +7,9 @@ first. The rest is held against the effect as in `benchmarks.hidden_effects.scor
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from scipy.stats import binomtest
@@ -35,8 +37,10 @@ def outcome(answer: Answer, verdict: SubmittedVerdict) -> str:
     return "tolerated" if ended == "wrong_class" and len(members) < len(verdict.members) else ended
 
 
-def results(folder: Path, label: str) -> pd.DataFrame:
-    """One row a record that was judged."""
+def results(
+    folder: Path, label: str, told: Callable[[dict[str, Any]], dict[str, object]] = lambda a: {"loop": a["loop"]}
+) -> pd.DataFrame:
+    """One row a record that was judged; `told` says which further columns come from its answer."""
     rows = []
     for file in sorted((folder / "runs" / label / "verdicts").glob("*.meta.json")):
         name, meta = file.name.removesuffix(".meta.json"), json.loads(file.read_text())
@@ -51,7 +55,7 @@ def results(folder: Path, label: str) -> pd.DataFrame:
             "record": name,
             "truth": "+".join(f"{e['site']}:{e['driver']}" for e in answer["effects"]),
             "size": round(max(answer["size"].values(), default=0.0), 2),
-            "loop": answer["loop"],
+            **told(answer),
             "verdict": verdict if isinstance(verdict, str) else verdict.verdict,
             "said": "+".join(f"{n.site}:{n.driver}" for n in said),
             "outcome": ended,
@@ -69,6 +73,7 @@ def figures(table: pd.DataFrame) -> pd.DataFrame:
         "wrong name, all records": table.outcome.isin(("wrong_name", "false_alarm")) & (table.verdict == "named"),
         "wrong name or class, all records": wrong,
         "abstained, records with an effect": with_effect.outcome == "abstained",
+        "no answer (crash, timeout), all records": table.outcome == "failed",
     }
     rows = []
     for name, hits in parts.items():

@@ -28,8 +28,8 @@ MUCH_WORSE = 0.1
 """Share by which an error is worse whatever its interval: a wide interval does not excuse it."""
 AT_NOISE = 1.25
 """An error of so many times the noise is the noise: what it does there contradicts nothing."""
-EVIDENCE = 10.0
-"""Drop of minus two log-likelihood for each effective sample that counts as very strong evidence."""
+LEAST_EVIDENCE = 10.0
+"""Drop of a criterion that counts: "very strong" evidence (Kass & Raftery, *J. Am. Statist. Assoc.* 90 (1995) 773)."""
 CLIPPED_TURNS = 3
 LAGS = 20
 
@@ -42,7 +42,8 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
     than MUCH_WORSE, and is within what noise and background leave unknown, is not worse (see `unknown_of_background`).
 
     A background may take up what an effect does, so that both predict alike. Then these rows confirm it where they say
-    that the background alone is less likely: by EVIDENCE for each effective sample (see `drop_beside_background`).
+    that the background alone is less likely, by LEAST_EVIDENCE for each effective sample: see
+    `drop_beside_background`.
     """
     rows, block = problem.rows("confirm"), block_rows(problem, before, after)
     size = problem.weights * after.noise.stationary_std()
@@ -59,7 +60,7 @@ def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
         if ratio > 1 + WORSE and not within and _reduction(old[:, j], new[:, j], block)[1][1] < 0:
             worse.append(after.model.outputs[c].name)
     drop = drop_beside_background(problem, before, after, "confirm")
-    likelier = drop > EVIDENCE * rows_per_effective_sample(problem, before, after)
+    likelier = drop > LEAST_EVIDENCE * rows_per_effective_sample(problem, before, after)
     confirmed = not worse and bool(interval[0] > 0 or likelier)
     return Verification(reduction, interval, tuple(worse), confirmed, likelihood=drop if likelier else 0.0)
 

@@ -20,12 +20,14 @@ from functools import cached_property
 
 import numpy as np
 
-from adaptive_flot.discovery.background.linear import lines_of_course, logarithms_of_factors, uncertain_profiles
+from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
+from adaptive_flot.discovery.background.linear import lines_of_course, uncertain_constants, uncertain_profiles
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.record.background import Course, root_of_covariance
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.rescaled import logarithms_of_factors
 
 LONGEST = 1 / 8
 """Longest correlation time, as a share of the record: what is slower is a trend."""
@@ -40,8 +42,6 @@ STANDS_OUT = 1.0
 MOST_STAND_OUT = 3
 LEAST_KNOWN = 0.04
 """Beside constants that stand out, the others are known to so much at best: no constant of a plant is exact."""
-LEAST_EVIDENCE = 10.0
-"""Drop of minus two log-likelihood, less the price of its numbers, that a background must bring."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,9 @@ class Evidence:
         C = scorer.projected(responses.of(uncertain_profiles(problem, responses)))
         left, strength, turned = np.linalg.svd(C, full_matrices=False)
         self._turned = strength[:, None] * turned  # C = left @ _turned
-        e = scorer.residual + C @ logarithms_of_factors(responses)  # what is off is counted from the model as it came
+        e = scorer.residual + C @ logarithms_of_factors(
+            responses.fit.model, uncertain_constants(responses)
+        )  # what is off is counted from the model as it came
         self._own = left.T @ e
         self.count = len(self._own)
         self._feeds = []

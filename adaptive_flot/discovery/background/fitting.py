@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.background.evidence import LEAST_EVIDENCE, Evidence, Spread, price
+from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
+from adaptive_flot.discovery.background.evidence import Evidence, Spread, price
 from adaptive_flot.discovery.background.linear import (
     lines_of_course,
     uncertain_constants,
@@ -54,30 +55,22 @@ def fit_with_background(
     return None if again is None else (problem, again)
 
 
-def fitted_beside(problem: Problem, spread: Spread, fit: Fit, responses: Responses) -> Fit | None:
-    """A fit once more, with a background linearised along it; None when it can not be simulated."""
-    beside = replace(problem, background=background_of(problem, spread, responses))
-    return Fitter(beside).fit(fit.model, fit.names, like=fit, rounds=2)
-
-
-def spread_along(problem: Problem, spread: Spread, fit: Fit, responses: Responses, feeds: Sequence[str]) -> Spread:
+def spread_along(problem: Problem, beside: Problem, fit: Fit, feeds: Sequence[str]) -> Spread:
     """The numbers of a background once more, along a fit that has it: far from there the responses say little.
 
     Parameters
     ----------
-    problem, fit, responses
-        The record without a background, a fit without it, and the responses along that.
-    spread
-        The numbers that were found along that fit.
+    problem
+        The record without a background.
+    beside, fit
+        The same with one, and a fit that has it.
     feeds
         Sites at which a course is tried.
     """
-    found = fit_with_background(problem, spread, fit, responses, turns=1)
-    if found is None:
-        return spread
-    beside, there = found
+    own = at_its_constants(beside, fit)
+    there = Fitter(beside).fit(own.model, own.names, like=own, rounds=2) or fit
     background = beside.background
-    assert background is not None
+    assert background is not None  # the caller's problem has one
     added = background.outputs(there.background, there.model)
     bare = replace(there, predicted=there.predicted - added, background=np.zeros(0))
     responses = Responses(problem, bare)

@@ -8,7 +8,6 @@ from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.record.background import knots_of_course, lines_between
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.rescaled import factors_of
 
 MOST_KNOTS, LEAST_ROWS = 96, 4
 """Knots of a course, and the least rows between them."""
@@ -34,12 +33,6 @@ def uncertain_constants(responses: Responses) -> tuple[str, ...]:
     adapted = responses.adapted_sites()
     sites = responses.fit.model.sites
     return tuple(s.name for s in sites if s.role in UNCERTAIN_ROLES and s.mode == "factor" and s.name not in adapted)
-
-
-def logarithms_of_factors(responses: Responses) -> FloatArray:
-    """By how much the logarithm of each of `uncertain_constants` is off in the model already."""
-    factors = factors_of(responses.fit.model)
-    return np.log([factors.get(site, 1.0) for site in uncertain_constants(responses)])
 
 
 def lines_of_course(problem: Problem, site: str, offset: bool) -> tuple[FloatArray, list[TimeProfile]]:

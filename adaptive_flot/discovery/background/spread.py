@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from adaptive_flot.discovery.background.evidence import LARGEST, LEAST_EVIDENCE, Evidence, Spread
-from adaptive_flot.discovery.background.fitting import fitted_beside, spread_along
+from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
+from adaptive_flot.discovery.background.evidence import LARGEST, Evidence, Spread
+from adaptive_flot.discovery.background.fitting import fit_with_background, spread_along
 from adaptive_flot.discovery.background.linear import feeds_unseen, uncertain_constants
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
@@ -47,7 +48,7 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
     """
     if not may_have_background(problem, responses):
         return None
-    feeds, found = feeds_unseen(problem, responses), list[tuple[float, Spread, Fit, Responses]]()
+    feeds, found = feeds_unseen(problem, responses), list[tuple[Problem, Fit]]()
     fit, scorer = base, scorer or scorer_of(problem, base, responses)[0]
     for before in range(MOST_BEFORE + 1):
         evidence = Evidence(problem, scorer, responses, feeds)
@@ -56,9 +57,8 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
         rival = max((s.penalised for s in scorer.scores() if not _free_in_time(s)), default=0.0)
         explains = best.evidence > max(LEAST_EVIDENCE, rival)
         if explains:
-            best = evidence.but_for_what_stands_out(best)
-            together = fitted_beside(problem, best, fit, responses)
-            found += [(together.bic, best, fit, responses)] if together else []
+            together = fit_with_background(problem, evidence.but_for_what_stands_out(best), fit, responses, turns=0)
+            found += [together] if together else []
         if best.evidence <= LEAST_EVIDENCE or (explains and before):
             break
         extended = _with_best_effect(problem, fit, scorer) if before < MOST_BEFORE else None
@@ -68,8 +68,7 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
         scorer = scorer_of(problem, fit, responses)[0]
     if not explains or not found:
         return None
-    _, best, fit, responses = min(found, key=lambda f: f[0])
-    best = spread_along(problem, best, fit, responses, feeds)
+    best = spread_along(problem, *min(found, key=lambda f: f[1].bic), feeds)
     # what fits best as far as the last of the sizes is something else
     return best if best.share < LARGEST and (best.course is not None or best.constants) else None
 

@@ -23,13 +23,14 @@ def background_words(background: Background, units: dict[str, str]) -> str:
     return " ".join(said)
 
 
-def estimated(background: Background) -> str:
-    """What was estimated beside every alternative, as a phrase."""
-    course = () if background.course is None else (f"the estimated course of {background.course.site}",)
-    return " and ".join((*course, *(("estimated constants of the process",) if background.constants else ())))
+def estimated(
+    background: Background, course: str = "the estimated course", constants: str = "estimated constants"
+) -> str:
+    """What was estimated beside every alternative, as a phrase; the two parts may be put in other words."""
+    parts = [] if background.course is None else [f"{course} of {background.course.site}"]
+    return " and ".join(parts + ([f"{constants} of the process"] if background.constants else []))
 
 
 def subject(background: Background) -> str:
     """The same as the subject of a sentence, with its verb."""
-    said = estimated(background).replace("the estimated", "a").replace("estimated ", "")
-    return f"{said} {'were' if background.constants else 'was'}"
+    return f"{estimated(background, 'a course', 'constants')} {'were' if background.constants else 'was'}"

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.rescaled import factors_of, rescaled
+from adaptive_flot.greybox.rescaled import logarithms_of_factors, rescaled
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class Background:
 
     def first(self, model: Model) -> FloatArray:
         """u0 (r,), whose constants a model has already; zero for the course."""
-        factors, first = factors_of(model), np.zeros(self.responses.shape[2])
+        first = np.zeros(self.responses.shape[2])
         if self.sites:
-            first[-len(self.sites) :] = np.log([factors.get(site, 1.0) for site in self.sites]) / self.constants
+            first[-len(self.sites) :] = logarithms_of_factors(model, self.sites) / self.constants
         return first
 
     def outputs(self, u: FloatArray, model: Model) -> FloatArray:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import verify
+from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE, verify
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
@@ -25,7 +25,7 @@ from adaptive_flot.discovery.search.joint_fits import (
     discount,
     discounted,
 )
-from adaptive_flot.discovery.search.rounds import LEAST_EVIDENCE, scorer_of, what_is_left
+from adaptive_flot.discovery.search.rounds import scorer_of, what_is_left
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CHEAP = 30_000

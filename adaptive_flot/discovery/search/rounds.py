@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
 from adaptive_flot.discovery.candidates.catalogue import catalogue
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
@@ -22,8 +23,6 @@ from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 
 NULL_DRAWS = 200
 NULL_QUANTILE = 0.99
-LEAST_EVIDENCE = 10.0
-"""Drop of the information criterion that an effect must bring."""
 FLAT = 0.02
 """A dependence must remove at least this share of the excess error beyond what the constant at its site removes."""
 SHORTLIST_NEAR, SHORTLIST_FURTHER = 9, 5

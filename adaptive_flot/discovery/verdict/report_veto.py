@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import AT_NOISE, EVIDENCE, MUCH_WORSE, WORSE
+from adaptive_flot.discovery.assessment.verification import AT_NOISE, LEAST_EVIDENCE, MUCH_WORSE, WORSE
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Judgement, OutputChange
@@ -59,7 +59,7 @@ def contradiction(
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
         return f"on held-out rows it makes the error larger ({said})"
-    if not any(c.reduction95[0] > 0 for c in changes) and not likelihood > EVIDENCE:
+    if not any(c.reduction95[0] > 0 for c in changes) and not likelihood > LEAST_EVIDENCE:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""
