@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
-from adaptive_flot.discovery.assessment.verification import changes, drop_beside_background, unknown_of_background
+from adaptive_flot.discovery.assessment.verification import changes, unknown_of_background
 from adaptive_flot.discovery.background.fitting import fit_with_background, needed
 from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
 from adaptive_flot.discovery.background.wording import background_words, subject
@@ -205,7 +205,7 @@ def heed_report(state: State) -> State:
         each = unknown_of_background(problem, after, ("estimate", "confirm"), "report")
         names = [after.model.outputs[c].name for c in problem.columns]
         unknown = each[[names.index(c.output) for c in error]]
-    against = contradiction(judgement, error, noise, unknown, drop_beside_background(problem, before, after, "report"))
+    against = contradiction(judgement, error, noise, unknown)
     if not against and state.report_record is None:
         last = last_report_rows(problem)
         at_the_end = changes(last, before, after, "report")

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import AT_NOISE, LEAST_EVIDENCE, MUCH_WORSE, WORSE
+from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE, WORSE
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Judgement, OutputChange
@@ -29,7 +29,6 @@ def contradiction(
     changes: Sequence[OutputChange],
     noise: FloatArray,
     unknown: FloatArray | None = None,
-    likelihood: float = 0.0,
 ) -> str:
     """What the report rows say against a name; empty where they do not, and where no name is given.
 
@@ -48,9 +47,6 @@ def contradiction(
         Noise of each of these outputs from row to row, which no model has fitted (m,).
     unknown
         Standard deviation of what the background leaves unknown in each of them (m,), see `unknown_of_background`.
-    likelihood
-        By how much minus two log-likelihood falls on these rows beside a background, see `drop_beside_background`: it
-        may take up what the effect does, so that no error gets smaller.
     """
     if judgement.word not in ("named", "class"):
         return ""
@@ -59,7 +55,7 @@ def contradiction(
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
         return f"on held-out rows it makes the error larger ({said})"
-    if not any(c.reduction95[0] > 0 for c in changes) and not likelihood > LEAST_EVIDENCE:
+    if not any(c.reduction95[0] > 0 for c in changes):
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""

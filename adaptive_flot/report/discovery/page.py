@@ -149,7 +149,7 @@ def _measured_against_model(discovery: Discovery, problem: Problem, before: Fit,
     runs = f"Measured values, and free runs of the model as it is {found}".rstrip()
     caption = f"{runs}: simulated from the inputs alone, never corrected by a measurement."
     if problem.background is not None:  # it was estimated from the measurements
-        caption = f"{runs}: simulated from the inputs, with {estimated(problem.background)}."
+        caption = f"{runs}: simulated from the inputs, with {spaced(estimated(problem.background))}."
     panels = run_panels(problem, before, after)
     shown = _telling(discovery, problem)
     if len(shown) < len(panels):
