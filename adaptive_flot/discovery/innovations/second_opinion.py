@@ -144,13 +144,16 @@ def _competes(state: State) -> bool:
 
 
 def _allowed(state: State, names: tuple[tuple[str, str], ...]) -> float:
-    """Ratio of errors up to which what is told is as good: above 1 for a fault at the place of a curve without a name.
+    """Ratio of errors up to which what is told is as good: above 1 beside what has more coefficients, and says less.
 
-    Such a curve has more coefficients, and says less.
+    That is a curve without a name at the place of a fault, or a set of more effects that the free run does not tell.
     """
-    best = state.judged.best
-    same = best is not None and {site for site, _ in best.names} == {site for site, _ in names}
-    return 1 + MUCH_WORSE if same and state.judged.word == "unnamed" else 1.0
+    best, word = state.judged.best, state.judged.word
+    if best is None:
+        return 1.0
+    curve = word == "unnamed" and {site for site, _ in best.names} == {site for site, _ in names}
+    larger = word == "abstain" and len(best.names) > len(names)
+    return 1 + MUCH_WORSE if curve or larger else 1.0
 
 
 def _smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], allowed: float) -> bool:

@@ -53,3 +53,15 @@ def test_only_a_fault_at_the_place_of_an_unnamed_curve_may_leave_a_little_more()
     assert asking._smaller((more,), (less,), asking._allowed(unnamed, here))
     assert not asking._smaller((more,), (less,), asking._allowed(unnamed, elsewhere))
     assert not asking._smaller((more,), (less,), asking._allowed(state("named", LAW), here))
+
+
+def test_one_effect_may_leave_a_little_more_than_a_larger_set_that_is_not_told() -> None:
+    one, two = (("gains", "sun"),), (("gains", "sun"), ("loss", "wind"))
+
+    def given(word: str) -> Any:
+        best = SimpleNamespace(effects=(LAW,), names=two)
+        return SimpleNamespace(judged=SimpleNamespace(word=word, best=best), contradiction="")
+
+    assert asking._allowed(given("abstain"), one) > 1.0
+    assert asking._allowed(given("abstain"), two) == 1.0
+    assert asking._allowed(given("named"), one) == 1.0
