@@ -15,6 +15,8 @@ FloatArray = NDArray[np.float64]
 ParameterRole = Literal["fixed", "estimated"]
 Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
 DIMENSIONLESS = ("-", "")
+ROUNDING = 1e-9
+"""Share of the end of a range by which a value may lie beyond it and is still at it."""
 ARBITRARY_ZERO = ("K", "degC", "degF")
 """Units of temperature: the same record in any of them says the same."""
 
@@ -106,19 +108,22 @@ class Parameter:
     disturbance: bool = False
 
     def with_value(self, value: float) -> Parameter:
-        """The same parameter with another value, in its unit.
+        """The same parameter with another value, in its unit; one a rounding error beyond its range is at the end.
+
+        A fit at a bound comes back from its scaled unknowns with the last digit off.
 
         Raises
         ------
         RangeError
             A value outside the physical range.
         """
-        if not (np.isfinite(value) and self.lower <= value <= self.upper):
+        inside = min(max(value, self.lower), self.upper)
+        if not (np.isfinite(value) and abs(value - inside) <= ROUNDING * abs(inside)):
             raise RangeError(
                 f"parameter {self.name!r} = {value:g} {self.unit} is outside its physical range "
                 f"[{self.lower:g}, {self.upper:g}] {self.unit}; give a value inside it"
             )
-        return replace(self, value=float(value))
+        return replace(self, value=float(inside))
 
     @property
     def varies_by_factor(self) -> bool:

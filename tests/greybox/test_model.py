@@ -163,6 +163,15 @@ def test_parameter_outside_its_range_is_refused(value: float) -> None:
         tank(good).with_parameters({"discharge": value})
 
 
+@pytest.mark.parametrize(("beyond", "kept"), [(1.0 + 1e-12, 1.0), (1.0 - 1e-12, 1.0 - 1e-12)])
+def test_a_value_a_rounding_error_beyond_its_range_is_at_its_end(beyond: float, kept: float) -> None:
+    """A fit at a bound comes back with the last digit off; a record of other processes ended with an error by it."""
+    parameter = Parameter("discharge", 0.5, "-", "", lower=0.0, upper=1.0)
+    assert parameter.with_value(beyond).value == kept
+    with pytest.raises(RangeError):
+        parameter.with_value(1.0 + 1e-6)
+
+
 def test_unknown_parameter_is_refused() -> None:
     with pytest.raises(ModelError, match="did you mean 'discharge'"):
         tank(good).with_parameters({"discharg": 0.1})
