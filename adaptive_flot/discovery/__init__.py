@@ -29,8 +29,8 @@ noise model                record/noise.py            fit_noise
 marginal likelihood        background/evidence.py     Evidence, fitting/fit.py
 effective sample size      record/effective_samples.py  correlation_times
 Ljung-Box, Holm            assessment/detect.py       detect
-block bootstrap            assessment/verification.py verify
-sd of a loglik difference  assessment/verification.py loglik_difference_sds
+block bootstrap            assessment/reduction.py    reduction
+sd of a loglik difference  assessment/likelihood.py   loglik_difference_sds
 backward elimination       candidates/knots.py        trimmed
 cross-validation           search/joint_fits.py       cross_validated
 separation of two models   test_design/separation.py  separation

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.beside_background import unknown_of_background
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
-from adaptive_flot.discovery.assessment.verification import changes, unknown_of_background
+from adaptive_flot.discovery.assessment.verification import changes
 from adaptive_flot.discovery.background.fitting import fit_with_background, needed
 from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
 from adaptive_flot.discovery.background.wording import background_words, subject

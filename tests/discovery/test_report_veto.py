@@ -41,6 +41,7 @@ def _judged(draught: Discovery, word: str = "named", driver: str = "fan_speed") 
         (_change(2.0, 2.1, -0.08, 0.02), "no output surely"),
         (_change(2.0, 1.0, 0.3, 0.6), ""),
         (_change(2.0, 1.9, -0.1, 0.2), "no output surely"),
+        (_change(2.0, 1.999, 1e-5, 1e-3), "no output surely"),  # certain, and nothing that a user would see
     ],
 )
 def test_a_name_is_contradicted(draught: Discovery, change: OutputChange, said: str) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
-from adaptive_flot.discovery.assessment.verification import drop_beside_background, unknown_of_background
+from adaptive_flot.discovery.assessment.beside_background import drop_beside_background, unknown_of_background
 from adaptive_flot.discovery.background.evidence import Evidence, Spread
 from adaptive_flot.discovery.background.fitting import background_of
 from adaptive_flot.discovery.background.linear import uncertain_constants
@@ -27,22 +29,25 @@ from tests.discovery.heated import moves
 
 DT, ROWS, ROOM = 30.0, 900, 293.0
 NOISE = 0.1  # K
+WANDERS_S = 1800.0
 CONSTANTS = {"heat_loss": 40.0, "exchange": 120.0, "water": 4.0e5, "jacket_wall": 1.5e5, "circulation": 0.8}
 
 
-def _equations(m: Scope) -> None:
+def _equations(m: Scope, wanders: bool = False) -> None:
     water, jacket = m.state("water"), m.state("jacket")
+    room = m.site("room", ROOM + 0 * jacket, "feed", "offset", unit="K") if wanders else ROOM
     heating = m.site("heating", m.parameter("efficiency") * m.input("power"), "actuator", unit="W")
     pumped = m.site("circulation", CONSTANTS["circulation"] + 0.01 * m.input("pump_speed"))
     exchange = m.site("exchange", CONSTANTS["exchange"] * pumped * (jacket - water), unit="W")
-    loss = m.site("heat_loss", CONSTANTS["heat_loss"] * (jacket - ROOM), unit="W")
+    loss = m.site("heat_loss", CONSTANTS["heat_loss"] * (jacket - room), unit="W")
     m.derivative("jacket", (heating - exchange - loss) / m.site("jacket_wall", CONSTANTS["jacket_wall"] + 0 * jacket))
     m.derivative("water", exchange / m.site("water", CONSTANTS["water"] + 0 * water))
     m.output("water", m.site("thermometer", water, "sensor", "offset", unit="K"))
     m.output("jacket", m.site("jacket_thermometer", jacket, "sensor", "offset", unit="K"))
 
 
-def jacketed_tank() -> Model:
+def jacketed_tank(wanders: bool = False) -> Model:
+    """The tank; with a site of role feed for the room where that may wander."""
     temperatures = tuple(Quantity(n, "K", "", 273.0, 373.0, 10.0) for n in ("water", "jacket"))
     inputs = Quantity("power", "W", "", 0.0, 1e4, 1e3), Quantity("pump_speed", "1/s", "", 0.0, 100.0, 5.0)
     return Model(
@@ -51,24 +56,31 @@ def jacketed_tank() -> Model:
         inputs=(*inputs, Quantity("fan_speed", "1/s", "", 0.0, 100.0, 5.0)),
         parameters=(Parameter("efficiency", 0.9, "-", "data sheet", None, 0.3, 1.5, 0.05, role="estimated"),),
         outputs=(Quantity("water", "K", ""), Quantity("jacket", "K", "")),
-        equations=_equations,
+        equations=partial(_equations, wanders=wanders),
         max_step_s=60.0,
         initial_guess={"water": 310.0, "jacket": 315.0},
     )
 
 
-def record(off: float, exponent: float = 0.0, seed: int = 0) -> Dataset:
-    """Truth in NumPy: Euler, twenty steps a row; constants off by a standard deviation, a draught takes heat."""
+def record(off: float, exponent: float = 0.0, seed: int = 0, wander: float = 0.0) -> Dataset:
+    """Truth in NumPy: Euler, twenty steps a row; constants off by a standard deviation, a draught takes heat.
+
+    The room wanders with the standard deviation `wander` [K] and the correlation time WANDERS_S.
+    """
     rng = np.random.default_rng(seed)
     factor = dict(zip(CONSTANTS, np.exp(off * rng.standard_normal(len(CONSTANTS))), strict=True))
     c = {name: value * factor[name] for name, value in CONSTANTS.items()}
     speeds = moves(ROWS, 20, 60, 35, seed + 300)
     inputs = np.column_stack([moves(ROWS, 500, 3000, 45, seed + 100), speeds, moves(ROWS, 5, 20, 25, seed + 200)])
+    memory = np.exp(-DT / WANDERS_S)
+    course = np.asarray(
+        lfilter([np.sqrt(1 - memory**2)], [1, -memory], np.random.default_rng(seed + 400).normal(size=2 * ROWS))
+    )
     water, jacket, seen = 310.0, 315.0, []
-    for power, pump, fan in inputs:
+    for (power, pump, fan), room in zip(inputs, ROOM + wander * course[ROWS:], strict=True):
         for _ in range(20):
             flow = c["exchange"] * factor["circulation"] * (CONSTANTS["circulation"] + 0.01 * pump) * (jacket - water)
-            loss = c["heat_loss"] * (fan / 10) ** exponent * (jacket - ROOM)
+            loss = c["heat_loss"] * (fan / 10) ** exponent * (jacket - room)
             jacket += DT / 20 * (0.9 * power - flow - loss) / c["jacket_wall"]
             water += DT / 20 * flow / c["water"]
         seen.append((water, jacket))
@@ -76,9 +88,10 @@ def record(off: float, exponent: float = 0.0, seed: int = 0) -> Dataset:
     return Dataset("tank", DT * np.arange(1.0, ROWS + 1), DT, inputs, y)
 
 
-def fitted(measured: Dataset) -> tuple[Problem, Fit, Responses]:
-    problem = make_problem(measured, jacketed_tank(), ("efficiency",), burn_in=30, guard=5)
-    fit = Fitter(problem).fit(jacketed_tank())
+def fitted(measured: Dataset, wanders: bool = False) -> tuple[Problem, Fit, Responses]:
+    model = jacketed_tank(wanders)
+    problem = make_problem(measured, model, ("efficiency",), burn_in=30, guard=5)
+    fit = Fitter(problem).fit(model)
     assert fit is not None
     return problem, fit, Responses(problem, fit)
 
@@ -208,3 +221,16 @@ def test_the_likelihood_beside_a_background_is_that_of_a_gaussian() -> None:
 
     expected = 2 * (density(beside) - density(other))
     assert drop_beside_background(problem, other, beside, "confirm") == pytest.approx(expected, abs=0.5)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_constants_that_are_off_and_a_room_that_wanders_are_found_together(seed: int) -> None:
+    """Each alone would be taken for coloured noise beside the other."""
+    spread = spread_of(*fitted(record(0.1, seed=seed, wander=1.0), wanders=True))
+    assert spread is not None
+    assert spread.numbers == 3
+    assert spread.course is not None
+    assert spread.course.site == "room"
+    rate = spread.course.std / np.sqrt(spread.course.time)
+    assert 1 / 1.6 < rate / (1.0 / np.sqrt(WANDERS_S)) < 1.6
+    assert 0.04 <= spread.constants <= 0.2

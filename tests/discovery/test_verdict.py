@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.assessment.verification import changes, loglik_difference_sds, verify, whiteness
+from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
+from adaptive_flot.discovery.assessment.verification import changes, verify, whiteness
 from adaptive_flot.discovery.fitting.fit import row_losses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading

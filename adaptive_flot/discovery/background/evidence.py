@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
+from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.background.linear import lines_of_course, uncertain_constants, uncertain_profiles
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
@@ -62,6 +62,11 @@ class Spread:
     constants: float
     evidence: float
     share: float = 0.0
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers of it were chosen: size and correlation time of a course, size of the constants."""
+        return 2 * (self.course is not None) + (self.constants > 0)
 
 
 def price(problem: Problem) -> float:

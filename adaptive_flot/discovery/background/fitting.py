@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
+from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.background.evidence import Evidence, Spread, price
 from adaptive_flot.discovery.background.linear import (
     lines_of_course,
@@ -58,6 +58,9 @@ def fit_with_background(
 def spread_along(problem: Problem, beside: Problem, fit: Fit, feeds: Sequence[str]) -> Spread:
     """The numbers of a background once more, along a fit that has it: far from there the responses say little.
 
+    The noise is that of this fit. Without a background, what wanders and what is off would count as coloured noise,
+    and hide the smaller part of the background: the constants beside a course, or a course beside the constants.
+
     Parameters
     ----------
     problem
@@ -69,13 +72,18 @@ def spread_along(problem: Problem, beside: Problem, fit: Fit, feeds: Sequence[st
     """
     own = at_its_constants(beside, fit)
     there = Fitter(beside).fit(own.model, own.names, like=own, rounds=2) or fit
-    background = beside.background
-    assert background is not None  # the caller's problem has one
-    added = background.outputs(there.background, there.model)
-    bare = replace(there, predicted=there.predicted - added, background=np.zeros(0))
+    bare = without_background(beside, there)
     responses = Responses(problem, bare)
-    evidence = Evidence(problem, scorer_of(problem, bare, responses)[0], responses, feeds)
+    evidence = Evidence(problem, scorer_of(problem, bare, responses, there.noise)[0], responses, feeds)
     return evidence.but_for_what_stands_out(evidence.best)
+
+
+def without_background(problem: Problem, fit: Fit) -> Fit:
+    """A fit of the problem, its background taken off: the run of its model with all constants that this has."""
+    if problem.background is None:
+        return fit
+    added = problem.background.outputs(fit.background, fit.model)
+    return replace(fit, predicted=fit.predicted - added, background=np.zeros(0))
 
 
 def background_of(problem: Problem, spread: Spread, responses: Responses) -> Background:

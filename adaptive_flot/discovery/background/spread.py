@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
-from adaptive_flot.discovery.background.evidence import LARGEST, Evidence, Spread
-from adaptive_flot.discovery.background.fitting import fit_with_background, spread_along
+from collections.abc import Sequence
+
+from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
+from adaptive_flot.discovery.background.evidence import LARGEST, Evidence, Spread, price
+from adaptive_flot.discovery.background.fitting import fit_with_background, spread_along, without_background
 from adaptive_flot.discovery.background.linear import feeds_unseen, uncertain_constants
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
@@ -36,8 +38,9 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
 
     It competes with the effects, by first order (see `evidence`). Where one of these explains more, the best is fitted
     first, and the background is looked for in what that leaves; MOST_BEFORE at most, and one at least: an effect
-    that is far from linear must not be taken for a background. Of the backgrounds that were found beside more or fewer
-    effects, that one counts whose fit together with them is best: a wrong effect leaves more for the background.
+    that is far from linear must not be taken for a background. Each that is found is looked for once more, along the
+    fit that has it. Of those that were found beside more or fewer effects, that one counts whose fit together with
+    them is best: a wrong effect leaves more for the background.
 
     Parameters
     ----------
@@ -48,7 +51,7 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
     """
     if not may_have_background(problem, responses):
         return None
-    feeds, found = feeds_unseen(problem, responses), list[tuple[Problem, Fit]]()
+    feeds, found = feeds_unseen(problem, responses), list[tuple[Spread, float]]()
     fit, scorer = base, scorer or scorer_of(problem, base, responses)[0]
     for before in range(MOST_BEFORE + 1):
         evidence = Evidence(problem, scorer, responses, feeds)
@@ -57,8 +60,7 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
         rival = max((s.penalised for s in scorer.scores() if not _free_in_time(s)), default=0.0)
         explains = best.evidence > max(LEAST_EVIDENCE, rival)
         if explains:
-            together = fit_with_background(problem, evidence.but_for_what_stands_out(best), fit, responses, turns=0)
-            found += [together] if together else []
+            found += _fitted(problem, evidence.but_for_what_stands_out(best), fit, responses, feeds)
         if best.evidence <= LEAST_EVIDENCE or (explains and before):
             break
         extended = _with_best_effect(problem, fit, scorer) if before < MOST_BEFORE else None
@@ -68,9 +70,24 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
         scorer = scorer_of(problem, fit, responses)[0]
     if not explains or not found:
         return None
-    best = spread_along(problem, *min(found, key=lambda f: f[1].bic), feeds)
+    best = min(found, key=lambda f: f[1])[0]
     # what fits best as far as the last of the sizes is something else
-    return best if best.share < LARGEST and (best.course is not None or best.constants) else None
+    return best if best.share < LARGEST and best.numbers else None
+
+
+def _fitted(
+    problem: Problem, first: Spread, fit: Fit, responses: Responses, feeds: Sequence[str]
+) -> list[tuple[Spread, float]]:
+    """A background, and what is found along the fit that has it, each with the BIC of its fit and its own numbers."""
+    fitted = fit_with_background(problem, first, fit, responses, turns=0)
+    if fitted is None:
+        return []
+    found = [(first, fitted[1].bic + first.numbers * price(problem))]
+    more = spread_along(problem, *fitted, feeds)
+    bare = without_background(*fitted)
+    if more.numbers and (again := fit_with_background(problem, more, bare, Responses(problem, bare), turns=0)):
+        found.append((more, again[1].bic + more.numbers * price(problem)))
+    return found
 
 
 def _with_best_effect(problem: Problem, fit: Fit, scorer: Scorer) -> Fit | None:

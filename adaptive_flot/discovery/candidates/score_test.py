@@ -75,9 +75,19 @@ class Score:
 
 
 class Scorer:
-    """Whitened, projected responses of a whole catalogue along one fit."""
+    """Whitened, projected responses of a whole catalogue along one fit.
 
-    def __init__(self, problem: Problem, fit: Fit, responses: Responses, candidates: list[Candidate]) -> None:
+    The noise model is worked out as above where none is given.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        fit: Fit,
+        responses: Responses,
+        candidates: list[Candidate],
+        noise: Noise | None = None,
+    ) -> None:
         self.problem, self.fit, self.candidates = problem, fit, candidates
         self.drivers, self._responses = responses.drivers, responses
         self.rows = problem.rows("estimate")
@@ -92,7 +102,7 @@ class Scorer:
         nuisance = (nuisance / problem.weights[:, :, None])[self._reached]
         residual = without_spikes(fit.residual(problem) / problem.weights)
         self._size = np.array([self._prior(c.offset, responses, c.site) for c in profiles])
-        self.noise = self._clean_noise(residual, weighted, nuisance)
+        self.noise = noise or self._clean_noise(residual, weighted, nuisance)
         e = self.noise.whiten(residual)
         present = np.isfinite(e) & self.rows[:, None]
         self._present = present[self._reached]

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.assessment.verification import loglik_difference_sds, verify
+from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
+from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.catalogue import finer
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter

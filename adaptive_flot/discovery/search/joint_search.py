@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE, verify
+from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
+from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem

@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import LEAST_EVIDENCE
+from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.candidates.catalogue import catalogue
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Round
 from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist, with_each_output
@@ -104,13 +105,15 @@ def ranked(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tupl
     return tuple(a for a in kept if not flat(a))
 
 
-def scorer_of(problem: Problem, fit: Fit, responses: Responses | None = None) -> tuple[Scorer, tuple[str, ...]]:
+def scorer_of(
+    problem: Problem, fit: Fit, responses: Responses | None = None, noise: Noise | None = None
+) -> tuple[Scorer, tuple[str, ...]]:
     """Scores along a fit, and the sites whose constant change is that of an adapted parameter.
 
-    `responses` are those along this fit, where they are known already.
+    `responses` are those along this fit, and `noise` its noise model, where they are known already.
     """
     responses = responses or Responses(problem, fit)
-    return Scorer(problem, fit, responses, catalogue(fit.model, responses)), responses.adapted_sites()
+    return Scorer(problem, fit, responses, catalogue(fit.model, responses), noise), responses.adapted_sites()
 
 
 def threshold_of(scorer: Scorer) -> float:

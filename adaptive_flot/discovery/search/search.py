@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from adaptive_flot.discovery.assessment.verification import loglik_difference_sds, rows_per_effective_sample, verify
+from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds, rows_per_effective_sample
+from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import column_means, squared_errors
+from adaptive_flot.discovery.assessment.reduction import column_means, squared_errors
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import without_spikes

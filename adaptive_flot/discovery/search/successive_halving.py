@@ -16,7 +16,7 @@ from itertools import count
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import worth_its_freedom
+from adaptive_flot.discovery.assessment.likelihood import worth_its_freedom
 from adaptive_flot.discovery.candidates.direction import nameable
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.fitting.fit import Fit

@@ -19,6 +19,8 @@ from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
+BETTER = 0.01
+"""Share by which the error of one output must fall: less is certain at times, and nothing that a user would see."""
 FAR_FROM_NOISE = 5.0
 """An error of so many times the noise is not explained, whatever the noise model says. Noise that is allowed to be
 coloured has up to three times what its differences show."""
@@ -55,7 +57,7 @@ def contradiction(
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
         return f"on held-out rows it makes the error larger ({said})"
-    if not any(c.reduction95[0] > 0 for c in changes):
+    if not any(c.reduction95[0] > 0 and c.after < (1 - BETTER) * c.before for c in changes):
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from adaptive_flot.discovery.assessment.verification import column_means
+from adaptive_flot.discovery.assessment.reduction import column_means
 
 
 @given(arrays(float, st.tuples(st.integers(0, 9), st.integers(1, 4)), elements=st.floats(-1e6, 1e6) | st.just(np.nan)))

@@ -1,0 +1,77 @@
+"""What a difference of likelihood between two fits says: how much evidence it is, and how certain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.reduction import MANY_BLOCKS, SHORTEST_BLOCK, column_means, squared_errors
+from adaptive_flot.discovery.fitting.fit import Fit, row_losses
+from adaptive_flot.discovery.record.effective_samples import correlation_times
+from adaptive_flot.discovery.record.problem import Problem
+
+LEAST_EVIDENCE = 10.0
+"""Drop of a criterion that counts: "very strong" evidence (Kass & Raftery, *J. Am. Statist. Assoc.* 90 (1995) 773)."""
+COMPARISON_BLOCK_ROWS = 60
+"""Rows of a block in which two fits are compared: what both lack is slower than the noise."""
+
+
+def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) -> tuple[float, ...]:
+    """Standard deviation of the difference between each fit's minus two log-likelihood and that of the best.
+
+    With the difference D_b over block b of B (see `row_losses`)::
+
+        sd = sqrt(B) * standard deviation of D_b
+
+    The likelihood ratio test of models that are not nested: Vuong, *Econometrica* 57 (1989) 307, eq. (4.2), with blocks
+    of rows instead of rows, as these depend on one another; the fits stay as they are (Kishino & Hasegawa, *J. Mol.
+    Evol.* 29 (1989) 170). A fit that is worse by less than `SURE` of these would be the better one in some records like
+    this. Zero of a record with fewer than MANY_BLOCKS blocks.
+    """
+    rows = problem.rows("estimate")
+    length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, COMPARISON_BLOCK_ROWS))
+    count = int(rows.sum()) // length
+    if count < MANY_BLOCKS:
+        return tuple(0.0 for _ in others)
+    own = row_losses(problem, best, rows)
+    deviations = []
+    for fit in others:
+        blocks = (row_losses(problem, fit, rows) - own)[: count * length].reshape(count, length).sum(axis=1)
+        deviations.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
+    return tuple(deviations)
+
+
+def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> float:
+    """Rows for each effective sample of a fit's innovations, averaged by what it gained in each output on another fit.
+
+    With the autocorrelation time t_j of the innovations of output j (see `correlation_times`) and the drop g_j of its
+    mean squared error::
+
+        t = sum_j g_j t_j / sum_j g_j
+
+    A disturbance that is slower than any noise of a sensor is not whitened away, and would be counted in every row.
+    """
+    rows = problem.rows("estimate")
+    size = problem.weights * after.noise.stationary_std()
+    old, new = (column_means(squared_errors(problem, fit, size, rows)) for fit in (before, after))
+    gained = np.maximum(old - new, 0.0)
+    if not gained.sum() > 0:
+        return 1.0
+    innovations = np.clip(np.where(rows[:, None], after.innovations, np.nan), -problem.clip, problem.clip)
+    return float(gained @ correlation_times(innovations) / gained.sum())
+
+
+def worth_its_freedom(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether what a freer form gains pays for its further coefficients, evidence counted once an effective sample.
+
+    By the Bayesian information criterion of N / t samples, with t of `rows_per_effective_sample` and q coefficients
+    more: (drop of minus two log-likelihood) / t > q log(N / t). Schwarz, *Ann. Statist.* 6 (1978) 461.
+
+    Where something else is still missing, neighbouring rows err alike, and a criterion that counts them all would
+    take any freedom it can get.
+    """
+    rows_each = rows_per_effective_sample(problem, before, after)
+    further = len(after.names) - len(before.names)
+    samples = max(problem.count(problem.rows("estimate")) / rows_each, 2.0)
+    return (before.loss - after.loss) / rows_each > further * float(np.log(samples))
