@@ -2,12 +2,11 @@
 
 Map
 ---
-detect.py        Whether the residual is more than noise, in which outputs, and since when.
-holm.py          Several tests as one.
-explained.py     Whether the inputs explain the outputs at all.
-verification.py  The error on rows to which nothing was fitted.
-reduction.py     By how much an error is smaller, with its interval.
-likelihood.py    What a difference of likelihood says.
-beside_background.py
-                 What a background leaves unknown on rows that did not fit it.
+detect.py             Whether the residual is more than noise, in which outputs, and since when.
+holm.py               Several tests as one.
+explained.py          Whether the inputs explain the outputs at all.
+verification.py       The error on rows to which nothing was fitted.
+reduction.py          By how much an error is smaller, with its interval.
+likelihood.py         What a difference of likelihood says.
+beside_background.py  What a background leaves unknown on rows that did not fit it.
 """
