@@ -79,10 +79,10 @@ def spread_along(problem: Problem, beside: Problem, fit: Fit, feeds: Sequence[st
 
 
 def without_background(problem: Problem, fit: Fit) -> Fit:
-    """A fit of the problem, its background taken off: the run of its model with all constants that this has."""
-    if problem.background is None:
-        return fit
-    added = problem.background.outputs(fit.background, fit.model)
+    """A fit beside a background, which is taken off: the run of its model with the constants that this has."""
+    background = problem.background
+    assert background is not None  # asked of a fit that has one
+    added = background.outputs(fit.background, fit.model)
     return replace(fit, predicted=fit.predicted - added, background=np.zeros(0))
 
 

@@ -72,7 +72,7 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
         return None
     best = min(found, key=lambda f: f[1])[0]
     # what fits best as far as the last of the sizes is something else
-    return best if best.share < LARGEST and best.numbers else None
+    return best if best.share < LARGEST else None
 
 
 def _fitted(
