@@ -20,8 +20,8 @@ from adaptive_flot.discovery.stages import (
     examine_residual,
     fit_model_as_it_is,
     fit_without_report,
-    heed_report,
     judge_alternatives,
+    look_for_courses,
     plan_test,
     screen_record,
     search_at_once,
@@ -31,6 +31,7 @@ from adaptive_flot.discovery.stages import (
 )
 from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import conclude
+from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -114,6 +115,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     allow_for_background,
     search_one_by_one,
     search_at_once,
+    look_for_courses,
     tell_background,
     compare_with_common_nuisance,
     judge_alternatives,

@@ -7,22 +7,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.beside_background import unknown_of_background
 from adaptive_flot.discovery.assessment.detect import detect
 from adaptive_flot.discovery.assessment.explained import nothing_explained
-from adaptive_flot.discovery.assessment.verification import changes
-from adaptive_flot.discovery.background.fitting import fit_with_background, needed
+from adaptive_flot.discovery.background.fitting import (
+    fit_with_background,
+    needed,
+    with_course_told,
+    without_constants,
+)
 from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
+from adaptive_flot.discovery.background.told_course import with_courses
 from adaptive_flot.discovery.background.wording import background_words, subject
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.base_fit import prepare, split_finer, split_record
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
-from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT
+from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.record.screening import screen
-from adaptive_flot.discovery.results import Judgement, State, Verdict
+from adaptive_flot.discovery.results import State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
 from adaptive_flot.discovery.search.rounds import scorer_of
@@ -30,15 +34,14 @@ from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
-from adaptive_flot.discovery.verdict.conclude import insufficient, report_errors
-from adaptive_flot.discovery.verdict.judge import first_that_stands, held_up, judge, least_separation, undecided_rivals
-from adaptive_flot.discovery.verdict.outputs import certain_words
-from adaptive_flot.discovery.verdict.report_veto import (
-    contradiction,
-    contradiction_at_the_end,
-    last_report_rows,
-    noise_from_row_to_row,
-    unexplained,
+from adaptive_flot.discovery.verdict.conclude import insufficient
+from adaptive_flot.discovery.verdict.judge import (
+    constants_told,
+    first_that_stands,
+    held_up,
+    judge,
+    least_separation,
+    undecided_rivals,
 )
 from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.rescaled import factors_of, rescaled
@@ -141,13 +144,27 @@ def search_at_once(state: State) -> State:
     return replace(state, problem=problem, base=result.base, search=result)
 
 
+def look_for_courses(state: State) -> State:
+    """Ask what else may wander, where nothing is told beside a feed that does."""
+    problem, result = state.searched
+    if problem.time_is_up or problem.background is None or problem.background.course is None:
+        return state
+    judgement = judge(first_that_stands(problem, result))
+    if judgement.word != "none" or judgement.best is not None:
+        return state
+    state.progress("look for what else wanders")
+    problem, result = with_courses(problem, result, state.progress)
+    return replace(state, problem=problem, base=result.base, search=result)
+
+
 def tell_background(state: State) -> State:
     """Say that a feed wanders, and how far constants are off, where the best alternative needs it."""
     problem, result = state.searched
+    best = result.alternatives[0] if result.alternatives else None
+    fit, problem = (result.base, problem) if best is None else (best.fit, best.problem or problem)
     background = problem.background
     if background is None:
         return state
-    fit = result.alternatives[0].fit if result.alternatives else result.base
     if needed(problem, fit):
         units = {site.name: site.unit or "" for site in fit.model.sites}
         return replace(state, background=background_words(background, units))
@@ -159,7 +176,7 @@ def compare_with_common_nuisance(state: State) -> State:
     """Compare the leading alternatives anew, with what all of them lack added to each."""
     problem, result = state.searched
     rivals = undecided_rivals(result) if problem.whiten and not problem.time_is_up else ()
-    if not rivals:
+    if not rivals or rivals[0].problem is not None:
         return state
     state.progress("compare with a common nuisance")
     return replace(state, search=adjust_for_common_nuisance(problem, result, rivals, state.processes))
@@ -181,42 +198,27 @@ def judge_alternatives(state: State) -> State:
 
 
 def fit_without_report(state: State) -> State:
-    """Fit the plain model and the best alternative to all rows but the report split, run at every row."""
+    """Fit the plain model and the best alternative to all rows but the report split, run at every row.
+
+    A constant that is told is no part of the background beside it: its whole size is that of the effect.
+    """
     state.progress("fit once more, without the report split")
     problem, base = state.fitted
     problem = replace(problem, deadline=state.ends)
     splits = ("estimate", "confirm")
-    fitter, every = Fitter(problem, splits), Fitter(replace(problem, nodes=None), splits)
 
-    def final(fit: Fit) -> Fit:
-        again = fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit
-        return every.with_intervals(at_every_row(fitter, again, {}))
+    def final(beside: Problem, fit: Fit) -> Fit:
+        fitter, every = Fitter(beside, splits), Fitter(replace(beside, nodes=None), splits)
+        again = at_every_row(fitter, fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit, {})
+        if beside.background is not None and beside.background.told is not None:
+            again = fitter.at_its_constants(again)
+        return with_course_told(beside, every.with_intervals(again))
 
-    best, before = state.judged.best, final(base)
-    return replace(state, before=before, after=before if best is None else final(best.fit))
-
-
-def heed_report(state: State) -> State:
-    """Take a name back where the held-out rows contradict it."""
-    problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
-    error = report_errors(problem, before, after, state.report_record)
-    noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
-    unknown = np.zeros(len(error))
-    if state.report_record is None:
-        each = unknown_of_background(problem, after, ("estimate", "confirm"), "report")
-        names = [after.model.outputs[c].name for c in problem.columns]
-        unknown = each[[names.index(c.output) for c in error]]
-    against = contradiction(judgement, error, noise, unknown)
-    if not against and state.report_record is None:
-        last = last_report_rows(problem)
-        at_the_end = changes(last, before, after, "report")
-        against = contradiction_at_the_end(judgement, at_the_end, noise_from_row_to_row(last, before.model, at_the_end))
-    if against:
-        judgement = replace(judgement, word="abstain", members=(), part=())
-    certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
-    if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
-        judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
-    return replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
+    best, before = state.judged.best, final(problem, base)
+    if best is None:
+        return replace(state, before=before, after=before)
+    beside, fit = without_constants(best.problem or problem, best.fit, constants_told(state.judged))
+    return replace(state, before=before, after=final(beside, fit), problem_after=beside)
 
 
 def plan_test(state: State) -> State:
@@ -225,6 +227,7 @@ def plan_test(state: State) -> State:
     if (
         judgement.best is None
         or judgement.word == "none"
+        or judgement.best.problem is not None  # moves of the inputs tell little of what wanders by itself
         or time.monotonic() + TEST_SHARE * state.base_seconds > state.ends
     ):
         return state

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange, State
-from adaptive_flot.discovery.stages import heed_report
+from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,

@@ -62,30 +62,39 @@ def jacketed_tank(wanders: bool = False) -> Model:
     )
 
 
-def record(off: float, exponent: float = 0.0, seed: int = 0, wander: float = 0.0) -> Dataset:
+def record(
+    off: float, exponent: float = 0.0, seed: int = 0, wander: float = 0.0, exchange: float = 0.0, one: float = 0.0
+) -> Dataset:
     """Truth in NumPy: Euler, twenty steps a row; constants off by a standard deviation, a draught takes heat.
 
-    The room wanders with the standard deviation `wander` [K] and the correlation time WANDERS_S.
+    The room wanders with the standard deviation `wander` [K] and the correlation time WANDERS_S, and the logarithm of
+    the exchange with the standard deviation `exchange` and half that time. That of the heat loss is off by `one` more.
     """
     rng = np.random.default_rng(seed)
     factor = dict(zip(CONSTANTS, np.exp(off * rng.standard_normal(len(CONSTANTS))), strict=True))
     c = {name: value * factor[name] for name, value in CONSTANTS.items()}
+    c["heat_loss"] *= np.exp(one)
     speeds = moves(ROWS, 20, 60, 35, seed + 300)
     inputs = np.column_stack([moves(ROWS, 500, 3000, 45, seed + 100), speeds, moves(ROWS, 5, 20, 25, seed + 200)])
-    memory = np.exp(-DT / WANDERS_S)
-    course = np.asarray(
-        lfilter([np.sqrt(1 - memory**2)], [1, -memory], np.random.default_rng(seed + 400).normal(size=2 * ROWS))
-    )
+    course, own = _course(WANDERS_S, seed + 400), _course(WANDERS_S / 2, seed + 500)
     water, jacket, seen = 310.0, 315.0, []
-    for (power, pump, fan), room in zip(inputs, ROOM + wander * course[ROWS:], strict=True):
+    for (power, pump, fan), room, more in zip(inputs, ROOM + wander * course, np.exp(exchange * own), strict=True):
         for _ in range(20):
-            flow = c["exchange"] * factor["circulation"] * (CONSTANTS["circulation"] + 0.01 * pump) * (jacket - water)
+            pumped = factor["circulation"] * (CONSTANTS["circulation"] + 0.01 * pump)
+            flow = c["exchange"] * more * pumped * (jacket - water)
             loss = c["heat_loss"] * (fan / 10) ** exponent * (jacket - room)
             jacket += DT / 20 * (0.9 * power - flow - loss) / c["jacket_wall"]
             water += DT / 20 * flow / c["water"]
         seen.append((water, jacket))
     y = np.array(seen) + NOISE * rng.standard_normal((ROWS, 2))
     return Dataset("tank", DT * np.arange(1.0, ROWS + 1), DT, inputs, y)
+
+
+def _course(time: float, seed: int) -> FloatArray:
+    """A first-order autoregressive course (ROWS,) of variance one, at rest when the record starts."""
+    memory = np.exp(-DT / time)
+    e = np.random.default_rng(seed).normal(size=2 * ROWS)
+    return np.asarray(lfilter([np.sqrt(1 - memory**2)], [1, -memory], e))[ROWS:]
 
 
 def fitted(measured: Dataset, wanders: bool = False) -> tuple[Problem, Fit, Responses]:

@@ -13,7 +13,7 @@ from adaptive_flot.greybox.model import FloatArray
 CLIPPED_TURNS = 3
 
 
-def drop_beside_background(problem: Problem, before: Fit, after: Fit, split: str) -> float:
+def drop_beside_background(problem: Problem, before: Fit, after: Fit, split: str, own: Problem | None = None) -> float:
     """By how much minus two log-likelihood of the rows of a split falls, with the background as it is before any fit.
 
     Parameters, effects and noise are those of each fit. Its background is not: on these rows u ~ N(0, I) again. With
@@ -22,11 +22,11 @@ def drop_beside_background(problem: Problem, before: Fit, after: Fit, split: str
         e'e - e'H (I + H'H)^-1 H'e + log det(I + H'H) + 2 sum of log s
 
     Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (5.8); values beyond the clip count as
-    the clip. Zero without a background.
+    the clip. Zero without a background. `own` is the problem of the fit after, where its background is another.
     """
     if problem.background is None:
         return 0.0
-    return _beside_background(problem, before, split) - _beside_background(problem, after, split)
+    return _beside_background(problem, before, split) - _beside_background(own or problem, after, split)
 
 
 def _beside_background(problem: Problem, fit: Fit, split: str) -> float:

@@ -23,35 +23,39 @@ AT_NOISE = 1.25
 LAGS = 20
 
 
-def verify(problem: Problem, before: Fit, after: Fit) -> Verification:
+def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None) -> Verification:
     """Compare two fits of the estimation split on the confirm split, in units of the noise of the better one.
 
     Confirmed where the 95 % interval of the reduction (see `reduction`) lies above zero and no output is worse: its
     error grew by more than WORSE, and the interval of its own reduction lies below zero. Of m outputs one is worse by
     chance m times as often, so each has an interval of 1 - 0.05 / m (Bonferroni; Dunn, *J. Am. Statist. Assoc.* 56
-    (1961) 52). An error that grew by less than MUCH_WORSE, and is within what noise and background leave unknown, is
-    not worse (see `unknown_of_background`).
+    (1961) 52).
 
-    A background may take up what an effect does, so that both predict alike. Then these rows confirm it where they say
-    that the background alone is less likely, by LEAST_EVIDENCE for each effective sample: see
-    `drop_beside_background`. That is reason enough not to say `none`. A name asks for a smaller error on report rows.
+    Beside a background, the rows may be surely likelier: by LEAST_EVIDENCE for each effective sample, with the
+    background as it is before any fit (see `drop_beside_background`). An error that is within what noise and background
+    leave unknown (see `unknown_of_background`) is not worse where it grew by less than MUCH_WORSE, or the rows are
+    likelier. A background may take up what an effect does, so that both predict alike; then likelier rows confirm it.
+    That is reason enough not to say `none`. A name asks more of the report rows.
+
+    `own` is the problem of the fit after, where its background is another.
     """
     rows, block = problem.rows("confirm"), block_rows(problem, before, after)
     size = problem.weights * after.noise.stationary_std()
     old, new = squared_errors(problem, before, size, rows), squared_errors(problem, after, size, rows)
     smaller, interval = reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
-    unknown = unknown_of_background(problem, after, ("estimate",), "confirm") / np.sqrt(
+    unknown = unknown_of_background(own or problem, after, ("estimate",), "confirm") / np.sqrt(
         np.nanmean(size[rows] ** 2, axis=0)
     )
+    drop = drop_beside_background(problem, before, after, "confirm", own)
+    likelier = drop > LEAST_EVIDENCE * rows_per_effective_sample(problem, before, after)
     worse, outputs = [], len(problem.columns)
     for j, c in enumerate(problem.columns):
         left = float(np.nanmean(new[:, j]))
         ratio = float(np.sqrt(left / np.maximum(np.nanmean(old[:, j]), 1e-300)))
-        within = unknown[j] > 0 and ratio < 1 + MUCH_WORSE and left < AT_NOISE**2 * (1 + unknown[j] ** 2)
+        little = ratio < 1 + MUCH_WORSE or likelier
+        within = unknown[j] > 0 and little and left < AT_NOISE**2 * (1 + unknown[j] ** 2)
         if ratio > 1 + WORSE and not within and reduction(old[:, j], new[:, j], block, outputs)[1][1] < 0:
             worse.append(after.model.outputs[c].name)
-    drop = drop_beside_background(problem, before, after, "confirm")
-    likelier = drop > LEAST_EVIDENCE * rows_per_effective_sample(problem, before, after)
     confirmed = not worse and bool(interval[0] > 0 or likelier)
     return Verification(smaller, interval, tuple(worse), confirmed, likelihood=drop if likelier else 0.0)
 

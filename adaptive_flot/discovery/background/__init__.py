@@ -5,9 +5,11 @@ acts on the same output, or whichever constant makes up best for all.
 
 Map
 ---
-linear.py     Its linear responses along a run: lines of a course, uncertain constants.
-evidence.py   Marginal likelihood of its numbers, to first order.
-spread.py     Whether there is one, and its numbers, beside the effects that explain more.
-fitting.py    The fit that has it, linearised anew; whether a fit needs it.
-wording.py    What is told of it.
+linear.py       Its linear responses along a run: lines of a course, uncertain constants.
+evidence.py     Marginal likelihood of its numbers, to first order.
+spread.py       Whether there is one, and its numbers, beside the effects that explain more.
+fitting.py      The fit that has it, linearised anew; whether a fit needs it.
+two_courses.py  A second course beside that of the feed: its site, and the numbers of both.
+told_course.py  What wanders at a site as an alternative, where nothing else is told.
+wording.py      What is told of it.
 """

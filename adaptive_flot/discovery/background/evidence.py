@@ -56,17 +56,20 @@ class Spread:
         The drop.
     share
         Standard deviation of the course as a share of the usual value at its site.
+    told
+        A course that is told as an effect.
     """
 
     course: Course | None
     constants: float
     evidence: float
     share: float = 0.0
+    told: Course | None = None
 
     @property
     def numbers(self) -> int:
         """How many numbers of it were chosen: size and correlation time of a course, size of the constants."""
-        return 2 * (self.course is not None) + (self.constants > 0)
+        return 2 * (self.course is not None) + 2 * (self.told is not None) + (self.constants > 0)
 
 
 def price(problem: Problem) -> float:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.background.evidence import Evidence, Spread, price
@@ -20,7 +21,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter, at_its_constants
 from adaptive_flot.discovery.record.background import Background, root_of_covariance
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.search.rounds import scorer_of
-from adaptive_flot.greybox.rescaled import as_it_came
+from adaptive_flot.greybox.rescaled import as_it_came, factors_of, rescaled
 
 RELINEARISED = 2
 """How often a background is fitted to be linearised anew."""
@@ -86,16 +87,69 @@ def without_background(problem: Problem, fit: Fit) -> Fit:
     return replace(fit, predicted=fit.predicted - added, background=np.zeros(0))
 
 
+def taken_up(problem: Problem, sites: Collection[str]) -> bool:
+    """Whether the background has constants at some of these sites: it may take up what is told of them."""
+    return problem.background is not None and not set(sites).isdisjoint(problem.background.sites)
+
+
+def without_constants(problem: Problem, fit: Fit, sites: Collection[str]) -> tuple[Problem, Fit]:
+    """A problem and a fit whose background leaves the constants at some sites as they came.
+
+    A constant that is named is part of the background as well, which takes up some of it. Without that, the effect has
+    its whole size, and an interval that counts it once.
+
+    Parameters
+    ----------
+    problem, fit
+        The record with its background, and a fit.
+    sites
+        Whose constants stay as they came; both come back unchanged where the background has none of them.
+    """
+    background = problem.background
+    if background is None or not taken_up(problem, sites):
+        return problem, fit
+    spread = Spread(background.course, background.constants, 0.0, told=background.told)
+    plain = replace(problem, background=None)
+    own = {s: f for s, f in factors_of(fit.model).items() if s not in sites}
+    fit, beside = replace(fit, model=rescaled(fit.model, own)), problem
+    for _ in range(RELINEARISED):
+        beside = replace(problem, background=background_of(plain, spread, Responses(plain, fit)).holding(sites))
+        again = Fitter(beside).fit(fit.model, fit.names, like=fit, rounds=2)
+        if again is None:
+            break
+        fit = at_its_constants(beside, again)
+    return beside, fit
+
+
+def with_course_told(problem: Problem, fit: Fit) -> Fit:
+    """The fit whose model has the told course that it came to, with the covariance of its values at the knots.
+
+    With the covariance S of its u, and std L of `Course.root`, that of the values is std L S L' std. Unchanged where
+    no course is told.
+    """
+    background = problem.background
+    if background is None or background.told is None:
+        return fit
+    model, told = background.at_its_values(fit.background, fit.model), background.told
+    root, names = told.root(model), told.parameters_in(model)
+    own = root @ fit.background_covariance[: len(root), : len(root)] @ root.T
+    return replace(
+        fit, model=model, names=(*fit.names, *names), values=np.concatenate([fit.values, told.values_in(model)]),
+        covariance=block_diag(fit.covariance, own),
+    )  # fmt: skip
+
+
 def background_of(problem: Problem, spread: Spread, responses: Responses) -> Background:
     """The background, with its responses along the fit of these `responses`."""
-    parts, course = [], spread.course
-    if course is not None:
-        knots, lines = lines_of_course(problem, course.site, course.offset)
-        parts.append(responses.of(lines) @ (course.std * root_of_covariance(knots, course.time)))
+    parts = []
+    for course in (spread.told, spread.course):
+        if course is not None:
+            knots, lines = lines_of_course(problem, course.site, course.offset)
+            parts.append(responses.of(lines) @ (course.std * root_of_covariance(knots, course.time)))
     if spread.constants:
         parts.append(spread.constants * responses.of(uncertain_profiles(problem, responses)))
     sites = uncertain_constants(responses) if spread.constants else ()
-    return Background(course, spread.constants, np.concatenate(parts, axis=2), sites)
+    return Background(spread.course, spread.constants, np.concatenate(parts, axis=2), sites, spread.told)
 
 
 def needed(problem: Problem, fit: Fit) -> bool:

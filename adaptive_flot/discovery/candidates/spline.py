@@ -29,6 +29,8 @@ def spline_values(values: FloatArray, knots: Sequence[float]) -> FloatArray:
 
 def drawn(effect: Effect, values: FloatArray) -> FloatArray:
     """A fitted curve (N,) at the values (N,) of its driver."""
+    if effect.form == "polyline":
+        return np.asarray(np.interp(values, knots_of(effect), values_of(effect)))
     curve: FloatArray = spline_values(values, knots_of(effect)) @ values_of(effect)
     return curve
 

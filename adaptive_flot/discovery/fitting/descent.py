@@ -299,8 +299,9 @@ class Descent:
         background = z[first:]
         if problem.background is not None:
             loss += float(background @ background) + float(np.linalg.slogdet(A[first:, first:])[1])
-        inverse = np.linalg.pinv(A, hermitian=True)[: self.unknowns.q, : self.unknowns.q]
-        covariance = cast(FloatArray, inverse * np.outer(self.unknowns.scale, self.unknowns.scale))
+        inverse = np.asarray(np.linalg.pinv(A, hermitian=True), dtype=np.float64)
+        own = inverse[: self.unknowns.q, : self.unknowns.q]
+        covariance = own * np.outer(self.unknowns.scale, self.unknowns.scale)
         p, x0 = self.unknowns.unpack(z)
         values = p[self.unknowns.where]
         fitted = self.model.with_parameters(dict(zip(self.unknowns.names, map(float, values), strict=True)))
@@ -319,6 +320,7 @@ class Descent:
             loss + float(penalty),
             self.unknowns.directions,
             background,
+            inverse[first:, first:],
         )
 
 

@@ -23,7 +23,7 @@ Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (5.8
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -74,6 +74,8 @@ class Fit:
     """Free combinations of the initial state (nx, r): those the record can tell; the rest keeps its first guess."""
     background: FloatArray
     """Components u (k,) of the background; empty without. What they do is part of `predicted`."""
+    background_covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    """Their covariance (k, k): the part of (J'J + P^-1)^-1 that is theirs."""
 
     def residual(self, problem: Problem) -> FloatArray:
         """Measured minus predicted (N, m)."""

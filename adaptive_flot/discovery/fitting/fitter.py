@@ -20,10 +20,10 @@ SETTLED = 1.0
 
 
 def at_its_constants(problem: Problem, fit: Fit) -> Fit:
-    """The fit with a model that has the constants of its background: beside them, little is left to be linear."""
+    """The fit with a model that has what its background came to, but for the feed: little is left to be linear."""
     if problem.background is None:
         return fit
-    return replace(fit, model=problem.background.at_constants(fit.background, fit.model))
+    return replace(fit, model=problem.background.at_its_values(fit.background, fit.model))
 
 
 class Fitter:
@@ -97,7 +97,8 @@ class Fitter:
         exact, and only its derivatives are those of a neighbour.
         """
         background = self.problem.background
-        for _ in range(MOST_RESTARTS if background is not None and background.sites else 0):
+        moves = background is not None and (background.sites or background.told)
+        for _ in range(MOST_RESTARTS if moves else 0):
             own = at_its_constants(self.problem, fit)
             again = self.fit(own.model, own.names, like=own, bounds=bounds, rounds=2)
             if again is None:

@@ -13,14 +13,19 @@ And the constants of the process are known to some per cent only: the logarithm 
 
 Both are linear in u - u0 along a fitted run, where the model has the constants of u0 already (see `greybox.rescaled`).
 All u are estimated beside whatever else is unknown, and integrated out in the likelihood (see `fitting.fit`).
+
+What is looked for may wander as well. Then a second course stands at its site, and is told as an effect: the model has
+it as a `polyline` in time through its knots, whose values are those of its u.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.rescaled import logarithms_of_factors, rescaled
 
@@ -46,6 +51,30 @@ class Course:
     time: float
     offset: bool
 
+    def effect(self, knots: FloatArray) -> Effect:
+        """The effect that draws it: a polyline through its knots (k,)."""
+        settings = {"knots": tuple(map(float, knots))}
+        return Effect(self.site, "time", "polyline", settings=settings, mode="offset" if self.offset else "factor")
+
+    def effect_in(self, model: Model) -> Effect:
+        """The effect of a model that draws it."""
+        return next(e for e in model.effects if e.site == self.site and e.driver == "time" and e.form == "polyline")
+
+    def parameters_in(self, model: Model) -> tuple[str, ...]:
+        """Parameters of a model that hold its values at the knots."""
+        effect = self.effect_in(model)
+        return tuple(effect.parameter(c.name) for c in effect.terms)
+
+    def values_in(self, model: Model) -> FloatArray:
+        """Its values (k,) at the knots, as a model has them."""
+        where = model.indices("parameters", self.parameters_in(model))
+        return np.array([model.parameters[i].value for i in where])
+
+    def root(self, model: Model) -> FloatArray:
+        """Std L (k, k), with L L' its correlation at the knots of the effect that draws it in a model."""
+        knots: FloatArray = np.asarray(self.effect_in(model).settings["knots"], dtype=float)
+        return self.std * root_of_covariance(knots, self.time)
+
 
 @dataclass(frozen=True)
 class Background:
@@ -62,16 +91,22 @@ class Background:
         constants.
     sites
         Sites of the constants, in the order of their responses.
+    told
+        A course that is told as an effect; its responses come before all others.
     """
 
     course: Course | None
     constants: float
     responses: FloatArray
     sites: tuple[str, ...] = ()
+    told: Course | None = None
 
     def first(self, model: Model) -> FloatArray:
-        """u0 (r,), whose constants a model has already; zero for the course."""
+        """u0 (r,), whose constants and told course a model has already; zero for the course of the feed."""
         first = np.zeros(self.responses.shape[2])
+        if self.told is not None:
+            values = self.told.values_in(model)
+            first[: len(values)] = np.linalg.solve(self.told.root(model), values)
         if self.sites:
             first[-len(self.sites) :] = logarithms_of_factors(model, self.sites) / self.constants
         return first
@@ -80,12 +115,22 @@ class Background:
         """What it adds to the measured outputs (N, m) of a model, for u (r,)."""
         return self.change(u - self.first(model))
 
-    def at_constants(self, u: FloatArray, model: Model) -> Model:
-        """The model with the constants of u (r,)."""
+    def at_its_values(self, u: FloatArray, model: Model) -> Model:
+        """The model with the constants of u (r,), and with its told course."""
+        if self.told is not None:
+            names = self.told.parameters_in(model)
+            values = self.told.root(model) @ u[: len(names)]
+            model = model.with_parameters(dict(zip(names, map(float, values), strict=True)))
         if not self.sites:
             return model
         factors = np.exp(self.constants * u[-len(self.sites) :])
         return rescaled(model, dict(zip(self.sites, map(float, factors), strict=True)))
+
+    def holding(self, sites: Collection[str]) -> Background:
+        """The background that leaves the constants at some of its sites as they are: nothing responds to their u."""
+        held = np.zeros(self.responses.shape[2], dtype=bool)
+        held[len(held) - len(self.sites) :] = [site in sites for site in self.sites]
+        return replace(self, responses=np.where(held, 0.0, self.responses))
 
     def change(self, moved: FloatArray) -> FloatArray:
         """What a change of u (r,) does to the measured outputs (N, m)."""

@@ -8,6 +8,7 @@ from typing import Literal
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.candidates.step_events import SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results.evidence import Verification
 from adaptive_flot.greybox.effects import Effect
 
@@ -37,6 +38,8 @@ class Alternative:
         Standard deviation of the difference between its minus two log-likelihood and that of the best one.
     adjusted_bic
         Its criterion with the common nuisance added, where that was worked out (see `adjust_for_common_nuisance`).
+    problem
+        Its own problem, where it has a background of its own: a course that is told as an effect.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -46,6 +49,7 @@ class Alternative:
     delta_bic: float
     loglik_difference_sd: float = 0.0
     adjusted_bic: float | None = None
+    problem: Problem | None = None
 
     def worse_than(self, best: Alternative) -> float:
         """How much worse its criterion is than that of another, adjusted for a common nuisance where both are."""

@@ -54,8 +54,12 @@ class State:
         The ranked alternatives, and what they amount to.
     before, after
         Fits of the plain and of the extended model to the estimation and confirm splits.
+    problem_after
+        The problem of the second, whose background leaves out the constants that are told.
     error
         Error of each output on the report rows, before and after.
+    likelihood
+        Drop of minus two log-likelihood on these rows, an effective sample, where it stands for an error that falls.
     contradiction
         What these rows say against a name, in words; empty where they do not.
     certain
@@ -87,7 +91,9 @@ class State:
     judgement: Judgement | None = None
     before: Fit | None = None
     after: Fit | None = None
+    problem_after: Problem | None = None
     error: tuple[OutputChange, ...] = ()
+    likelihood: float = 0.0
     contradiction: str = ""
     certain: str = ""
     background: str = ""

@@ -103,7 +103,7 @@ def search_jointly(
     progress("confirm")
     chosen_fit = best.alternatives[0].fit
     seen = replace(plain, splits=np.where(chosen == "estimate", "confirm", chosen))
-    checked = verify(seen, *(cross_validated(plain, fit, processes) for fit in (base, chosen_fit)))
+    checked = verify(seen, cross_validated(plain, base, processes), cross_validated(plain, chosen_fit, processes))
     checked = replace(checked, where="by cross-validation, on rows that also helped to choose the effects")
     left = _left(plain, chosen_fit, rows_per_effective_sample)
     return plain, replace(

@@ -4,6 +4,7 @@ Map
 ---
 judge.py        One of six words, from the ranked alternatives.
 certain_part.py A part that is certain, where the whole is not told.
+heed_report.py  The stage in which the report rows have their say.
 report_veto.py  What held-out rows contradict is not told as a name.
 outputs.py      What is certain output by output where the record is not told.
 conclude.py     The verdict: that word with errors, tests, intervals and reasons.

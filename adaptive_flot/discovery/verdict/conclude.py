@@ -14,7 +14,7 @@ from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
 from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
-from adaptive_flot.discovery.verdict.wording import drift_words, reason_words
+from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import Model
@@ -72,7 +72,7 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
     if not state.sentence:
         wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong)
-        return " ".join(filter(None, (said, state.certain, state.background)))
+        return " ".join(filter(None, (said, beside_words(state.likelihood), state.certain, state.background)))
     errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
     return f"{state.sentence} Error of the free run on held-out rows: {errors}."
 

@@ -78,12 +78,20 @@ def same_site(names: Sequence[Name]) -> tuple[Name, ...]:
     return tuple(n for n in names if sites.count(n[0]) > 1)
 
 
+def constants_told(judged: Judgement) -> tuple[str, ...]:
+    """Sites whose constant is named, or is in the class that is told."""
+    if judged.word not in ("named", "class") or judged.best is None:
+        return ()
+    told = (*(judged.part or judged.best.names), *judged.members)
+    return tuple(dict.fromkeys(site for site, driver in told if driver == "constant"))
+
+
 def held_up(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[SearchResult, Judgement]:
     """The judgement, confirmed for what it names: a search confirms the best alternative, which may have no name."""
     best = judged.best
     if best is None or best is result.alternatives[0] or judged.word not in ("named", "class") or not problem.whiten:
         return result, judged
-    checked = verify(problem, result.base, best.fit)
+    checked = verify(problem, result.base, best.fit, best.problem)
     if checked.confirmed:
         return replace(result, verification=checked), judged
     return result, Judgement("abstain", result.alternatives[0], (), judged.rivals, judged.margin)
@@ -101,7 +109,7 @@ def first_that_stands(problem: Problem, result: SearchResult) -> SearchResult:
     best = result.alternatives[0]
     for a in result.alternatives[1:]:
         if all(a.known) and problem.whiten and a.near(best, LEAST_MARGIN * result.rows_per_effective_sample):
-            own = verify(problem, result.base, a.fit)
+            own = verify(problem, result.base, a.fit, a.problem)
             if own.confirmed:
                 others = tuple(b for b in result.alternatives if b is not a)
                 return replace(result, alternatives=(a, *others), verification=own)

@@ -1,8 +1,9 @@
 """The report split has a veto: what held-out rows contradict is not told as a name.
 
-A name is contradicted where an output gets worse on these rows, or where no output surely gets better. A free curve in
-time at a sensor must also hold on the last of these rows, which lie beyond all that it was fitted to: such a curve can
-mimic any residual between rows that it has seen.
+A name is contradicted where an output gets worse on these rows, or where no output surely gets better. But the
+constants of a background, each a little off, may predict what one does that is far off: then these rows must say that
+the background alone is much less likely. A free curve in time at a sensor must also hold on the last of these rows,
+which lie beyond all that it was fitted to: such a curve can mimic any residual between rows that it has seen.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ def contradiction(
     changes: Sequence[OutputChange],
     noise: FloatArray,
     unknown: FloatArray | None = None,
+    likelier: bool = False,
+    alike: bool = False,
 ) -> str:
     """What the report rows say against a name; empty where they do not, and where no name is given.
 
@@ -49,18 +52,34 @@ def contradiction(
         Noise of each of these outputs from row to row, which no model has fitted (m,).
     unknown
         Standard deviation of what the background leaves unknown in each of them (m,), see `unknown_of_background`.
+    likelier
+        Whether these rows are surely likelier than with the background alone. Then no error is worse that is within
+        what noise and background leave unknown.
+    alike
+        Whether the background may take up what is told: one of its constants, or a course beside its own. Both then
+        predict about alike, and no output needs to get better where the rows are likelier.
     """
     if judgement.word not in ("named", "class"):
         return ""
     both = noise if unknown is None else np.hypot(noise, unknown)
-    worse = [c for c, s, v in zip(changes, noise, both, strict=True) if _is_worse(c, float(s), float(v))]
+    least = both if likelier else noise
+    worse = [
+        c
+        for c, s, v, e in zip(changes, noise, both, least, strict=True)
+        if _is_worse(c, float(s), float(v)) and c.after > AT_NOISE * e
+    ]
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
         return f"on held-out rows it makes the error larger ({said})"
-    if not any(c.reduction95[0] > 0 and c.after < (1 - BETTER) * c.before for c in changes):
+    if not (likelier and alike) and not surely_better(changes):
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""
+
+
+def surely_better(changes: Sequence[OutputChange]) -> bool:
+    """Whether the error of one output falls by more than chance, and by as much as a user would see."""
+    return any(c.reduction95[0] > 0 and c.after < (1 - BETTER) * c.before for c in changes)
 
 
 def unexplained(changes: Sequence[OutputChange], noise: FloatArray) -> str:

@@ -82,6 +82,16 @@ def reason_words(
     )
 
 
+def beside_words(likelihood: float) -> str:
+    """Why a constant is told although the error on held-out rows stays as it is; empty without a `likelihood`."""
+    if not likelihood:
+        return ""
+    return (
+        "The error on held-out rows stays as it is: several other constants, each a little off, would do there what "
+        f"this one does. Those rows make that less likely by a factor of e^{likelihood / 2:.0f}."
+    )
+
+
 def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     assert judgement.best is not None  # a class has a best member
     sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]

@@ -66,6 +66,15 @@ def _curve(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     return g
 
 
+def _polyline(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    # hats between even knots: 1 at the own knot, 0 at all others; before the first and after the last it stays level
+    knots = numbers(s, "knots")
+    inside = ca.fmin(ca.fmax(driver, knots[0]), knots[-1])
+    place = (inside - knots[0]) * ((len(knots) - 1) / (knots[-1] - knots[0]))
+    g: ca.SX = sum((c[f"value_{k + 1}"] * ca.fmax(0, 1 - ca.fabs(place - k)) for k in range(len(knots))), ca.SX(0))
+    return g
+
+
 def spline_basis(x: ca.SX, knots: FloatArray) -> list[ca.SX]:
     """Cardinal natural cubic splines: entry k is 1 at knot k and 0 at the others, straight lines outside.
 
@@ -147,6 +156,16 @@ STATIC_FORMS: tuple[Form, ...] = (
         {"knots": None},
         {"knots": "driver"},
         static=_curve,
+    ),
+    Form(
+        "polyline",
+        "straight lines between even knots",
+        FormKind.CURVE,
+        _curve_coefficients,
+        ("time",),
+        {"knots": None},
+        {"knots": "driver"},
+        static=_polyline,
     ),
     Form(
         "hinge",

@@ -1,0 +1,58 @@
+"""The stage in which the report rows have their say: errors before and after, and a name that they contradict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.beside_background import drop_beside_background, unknown_of_background
+from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE, rows_per_effective_sample
+from adaptive_flot.discovery.assessment.verification import changes
+from adaptive_flot.discovery.background.fitting import taken_up
+from adaptive_flot.discovery.results import Judgement, State
+from adaptive_flot.discovery.verdict.conclude import report_errors
+from adaptive_flot.discovery.verdict.judge import constants_told
+from adaptive_flot.discovery.verdict.outputs import certain_words
+from adaptive_flot.discovery.verdict.report_veto import (
+    contradiction,
+    contradiction_at_the_end,
+    last_report_rows,
+    noise_from_row_to_row,
+    surely_better,
+    unexplained,
+)
+
+
+def heed_report(state: State) -> State:
+    """Take a name back where the held-out rows contradict it."""
+    problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
+    beside = state.problem_after or problem
+    error = report_errors(problem, before, after, state.report_record)
+    noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
+    unknown, likelier = np.zeros(len(error)), 0.0
+    if state.report_record is None:
+        each = unknown_of_background(beside, after, ("estimate", "confirm"), "report")
+        names = [after.model.outputs[c].name for c in problem.columns]
+        unknown = each[[names.index(c.output) for c in error]]
+        likelier = drop_beside_background(problem, before, after, "report", beside)
+        likelier /= rows_per_effective_sample(problem, before, after)
+    surely = likelier > LEAST_EVIDENCE
+    alike = taken_up(problem, constants_told(judgement)) or _has_course(judgement)
+    against = contradiction(judgement, error, noise, unknown, surely, alike)
+    if not against and state.report_record is None:
+        last = last_report_rows(problem)
+        at_the_end = changes(last, before, after, "report")
+        against = contradiction_at_the_end(judgement, at_the_end, noise_from_row_to_row(last, before.model, at_the_end))
+    if against:
+        judgement = replace(judgement, word="abstain", members=(), part=())
+    certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
+    if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
+        judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
+    told = likelier if surely and alike and not against and not surely_better(error) else 0.0
+    return replace(state, error=error, judgement=judgement, likelihood=told, contradiction=against, certain=certain)
+
+
+def _has_course(judgement: Judgement) -> bool:
+    """Whether a course is told, which wanders as that of a feed does."""
+    return judgement.best is not None and judgement.best.problem is not None
