@@ -131,7 +131,7 @@ def test_a_model_of_the_user_from_record_to_extended_model(call: Call, tmp_path:
     )
     assert result.code == 0, result.err
     said = " ".join(result.out.split())
-    assert said.startswith("named: The model lacks this: heat_loss depends on fan_speed")
+    assert said.startswith("named: Heat loss depends on fan speed: ")
     assert "temperature" in said and "Model: more.yaml" in said
     page = (tmp_path / "results" / "tank" / "discover" / "report.html").read_text()
     assert "heat loss by fan speed" in page and "Error before and after" in page

@@ -10,6 +10,7 @@ outputs.py      What is certain output by output where the record is not told.
 conclude.py     The verdict: that word with errors, tests, intervals and reasons.
 suspects.py     Events that seem to begin where a sensor says nothing.
 wording.py      The verdict in plain words.
+sizes.py        An effect that is told: what, by how much, in which direction and when.
 locate.py       Where in the process the missing effect acts.
 curve.py        The curve of a fitted effect with its band.
 """

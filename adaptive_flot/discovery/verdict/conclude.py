@@ -12,7 +12,9 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
+from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
 from adaptive_flot.discovery.verdict.locate import locate
+from adaptive_flot.discovery.verdict.sizes import words_of_effects
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -71,10 +73,19 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
     """The verdict in one paragraph: in the words of the innovations form where that has decided."""
     if not state.sentence:
         wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
-        said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong)
+        told = words_of_effects(state.refitted[1].model, effects, _curves(state, effects)) if effects else ""
+        said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
         return " ".join(filter(None, (said, beside_words(state.likelihood), state.certain, state.background)))
     errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
     return f"{state.sentence} Error of the free run on held-out rows: {errors}."
+
+
+def _curves(state: State, effects: tuple[NamedEffect, ...]) -> tuple[EffectCurve, ...]:
+    """Curves of the effects that are told, over what the record covers of their drivers."""
+    best, problem = state.judged.best, state.problem_after or state.known_problem
+    told = {e.effect.label for e in effects}
+    curves = effect_curves(problem, state.refitted[1], len(best.names)) if best else ()
+    return tuple(c for c in curves if c.effect.label in told)
 
 
 def _tests(problem: Problem, before: Fit, after: Fit) -> dict[str, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_site
+from adaptive_flot.discovery.verdict.sizes import words_alone
 
 
 def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
@@ -38,10 +39,12 @@ def reason_words(
     drift: tuple[str, ...],
     contradiction: str = "",
     wrong: Sequence[str] = (),
+    said: str = "",
 ) -> str:
     """The verdict in one paragraph; what contradicts a name comes first.
 
-    Where outputs stay `wrong` after all, what every set has is what they share, and not certain.
+    `said` is what is told in the words of its user. Where outputs stay `wrong` after all, what every set has is what
+    they share, and not certain.
     """
     if contradiction and judgement.best is not None:
         fitted = " with ".join(f"{site} by {driver}" for site, driver in judgement.best.names)
@@ -66,15 +69,14 @@ def reason_words(
     if judgement.word == "abstain" and judgement.best is None:
         return "Something is missing, and no effect at any site, with any driver, explains it."
     evidence = f"{result.verification}" if result.verification else ""
-    said = "; and ".join(
-        f"{e.effect.site} depends on {e.effect.driver}" + (f" ({e.meaning})" if e.meaning else "") for e in effects
-    )
+    evidence = evidence[:1].upper() + evidence[1:]
     if judgement.word == "named":
-        return f"The model lacks this: {said}. {_beside(judgement)}{evidence}."
+        lacks = "these effects" if len(effects) > 1 else "this"
+        return f"{said}. The model lacks {lacks}. {_beside(judgement)}{evidence}."
     if judgement.word == "class":
         return f"{_class_words(judgement, wrong)} {evidence}."
     if judgement.word == "unnamed":
-        return f"The model lacks something that has no name: {said}. {_beside(judgement)}{evidence}."
+        return f"{said}. The model lacks this, and it has no name. {_beside(judgement)}{evidence}."
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
@@ -96,7 +98,8 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     assert judgement.best is not None  # a class has a best member
     sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
     if judgement.part or all(len(a.names) == 1 for a in sets):
-        members = ", ".join(f"{s} by {d}" for s, d in judgement.members)
+        alone = {a.names[0]: words_alone(a) for a in reversed(sets) if len(a.names) == 1}
+        members = "; or ".join(alone.get(name, " by ".join(name)) for name in judgement.members)
         said = f"The model lacks one of these, which this record can not tell apart: {members}."
         return f"{said} {_beside(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -67,11 +68,13 @@ def _curve(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
 
 
 def _polyline(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
-    # hats between even knots: 1 at the own knot, 0 at all others; before the first and after the last it stays level
+    # hats: 1 at the own knot, 0 at all others, straight between; before the first and after the last it stays level
     knots = numbers(s, "knots")
-    inside = ca.fmin(ca.fmax(driver, knots[0]), knots[-1])
-    place = (inside - knots[0]) * ((len(knots) - 1) / (knots[-1] - knots[0]))
-    g: ca.SX = sum((c[f"value_{k + 1}"] * ca.fmax(0, 1 - ca.fabs(place - k)) for k in range(len(knots))), ca.SX(0))
+    x = ca.fmin(ca.fmax(driver, knots[0]), knots[-1])
+    rising = [1.0, *((x - a) / (b - a) for a, b in pairwise(knots))]
+    falling = [*((b - x) / (b - a) for a, b in pairwise(knots)), 1.0]
+    hats = (ca.fmax(ca.fmin(up, down), 0.0) for up, down in zip(rising, falling, strict=True))
+    g: ca.SX = sum((c[f"value_{k + 1}"] * hat for k, hat in enumerate(hats)), ca.SX(0))
     return g
 
 
@@ -159,10 +162,10 @@ STATIC_FORMS: tuple[Form, ...] = (
     ),
     Form(
         "polyline",
-        "straight lines between even knots",
+        "straight lines between knots, level beyond them",
         FormKind.CURVE,
         _curve_coefficients,
-        ("time",),
+        ("signal", "time"),
         {"knots": None},
         {"knots": "driver"},
         static=_polyline,

@@ -17,6 +17,7 @@ SETTINGS: dict[str, dict[str, float | tuple[float, ...]]] = {
     "power": {"reference": 1.5e-3},
     "linear": {"reference": 1.5e-3},
     "curve": {"knots": (1.0e-3, 1.3e-3, 1.6e-3, 1.9e-3)},
+    "polyline": {"knots": (1.0e-3, 1.2e-3, 1.6e-3, 1.9e-3)},
     "hinge": {"reference": 1.5e-3},
     "span": {"middle": 1.5e-3},
     "lag": {"scale": 1e-6},

@@ -90,7 +90,7 @@ def test_each_amplitude_switches_its_form_on(name: str) -> None:
     amplitudes = [c for c in terms(form) if not c.is_shape]
     assert amplitudes
     for c in amplitudes:
-        changed = [output(effect(form, {**shape, c.name: 0.5}), 5.0, drive, 900.0, 0.5) for drive in (3.0, 0.7)]
+        changed = [output(effect(form, {**shape, c.name: 0.5}), 5.0, drive, 900.0, 0.5) for drive in (3.0, 0.7, -0.5)]
         assert any(abs(y - 5.0) > 1e-6 for y in changed), c.name
 
 
@@ -143,3 +143,15 @@ def test_values_come_by_role() -> None:
     curve = Effect("place", "drive", "curve", {"value_2": 0.2, "value_1": 0.1}, {"knots": KNOTS})
     assert curve.levels == [0.2, 0.1]
     assert Effect("place", "lag", "lag", {"amplitude": 1.0}, {"scale": 1.0}).levels == []  # a blend is no level
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    drive=st.floats(-5.0, 8.0),
+    values=st.lists(st.floats(-2.0, 2.0), min_size=len(KNOTS), max_size=len(KNOTS)),
+)
+def test_a_polyline_is_what_numpy_interpolates(drive: float, values: list[float]) -> None:
+    """Against `numpy.interp`, between the knots and beyond them."""
+    coefficients = {f"value_{k + 1}": v for k, v in enumerate(values)}
+    drawn = output(effect(FORMS["polyline"], coefficients, "offset"), 5.0, drive, 900.0, 0.5) - 5.0
+    assert drawn == pytest.approx(float(np.interp(drive, KNOTS, values)), abs=1e-9)

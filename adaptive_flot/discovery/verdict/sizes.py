@@ -1,0 +1,202 @@
+"""An effect that is told, in the words of its user: what is the matter, by how much, in which direction and when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.discovery.results import Alternative, NamedEffect
+from adaptive_flot.discovery.verdict.curve import EffectCurve
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.scope import Site
+
+SHOWN = (0.02, 0.98)
+"""Quantiles of a driver between which a dependence is told: beyond them it rests on a few rows."""
+LARGE = 2.0
+"""Factor above which a change is told as one, and not in per cent."""
+SETTLED = 3.0
+"""Time constants after which an exponential approach is over, but for a twentieth."""
+
+
+def words_of_effects(model: Model, told: Sequence[NamedEffect], curves: Sequence[EffectCurve]) -> str:
+    """One sentence, without its full stop, of all effects that are told."""
+    by_label = {c.effect.label: c for c in curves}
+    said = "; and ".join(words_of_effect(model, e, by_label.get(e.effect.label)) for e in told)
+    return said[:1].upper() + said[1:]
+
+
+def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None = None) -> str:
+    """One effect: `froth recovery is 60 % smaller than the model says (95 %: 55 to 64 %; other froth than assumed)`.
+
+    Parameters
+    ----------
+    model
+        The model that has the effect.
+    told
+        The effect with its intervals.
+    curve
+        What it does over its driver; None where it has none (a constant, a lag, a dead time, a limit).
+    """
+    effect = told.effect
+    site = next(s for s in model.sites if s.name == effect.site)
+    name = spaced(site.name)
+    if effect.driver == "constant":
+        said = f"{name} {_always(site, effect)}"
+    elif effect.driver == "lag":
+        taus = " and ".join(f"{v:.3g} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
+        said = f"{name} answers slowly, with a time constant of {taus}"
+    elif effect.driver == "delay":
+        (dead,) = effect.values(CoefficientRole.DEAD_TIME)
+        said = f"{name} answers {dead:.3g} s late"
+    elif effect.driver == "saturation":
+        (limit,) = effect.values(CoefficientRole.LIMIT)
+        said = f"{name} does not go beyond {limit:.3g}{_unit(site)}"
+    elif effect.family.is_event:
+        said = f"{name} {_event(site, effect)}"
+    elif curve is None:
+        said = f"{name} depends on {spaced(effect.driver)}"
+    elif effect.driver == "time":
+        said = f"{name} {_in_time(site, curve)}"
+    else:
+        said = f"{name} depends on {spaced(effect.driver)}: {_over_driver(site, curve)}"
+    notes = [n for n in (_interval(site, told), told.meaning) if n]
+    return f"{said} ({'; '.join(notes)})" if notes else said
+
+
+def words_alone(a: Alternative) -> str:
+    """The only effect of an alternative as it was fitted in the search, without an interval and without a curve."""
+    (effect,) = a.effects
+    return words_of_effect(a.fit.model, NamedEffect(effect, "", {}, ()))
+
+
+def spaced(name: str) -> str:
+    """A name as it is read: `froth recovery`."""
+    return name.replace("_", " ")
+
+
+def _always(site: Site, effect: Effect) -> str:
+    (level,) = effect.levels
+    if site.role == "sensor":
+        return f"shows {_amount(site, effect, level)} too {'much' if level > 0 else 'little'}"
+    where = {"actuator": "was asked", "feed": "the record says"}.get(site.role, "the model says")
+    if _is_factor(site, effect):
+        return f"is {_times(float(np.exp(level)))} {where}"
+    return f"is {_amount(site, effect, level)} {'more' if level > 0 else 'less'} than {where}"
+
+
+def _event(site: Site, effect: Effect) -> str:
+    (level,), (onset,) = effect.levels, effect.values(CoefficientRole.ONSET)
+    durations = effect.values(CoefficientRole.DURATION)
+    lasts = [*durations, *(SETTLED * t for t in effect.values(CoefficientRole.TIME_CONSTANT))]
+    when = f"from {onset:.0f} s to {onset + lasts[0]:.0f} s" if lasts else f"at {onset:.0f} s"
+    factor = float(np.exp(level)) if _is_factor(site, effect) else None
+    return f"{_moved(site, _amount(site, effect, level), rises=level > 0, factor=factor)} {when}"
+
+
+def _in_time(site: Site, curve: EffectCurve) -> str:
+    """The largest change between two times; of what wanders, how far it goes down and up."""
+    if curve.effect.form == "polyline":
+        low, high = (_change(site, curve, float(v)) for v in (np.min(curve.change), np.max(curve.change)))
+        return f"wanders in time, between {low} and {high}"
+    a, b = _extremes(curve)
+    factor = _ratio(curve, a, b) if curve.relative else None
+    moved = _moved(site, _between(site, curve, a, b), rises=bool(curve.change[b] > curve.change[a]), factor=factor)
+    return f"{moved} from {curve.driver[a]:.0f} s to {curve.driver[b]:.0f} s"
+
+
+def _moved(site: Site, size: str, *, rises: bool, factor: float | None) -> str:
+    """What has happened: `fell by 20 %`, `rose to 2.8 times what it was`; `factor` is None of an offset."""
+    if factor is not None and factor > LARGE and site.role != "sensor":
+        return f"rose to {factor:.2g} times what it was"
+    if site.role == "sensor":
+        return f"came to show {size} {'more' if rises else 'less'}"
+    return f"{'rose' if rises else 'fell'} by {size}"
+
+
+def _over_driver(site: Site, curve: EffectCurve) -> str:
+    a, b = _extremes(curve)
+    driver, unit = spaced(curve.effect.driver), f" {curve.driver_unit}" if curve.driver_unit not in ("", "-") else ""
+    here, there = f"at {driver} {curve.driver[b]:.3g}{unit}", f"at {curve.driver[a]:.3g}{unit}"
+    if curve.relative:
+        size, word = _times(_ratio(curve, a, b)).rsplit(" ", 1)
+        return f"{size} {here} {word} {there}"
+    more = "more" if curve.change[b] > curve.change[a] else "less"
+    return f"{_between(site, curve, a, b)} {more} {here} than {there}"
+
+
+def _extremes(curve: EffectCurve) -> tuple[int, int]:
+    """Places of the smallest and the largest change over what most rows have seen, in the order of the driver."""
+    low, high = np.quantile(curve.seen, SHOWN)
+    inside = np.flatnonzero((curve.driver >= low) & (curve.driver <= high))
+    inside = inside if inside.size else np.arange(len(curve.driver))
+    places = inside[np.argmin(curve.change[inside])], inside[np.argmax(curve.change[inside])]
+    return int(min(places)), int(max(places))
+
+
+def _between(site: Site, curve: EffectCurve, a: int, b: int) -> str:
+    """Size of the change between two places of a curve."""
+    if curve.relative:
+        return _percent(_ratio(curve, a, b))
+    return f"{abs(curve.change[b] - curve.change[a]):.3g}{_unit(site)}"
+
+
+def _ratio(curve: EffectCurve, a: int, b: int) -> float:
+    return float(curve.change[b] / max(float(curve.change[a]), 1e-12))
+
+
+def _change(site: Site, curve: EffectCurve, value: float) -> str:
+    """A value of a curve: `20 % less`, `0.3 K more`."""
+    if curve.relative:
+        return _times(value).rsplit(" ", 1)[0]
+    return f"{abs(value):.3g}{_unit(site)} {'more' if value > 0 else 'less'}"
+
+
+def _amount(site: Site, effect: Effect, level: float) -> str:
+    if not _is_factor(site, effect):
+        return f"{abs(level):.3g}{_unit(site)}"
+    return _percent(float(np.exp(level)))
+
+
+def _is_factor(site: Site, effect: Effect) -> bool:
+    return (effect.mode or site.mode) != "offset"
+
+
+def _times(factor: float) -> str:
+    """A factor with the word that compares: `20 % less than`, `2.8 times as much as`."""
+    if factor > LARGE:
+        return f"{factor:.2g} times as much as"
+    return f"{_percent(factor)} {'more' if factor > 1 else 'less'} than"
+
+
+def _percent(factor: float) -> str:
+    return f"{abs(100 * (factor - 1)):.2g} %" if abs(factor - 1) < 0.1 else f"{abs(100 * (factor - 1)):.0f} %"
+
+
+def _interval(site: Site, told: NamedEffect) -> str:
+    """The 95 % interval of a single size, a time constant or a dead time; empty for a curve."""
+    effect = told.effect
+    if effect.driver not in ("constant", "lag", "delay") and not effect.family.is_event:
+        return ""
+    level = effect.driver not in ("lag", "delay")
+    roles = (CoefficientRole.LEVEL,) if level else (CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME)
+    known = [told.interval95[n] for n in effect.names(*roles) if n in told.interval95]
+    if not known:
+        return ""
+    low, high = sorted(known[0], key=abs)
+    if not level:
+        return f"95 %: {low:.3g} to {high:.3g} s"
+    if low * high < 0:
+        signed = (f"{'-' if v < 0 else '+'}{_amount(site, effect, v)}" for v in known[0])
+        return f"95 %: {' to '.join(signed)}"
+    if _is_factor(site, effect) and np.exp(high) > LARGE:
+        return f"95 %: {np.exp(low):.2g} to {np.exp(high):.2g} times"
+    if _is_factor(site, effect):
+        return f"95 %: {abs(100 * np.expm1(low)):.3g} to {abs(100 * np.expm1(high)):.3g} %"
+    return f"95 %: {abs(low):.3g} to {abs(high):.3g}{_unit(site)}"
+
+
+def _unit(site: Site) -> str:
+    return f" {site.unit}" if site.unit and site.unit != "-" else ""

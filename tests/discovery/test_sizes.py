@@ -1,0 +1,91 @@
+"""Protects: the first sentence of a verdict says what is the matter, by how much, in which direction and when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.results import NamedEffect
+from adaptive_flot.discovery.verdict.curve import EffectCurve
+from adaptive_flot.discovery.verdict.sizes import words_of_effect, words_of_effects
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
+from tests.discovery.test_uncertain_constants import jacketed_tank
+
+MODEL = jacketed_tank()
+Settings = Mapping[str, float | tuple[float, ...]]
+
+
+SETTINGS: Mapping[str, Settings] = {
+    "curve": {"knots": (0.0, 1.0)},
+    "polyline": {"knots": (0.0, 1.0)},
+    "step": {"width": 1.0},
+    "lag": {"scale": 1.0},
+    "delay": {"scale": 1.0},
+}
+
+
+def told(site: str, driver: str, form: str, meaning: str = "", half: float = 0.0, **coefficients: float) -> NamedEffect:
+    """An effect, each coefficient with an interval of so much on either side where that is not zero."""
+    intervals = {k: (v - half, v + half) for k, v in coefficients.items()} if half else {}
+    return NamedEffect(Effect(site, driver, form, coefficients, SETTINGS.get(form, {})), meaning, intervals, ())
+
+
+def curve(effect: NamedEffect, driver: FloatArray, change: FloatArray, unit: str, *, relative: bool) -> EffectCurve:
+    return EffectCurve(effect.effect, unit, "-", relative, driver, change, change, change, driver)
+
+
+@pytest.mark.parametrize(
+    ("effect", "said"),
+    [
+        (
+            told("heat_loss", "constant", "shift", "a draught", 0.05, amplitude=float(np.log(0.8))),
+            "heat loss is 20 % less than the model says (95 %: 15.9 to 23.9 %; a draught)",
+        ),
+        (told("heat_loss", "constant", "shift", amplitude=1.03), "heat loss is 2.8 times as much as the model says"),
+        (told("heating", "constant", "shift", amplitude=-0.05), "heating is 4.9 % less than was asked"),
+        (told("thermometer", "constant", "shift", amplitude=-1.5), "thermometer shows 1.5 K too little"),
+        (
+            told("thermometer", "constant", "shift", half=2.0, amplitude=1.5),
+            "thermometer shows 1.5 K too much (95 %: -0.5 K to +3.5 K)",
+        ),
+        (told("heat_loss", "time", "step", amplitude=-0.2231, onset=1500.0), "heat loss fell by 20 % at 1500 s"),
+        (
+            told("heat_loss", "time", "ramp", amplitude=float(np.log(1.3)), onset=600.0, duration=300.0),
+            "heat loss rose by 30 % from 600 s to 900 s",
+        ),
+        (
+            told("thermometer", "time", "washout", amplitude=0.5, onset=600.0, time_constant=100.0),
+            "thermometer came to show 0.5 K more from 600 s to 900 s",
+        ),
+        (
+            told("thermometer", "lag", "lag", amplitude=1.0, time_constant=42.0),
+            "thermometer answers slowly, with a time constant of 42 s",
+        ),
+        (told("heating", "delay", "delay", amplitude=1.0, dead_time=30.0), "heating answers 30 s late"),
+    ],
+)
+def test_an_effect_is_told_with_size_direction_and_time(effect: NamedEffect, said: str) -> None:
+    assert words_of_effect(MODEL, effect) == said
+
+
+def test_a_dependence_is_told_between_the_extremes_of_its_curve() -> None:
+    speed = np.linspace(0.0, 20.0, 161)
+    effect = told("heat_loss", "fan_speed", "curve")
+    humped = 1.0 + 0.5 * np.exp(-((speed - 10.0) ** 2))
+    said = words_of_effects(MODEL, [effect], [curve(effect, speed, humped, "1/s", relative=True)])
+    assert said == "Heat loss depends on fan speed: 50 % more at fan speed 10 1/s than at 0.5 1/s"
+    rising = words_of_effect(MODEL, effect, curve(effect, speed, 1.0 + speed / 5.0, "1/s", relative=True))
+    assert rising == "heat loss depends on fan speed: 4.5 times as much at fan speed 19.5 1/s as at 0.5 1/s"
+
+
+def test_a_curve_in_time_is_told_by_its_largest_change_and_a_course_by_its_range() -> None:
+    time = np.linspace(0.0, 1000.0, 161)
+    effect = told("heat_loss", "time", "curve")
+    falling = curve(effect, time, 1.0 - 0.3 * time / 1000, "s", relative=True)
+    assert words_of_effect(MODEL, effect, falling).startswith("heat loss fell by 29 % from 25 s to 975 s")
+    wanders = told("heat_loss", "time", "polyline")
+    up_and_down = curve(wanders, time, 1.0 + 0.2 * np.sin(time / 50), "s", relative=True)
+    assert words_of_effect(MODEL, wanders, up_and_down) == "heat loss wanders in time, between 20 % less and 20 % more"
