@@ -64,6 +64,10 @@ def curve(effect: NamedEffect, driver: FloatArray, change: FloatArray, unit: str
             told("thermometer", "lag", "lag", amplitude=1.0, time_constant=42.0),
             "thermometer answers slowly, with a time constant of 42 s",
         ),
+        (
+            told("heat_loss", "time", "polyline", value_1=-0.2231, value_2=0.1),
+            "heat loss wanders in time, between 20 % less and 11 % more",
+        ),
         (told("heating", "delay", "delay", amplitude=1.0, dead_time=30.0), "heating answers 30 s late"),
     ],
 )

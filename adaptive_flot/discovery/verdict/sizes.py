@@ -56,6 +56,9 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
         said = f"{name} does not go beyond {limit:.3g}{_unit(site)}"
     elif effect.family.is_event:
         said = f"{name} {_event(site, effect)}"
+    elif curve is None and effect.driver == "time":
+        low, high = (_deviation(site, effect, v) for v in (min(effect.levels), max(effect.levels)))
+        said = f"{name} {'wanders' if effect.form == 'polyline' else 'changes'} in time, between {low} and {high}"
     elif curve is None:
         said = f"{name} depends on {spaced(effect.driver)}"
     elif effect.driver == "time":
@@ -99,7 +102,8 @@ def _event(site: Site, effect: Effect) -> str:
 def _in_time(site: Site, curve: EffectCurve) -> str:
     """The largest change between two times; of what wanders, how far it goes down and up."""
     if curve.effect.form == "polyline":
-        low, high = (_change(site, curve, float(v)) for v in (np.min(curve.change), np.max(curve.change)))
+        ends = float(np.min(curve.change)), float(np.max(curve.change))
+        low, high = (_deviation(site, curve.effect, float(np.log(v)) if curve.relative else v) for v in ends)
         return f"wanders in time, between {low} and {high}"
     a, b = _extremes(curve)
     factor = _ratio(curve, a, b) if curve.relative else None
@@ -147,11 +151,11 @@ def _ratio(curve: EffectCurve, a: int, b: int) -> float:
     return float(curve.change[b] / max(float(curve.change[a]), 1e-12))
 
 
-def _change(site: Site, curve: EffectCurve, value: float) -> str:
-    """A value of a curve: `20 % less`, `0.3 K more`."""
-    if curve.relative:
-        return _times(value).rsplit(" ", 1)[0]
-    return f"{abs(value):.3g}{_unit(site)} {'more' if value > 0 else 'less'}"
+def _deviation(site: Site, effect: Effect, level: float) -> str:
+    """A change at a site: `20 % less`, `0.3 K more`."""
+    if _is_factor(site, effect):
+        return _times(float(np.exp(level))).rsplit(" ", 1)[0]
+    return f"{abs(level):.3g}{_unit(site)} {'more' if level > 0 else 'less'}"
 
 
 def _amount(site: Site, effect: Effect, level: float) -> str:

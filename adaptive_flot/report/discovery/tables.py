@@ -13,6 +13,8 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.kit.wording import number, p_text, spaced
 
+MOST_COEFFICIENTS = 30
+"""Coefficients of an effect that are listed: more are the values of a curve, which the figure shows."""
 MOST_ROWS = 10
 
 
@@ -46,6 +48,10 @@ def coefficient_table(discovery: Discovery) -> Table:
     rows = []
     for named in discovery.verdict.effects:
         units = discovery.model.effect_units(named.effect)
+        if len(named.effect.coefficients) > MOST_COEFFICIENTS:
+            site, count = effect_text([(named.effect.site, named.effect.driver)]), len(named.effect.coefficients)
+            rows.append((site, named.effect.form, f"{count} values at knots", "–", "see figure", "see figure"))
+            continue
         for name, value in named.effect.coefficients.items():
             low, high = named.interval95.get(name, (np.nan, np.nan))
             interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"
