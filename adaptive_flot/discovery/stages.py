@@ -153,7 +153,7 @@ def look_for_courses(state: State) -> State:
     if judgement.word != "none" or judgement.best is not None:
         return state
     state.progress("look for what else wanders")
-    problem, result = with_courses(problem, result, state.progress)
+    problem, result = with_courses(problem, result, state.processes, state.progress)
     return replace(state, problem=problem, base=result.base, search=result)
 
 

@@ -85,11 +85,11 @@ def test_the_evidence_for_two_courses_is_that_of_a_gaussian() -> None:
     assert best.evidence == pytest.approx(drop, rel=1e-6, abs=1e-3)
 
 
-def searched(measured: Dataset) -> tuple[Problem, SearchResult, SearchResult]:
+def searched(measured: Dataset, processes: int = 1) -> tuple[Problem, SearchResult, SearchResult]:
     """What was told beside the room (nothing), and what is with a second course."""
     problem, base = beside_the_room(measured)
     nothing = SearchResult(base, (), (), None, 0.0, 0.0, scorer_of(problem, base)[1])
-    again, result = with_courses(problem, nothing)
+    again, result = with_courses(problem, nothing, processes)
     return again, nothing, result
 
 
@@ -98,6 +98,10 @@ def test_an_exchange_that_wanders_is_found_beside_the_room() -> None:
     _, _, result = searched(record(OFF, wander=2.0, exchange=0.8, seed=2))
     assert {a.names[0] for a in result.alternatives[:2]} == {("exchange", "time"), ("circulation", "time")}
     assert all(a.delta_bic > result.alternatives[0].delta_bic + LEAST_EVIDENCE for a in result.alternatives[2:])
+    parted = searched(record(OFF, wander=2.0, exchange=0.8, seed=2), processes=2)[2]  # a fit comes without its model
+    assert [(a.names, a.fit.bic) for a in parted.alternatives] == [(a.names, a.fit.bic) for a in result.alternatives]
+    for one, other in zip(parted.alternatives, result.alternatives, strict=True):
+        np.testing.assert_array_equal(one.fit.model.parameter_values, other.fit.model.parameter_values)
     best = result.alternatives[0]
     assert result.verification is not None
     assert result.verification.confirmed

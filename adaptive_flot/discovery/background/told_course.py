@@ -6,8 +6,9 @@ nothing else is told, a second course is tried at every site, and fitted with nu
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
 
 from adaptive_flot.discovery.assessment.likelihood import (
     LEAST_EVIDENCE,
@@ -22,17 +23,20 @@ from adaptive_flot.discovery.background.two_courses import TwoCourses
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter, at_its_constants
-from adaptive_flot.discovery.record.background import knots_of_course
+from adaptive_flot.discovery.fitting.parallel import parallel_map
+from adaptive_flot.discovery.record.background import Background, Course, knots_of_course
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, SearchResult
 from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.rescaled import factors_of, rescaled
 
 MOST_SITES = 6
 """Sites at which a second course is fitted: those that explain most to first order."""
 
 
 def with_courses(
-    problem: Problem, result: SearchResult, progress: Callable[[str], None] = lambda stage: None
+    problem: Problem, result: SearchResult, processes: int = 1, progress: Callable[[str], None] = lambda stage: None
 ) -> tuple[Problem, SearchResult]:
     """The problem and the search, with what wanders at a site as its alternatives; both unchanged where nothing does.
 
@@ -43,43 +47,37 @@ def with_courses(
     ----------
     problem, result
         The record with a background in which a feed wanders, and what was found beside it.
-    progress
-        Called with a word for each fit.
+    processes, progress
+        As in `search`.
     """
     background = problem.background
     assert background is not None  # asked where a feed wanders
-    plain, own = replace(problem, background=None), at_its_constants(problem, result.base)
-    there = Fitter(problem).fit(own.model, own.names, like=own, rounds=2) or result.base
-    bare = without_background(problem, there)
-    responses = Responses(plain, bare)
-    courses = TwoCourses(plain, scorer_of(plain, bare, responses, there.noise)[0], responses)
+    run = _Run.beside(problem, result.base)
     first = Spread(background.course, background.constants, 0.0)
+    courses = TwoCourses(run.plain, scorer_of(run.plain, run.bare, run.responses, run.there.noise)[0], run.responses)
     alone = courses.best(first)
-    taken = {e.site for e in bare.model.effects if e.driver == "time"} | {first.course.site if first.course else ""}
-    sites = [s for s in responses.sites if s not in taken]
-    promising = courses.promising(scorer_of(problem, there)[0], sites, MOST_SITES)
-    beside = [
-        spread for site in promising if (spread := courses.best(first, site)).evidence > alone.evidence + LEAST_EVIDENCE
-    ]
-    if not beside:
+    sites = courses.promising(scorer_of(problem, run.there)[0], run.other_sites(first), MOST_SITES)
+
+    def fitted(k: int) -> _Made | None:
+        spread = courses.best(first, sites[k])
+        enough = spread.evidence > alone.evidence + LEAST_EVIDENCE and not problem.time_is_up
+        return run.fitted(spread) if enough else None
+
+    ended = count(1)
+    made = parallel_map(
+        fitted, range(len(sites)), processes, lambda: progress(f"fit {next(ended)} of {len(sites)} courses")
+    )
+    if problem.time_is_up or not any(made):
         return problem, result
-    base_problem, base, numbers = _better_alone(problem, there, first, alone, bare, responses)
+    base_problem, base, numbers = _better_alone(problem, run, first, alone)
     found = []
-    for spread in beside:
-        if problem.time_is_up:
-            return problem, result
-        assert spread.told is not None
-        site = spread.told.site
-        progress(f"fit {site} by time")
-        made = _fitted(plain, spread, bare, responses)
-        if made is not None:
-            fit = _paid(problem, made[1], made[2] - numbers)
-            found.append(
-                Alternative(((site, "time"),), (True,), fit, base.loss - fit.loss, fit.bic - base.bic, problem=made[0])
-            )
+    for each in made:
+        if each is not None:
+            own, fit = run.with_model(each)
+            fit = _paid(problem, fit, each.spread.numbers - numbers)
+            name = each.told.site, "time"
+            found.append(Alternative((name,), (True,), fit, base.loss - fit.loss, fit.bic - base.bic, problem=own))
     found.sort(key=lambda a: a.fit.bic)
-    if not found:
-        return problem, result
     best = found[0]
     rows_each = rows_per_effective_sample(problem, base, best.fit)
     checked = verify(base_problem, base, best.fit, best.problem)
@@ -93,13 +91,75 @@ def with_courses(
     )  # fmt: skip
 
 
-def _better_alone(
-    problem: Problem, there: Fit, first: Spread, again: Spread, bare: Fit, responses: Responses
-) -> tuple[Problem, Fit, int]:
+@dataclass(frozen=True)
+class _Made:
+    """A background with a told course and its fit, as they come from another process: the fit has no model then."""
+
+    spread: Spread
+    background: Background
+    fit: Fit
+    factors: Mapping[str, float]
+    values: Mapping[str, float]
+
+    @property
+    def told(self) -> Course:
+        """The course that is told."""
+        assert self.spread.told is not None  # only such are made
+        return self.spread.told
+
+
+@dataclass(frozen=True)
+class _Run:
+    """The record without a background, the run along which responses are worked out, and the fit that has the feed."""
+
+    plain: Problem
+    there: Fit
+    bare: Fit
+    responses: Responses
+
+    @staticmethod
+    def beside(problem: Problem, base: Fit) -> _Run:
+        """The run of the fit beside a background, with the constants that this has."""
+        own, plain = at_its_constants(problem, base), replace(problem, background=None)
+        there = Fitter(problem).fit(own.model, own.names, like=own, rounds=2) or base
+        bare = without_background(problem, there)
+        return _Run(plain, there, bare, Responses(plain, bare))
+
+    def other_sites(self, first: Spread) -> list[str]:
+        """Sites but that of the feed, and those at which the model has an effect in time already."""
+        taken = {e.site for e in self.bare.model.effects if e.driver == "time"}
+        feed = first.course.site if first.course else ""
+        return [s for s in self.responses.sites if s not in taken and s != feed]
+
+    def _extended(self, told: Course) -> Model:
+        knots = knots_of_course(self.plain.record.time, MOST_KNOTS, LEAST_ROWS)
+        return self.bare.model.with_effects([told.effect(knots)])
+
+    def fitted(self, spread: Spread) -> _Made | None:
+        """The fit beside a told course, with a model that has it; None where it can not be simulated."""
+        assert spread.told is not None  # sought for a site
+        extended = replace(self.bare, model=self._extended(spread.told))
+        made = fit_with_background(self.plain, spread, extended, self.responses)
+        if made is None:
+            return None
+        problem, fit = made[0], Fitter(made[0]).at_its_constants(made[1])
+        names, background = spread.told.parameters_in(fit.model), problem.background
+        assert background is not None  # a fit with a background has one
+        values = dict(zip(names, map(float, spread.told.values_in(fit.model)), strict=True))
+        return _Made(spread, background, fit, factors_of(fit.model), values)
+
+    def with_model(self, made: _Made) -> tuple[Problem, Fit]:
+        """The problem of a course that was made, and its fit with the model, made anew where it came without."""
+        problem = replace(self.plain, background=made.background)
+        model = rescaled(self._extended(made.told), made.factors).with_parameters(made.values)
+        return problem, made.fit.with_model(lambda: model)
+
+
+def _better_alone(problem: Problem, run: _Run, first: Spread, again: Spread) -> tuple[Problem, Fit, int]:
     """The feed alone, with the numbers that it has or those that are sought as for two courses, and how many."""
-    made = fit_with_background(replace(problem, background=None), again, bare, responses)
-    if made is None or _cost(problem, made[1], again.numbers) > _cost(problem, there, first.numbers):
-        return problem, there, first.numbers
+    made = fit_with_background(run.plain, again, run.bare, run.responses)
+    if made is None or _cost(problem, made[1], again.numbers) > _cost(problem, run.there, first.numbers):
+        return problem, run.there, first.numbers
     return *made, again.numbers
 
 
@@ -110,15 +170,3 @@ def _cost(problem: Problem, fit: Fit, numbers: int) -> float:
 def _paid(problem: Problem, fit: Fit, numbers: int) -> Fit:
     """The fit with the price of so many numbers more than the base fit has in its criterion."""
     return replace(fit, bic=_cost(problem, fit, numbers))
-
-
-def _fitted(plain: Problem, spread: Spread, bare: Fit, responses: Responses) -> tuple[Problem, Fit, int] | None:
-    """A background with a told course, its fit with a model that has the course, and how many numbers it has."""
-    assert spread.told is not None  # sought for a site
-    knots = knots_of_course(plain.record.time, MOST_KNOTS, LEAST_ROWS)
-    extended = replace(bare, model=bare.model.with_effects([spread.told.effect(knots)]))
-    made = fit_with_background(plain, spread, extended, responses)
-    if made is None:
-        return None
-    problem, fit = made
-    return problem, Fitter(problem).at_its_constants(fit), spread.numbers

@@ -10,7 +10,7 @@ finished fit can start: events in time, and the constant that a dependence may h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
@@ -41,6 +41,8 @@ from adaptive_flot.discovery.search.fit_jobs import (
     step,
     unbent,
 )
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.rescaled import as_it_came, factors_of, rescaled
 
 FIRST_STEPS = 6
 """Steps of the first rung, in which every candidate jobs."""
@@ -81,7 +83,8 @@ def refit(
     best = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
     best = best_of_each([*halving.trimmed(best[:MOST_FREED]), *best])
     ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(best, last), *best])]
-    exact = [_exact(fitter, base, a) for a in ranked[:LEADERS]]
+    done("the leaders at every row")
+    exact = _all_exact(fitter, base, ranked[:LEADERS], processes)
     return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic), compared
 
 
@@ -223,12 +226,25 @@ def _close(alternatives: list[Alternative]) -> list[Alternative]:
     return [a for a in alternatives if a.gain > CLOSE_GAIN * most]
 
 
-def _exact(fitter: Fitter, base: Fit, a: Alternative) -> Alternative:
-    """The alternative as a run at every row has it, and at its own constants where these are uncertain."""
-    bounds = {k: b for e in a.effects for k, b in effect_bounds(fitter.problem, a.fit.model, e).items()}
-    fit = at_every_row(fitter, a.fit, bounds)
-    fit = fitter.at_its_constants(fit, bounds)
-    return replace(a, fit=fit, gain=base.loss - fit.loss, delta_bic=fit.bic - base.bic)
+def _all_exact(fitter: Fitter, base: Fit, leaders: Sequence[Alternative], processes: int) -> list[Alternative]:
+    """The leaders as runs at every row have them, and at their own constants where these are uncertain."""
+
+    def exact(k: int) -> tuple[Fit, Mapping[str, float]]:
+        a = leaders[k]
+        bounds = {n: b for e in a.effects for n, b in effect_bounds(fitter.problem, a.fit.model, e).items()}
+        fit = fitter.at_its_constants(at_every_row(fitter, a.fit, bounds), bounds)
+        return fit, factors_of(fit.model)
+
+    found = []
+    for a, (fit, factors) in zip(leaders, parallel_map(exact, range(len(leaders)), processes), strict=True):
+        own = a.fit.model
+
+        def make(model: Model = own, factors: Mapping[str, float] = factors) -> Model:
+            return rescaled(model, factors) if factors else as_it_came(model)
+
+        fit = fit.with_model(make)
+        found.append(replace(a, fit=fit, gain=base.loss - fit.loss, delta_bic=fit.bic - base.bic))
+    return found
 
 
 def _finalists(loss: float, ranked: list[FittedJob], tied: set[tuple[str, str]]) -> list[FittedJob]:
