@@ -77,7 +77,7 @@ class TwoCourses:
     def best(self, first: Spread, site: str | None = None) -> Spread:
         """The background with the largest drop: course of the feed, constants, and a course at a site if one is given.
 
-        The search begins with the feed and the size of the constants of `first`.
+        The search begins at the middle of its grid, with the size of the constants of `first`, whose feed it is.
         """
         assert first.course is not None  # asked where a feed wanders
         sites = [first.course.site] if site is None else [site, first.course.site]
@@ -130,7 +130,7 @@ class TwoCourses:
 
 
 def _drop(information: FloatArray, along: FloatArray) -> float:
-    """B'e (I + B'B)^-1 ... of the equation above, for products in standard deviations of the prior."""
+    """The drop of the equation above, from B'B (k, k) and B'e (k,) in standard deviations of the prior."""
     root = np.linalg.cholesky(np.eye(len(along)) + information)
     own = solve_triangular(root, along, lower=True)
     return float(own @ own - 2 * np.sum(np.log(np.diag(root))))
