@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 
+import numpy as np
+
 from adaptive_flot.discovery.assessment.likelihood import (
     LEAST_EVIDENCE,
     loglik_difference_sds,
@@ -27,7 +29,9 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.background import Background, Course, knots_of_course
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, SearchResult
+from adaptive_flot.discovery.search.alternatives import effect_bounds
 from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.rescaled import factors_of, rescaled
 
@@ -40,8 +44,9 @@ def with_courses(
 ) -> tuple[Problem, SearchResult]:
     """The problem and the search, with what wanders at a site as its alternatives; both unchanged where nothing does.
 
-    A second course must be better than the feed alone, with numbers that were sought in the same way, by
-    LEAST_EVIDENCE for each effective sample and the price of its numbers; and rows that chose neither must confirm it.
+    A second course must be better than the feed alone, with numbers that were sought in the same way, and better than
+    the feed with a constant at its site, which a slow course draws. By LEAST_EVIDENCE for each effective sample, and by
+    what the choice of a site is worth: 2 log(number of sites). And rows that chose neither must confirm it.
 
     Parameters
     ----------
@@ -55,13 +60,13 @@ def with_courses(
     run = _Run.beside(problem, result.base)
     first = Spread(background.course, background.constants, 0.0)
     courses = TwoCourses(run.plain, scorer_of(run.plain, run.bare, run.responses, run.there.noise)[0], run.responses)
-    alone = courses.best(first)
-    sites = courses.promising(scorer_of(problem, run.there)[0], run.other_sites(first), MOST_SITES)
+    alone, others = courses.best(first), run.other_sites(first)
+    least = LEAST_EVIDENCE + 2 * float(np.log(len(others)))
+    sites = courses.promising(scorer_of(problem, run.there)[0], others, MOST_SITES)
 
     def fitted(k: int) -> _Made | None:
         spread = courses.best(first, sites[k])
-        enough = spread.evidence > alone.evidence + LEAST_EVIDENCE and not problem.time_is_up
-        return run.fitted(spread) if enough else None
+        return run.fitted(spread) if spread.evidence > alone.evidence + least and not problem.time_is_up else None
 
     ended = count(1)
     made = parallel_map(
@@ -81,7 +86,8 @@ def with_courses(
     best = found[0]
     rows_each = rows_per_effective_sample(problem, base, best.fit)
     checked = verify(base_problem, base, best.fit, best.problem)
-    if best.delta_bic > -LEAST_EVIDENCE * rows_each or not checked.confirmed:
+    reference = min(base.bic, _bic_with_constant(base_problem, base, best.names[0][0]))
+    if best.fit.bic > reference - least * rows_each or not checked.confirmed:
         return problem, result
     differences = loglik_difference_sds(problem, best.fit, [a.fit for a in found])
     alternatives = tuple(replace(a, loglik_difference_sd=d) for a, d in zip(found, differences, strict=True))
@@ -161,6 +167,17 @@ def _better_alone(problem: Problem, run: _Run, first: Spread, again: Spread) -> 
     if made is None or _cost(problem, made[1], again.numbers) > _cost(problem, run.there, first.numbers):
         return problem, run.there, first.numbers
     return *made, again.numbers
+
+
+def _bic_with_constant(problem: Problem, base: Fit, site: str) -> float:
+    """Criterion of the feed alone with a constant at a site beside it; infinite where that can not be simulated."""
+    shift = Effect(site, "constant", "shift")
+    if any(e.label == shift.label for e in base.model.effects):
+        return float("inf")
+    model, name = base.model.with_effects([shift]), shift.parameter("amplitude")
+    bounds = effect_bounds(problem, model, shift)
+    fit = Fitter(problem).fit(model, (*base.names, name), like=base, bounds=bounds, rounds=2)
+    return fit.bic if fit is not None else float("inf")
 
 
 def _cost(problem: Problem, fit: Fit, numbers: int) -> float:

@@ -38,7 +38,7 @@ def heed_report(state: State) -> State:
         likelier = drop_beside_background(problem, before, after, "report", beside)
         likelier /= rows_per_effective_sample(problem, before, after)
     surely = likelier > LEAST_EVIDENCE
-    alike = taken_up(problem, constants_told(judgement)) or _has_course(judgement)
+    alike = taken_up(problem, constants_told(judgement))
     against = contradiction(judgement, error, noise, unknown, surely, alike)
     if not against and state.report_record is None:
         last = last_report_rows(problem)
@@ -51,8 +51,3 @@ def heed_report(state: State) -> State:
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
     told = likelier if surely and alike and not against and not surely_better(error) else 0.0
     return replace(state, error=error, judgement=judgement, likelihood=told, contradiction=against, certain=certain)
-
-
-def _has_course(judgement: Judgement) -> bool:
-    """Whether a course is told, which wanders as that of a feed does."""
-    return judgement.best is not None and judgement.best.problem is not None

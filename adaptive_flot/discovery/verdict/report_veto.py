@@ -56,8 +56,8 @@ def contradiction(
         Whether these rows are surely likelier than with the background alone. Then no error is worse that is within
         what noise and background leave unknown.
     alike
-        Whether the background may take up what is told: one of its constants, or a course beside its own. Both then
-        predict about alike, and no output needs to get better where the rows are likelier.
+        Whether the background has what is told as one of its constants. Both then predict alike, and no output needs to
+        get better where the rows are likelier.
     """
     if judgement.word not in ("named", "class"):
         return ""
