@@ -36,6 +36,7 @@ from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
 from adaptive_flot.discovery.verdict.conclude import insufficient
 from adaptive_flot.discovery.verdict.judge import (
+    but_for_what_has_no_reason,
     constants_told,
     first_that_stands,
     held_up,
@@ -187,6 +188,8 @@ def judge_alternatives(state: State) -> State:
     problem, result = state.searched
     result = first_that_stands(problem, result)
     result, judgement = held_up(problem, result, judge(result))
+    if problem.background is not None:
+        judgement = but_for_what_has_no_reason(result, judgement)
     judgement = with_certain_part(problem, result, judgement)
     said = state.screening.notes
     if problem.time_is_up:

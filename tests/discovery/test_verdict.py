@@ -14,9 +14,10 @@ from adaptive_flot.discovery.fitting.fit import row_losses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
 from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.judge import first_that_stands, held_up, judge
+from adaptive_flot.discovery.verdict.judge import but_for_what_has_no_reason, first_that_stands, held_up, judge
 from adaptive_flot.discovery.verdict.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.quantities import KnownEffect
 from tests.discovery.heated import heated_tank
 
 BY_FAN, BY_HEATER, BY_TIME = ("heat_loss", "fan_speed"), ("heating", "fan_speed"), ("heat_loss", "time")
@@ -33,6 +34,29 @@ def _search(draught: Discovery, *found: tuple[tuple[str, str], bool, float], lef
         for name, known, worse in found
     )
     return replace(draught.search, alternatives=alternatives, verification=verification, left=left, left_threshold=10.0)
+
+
+@pytest.mark.parametrize(
+    ("lists", "rival", "site", "word"),
+    [
+        ("heating", 2.0, "thermometer", "abstain"),  # neither has a reason
+        ("heat_loss", 2.0, "thermometer", "named"),  # the table has one
+        ("", 2.0, "thermometer", "named"),  # there is no table
+        ("heating", 50.0, "thermometer", "named"),  # the other is surely worse
+        ("heating", 2.0, "heat_loss", "named"),  # the place is sure
+    ],
+)
+def test_what_the_table_does_not_list_is_not_named_beside_something_nameless_as_near(
+    draught: Discovery, lists: str, rival: float, site: str, word: str
+) -> None:
+    found = _search(draught, (BY_FAN, True, 0.0), ((site, "temperature"), False, rival))
+    known = (KnownEffect(lists, "fan_speed", "a draught"),) if lists else ()
+    table = tuple(
+        replace(a, fit=replace(a.fit, model=replace(a.fit.model, known_effects=known))) for a in found.alternatives
+    )
+    found = replace(found, alternatives=table)
+    assert judge(found).word == "named"
+    assert but_for_what_has_no_reason(found, judge(found)).word == word
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.assessment.verification import verify
+from adaptive_flot.discovery.candidates.direction import listed
 from adaptive_flot.discovery.candidates.step_events import slow
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
@@ -76,6 +77,24 @@ def same_site(names: Sequence[Name]) -> tuple[Name, ...]:
     """
     sites = [site for site, _ in names]
     return tuple(n for n in names if sites.count(n[0]) > 1)
+
+
+def but_for_what_has_no_reason(result: SearchResult, judged: Judgement) -> Judgement:
+    """The judgement, with a name taken back that has no more reason than something nameless that comes as near.
+
+    Beside a background much is free, and a dependence of a quantity of the process looks like one of a sensor. The
+    sensor has no reason for it. Neither has the quantity, where the model's table of known effects does not list it.
+    """
+    best = judged.best
+    if judged.word != "named" or best is None or len(best.names) != 1:
+        return judged
+    (effect,), model = best.effects, best.fit.model
+    if effect.driver in STATELESS_DRIVERS or not model.known_effects or listed(model, effect) is not None:
+        return judged
+    elsewhere = (a for a in result.alternatives if not all(a.known) and all(s != effect.site for s, _ in a.names))
+    if any(judged.near(a) for a in elsewhere):
+        return replace(judged, word="abstain", members=())
+    return judged
 
 
 def constants_told(judged: Judgement) -> tuple[str, ...]:
