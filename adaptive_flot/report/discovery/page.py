@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Picture, Section, present
 from adaptive_flot.report.kit.plotdata import Residuals
 from adaptive_flot.report.kit.residuals import residual_pictures
-from adaptive_flot.report.kit.wording import capital, joined, spaced
+from adaptive_flot.report.kit.wording import capital, spaced
 
 MOST_RESIDUALS = 3
 """Outputs whose residuals are drawn: one that is still wrong, and those whose error fell most by their noise."""
@@ -83,13 +84,10 @@ def discovery_report(discovery: Discovery, name: str, command: str = "", read: S
 
 
 def _title(discovery: Discovery) -> str:
-    """What is missing where it has a name, else what the verdict means."""
+    """What is missing where it has a name, with size and time but without what stands in brackets; else the word."""
     verdict = discovery.verdict
     if verdict.word == "named" and verdict.effects:
-        if not verdict.reason.startswith("The model lacks"):  # the innovations form says it with sizes and times
-            return verdict.reason.partition(". ")[0]
-        names = [f"{spaced(e.effect.site)} depends on {spaced(e.effect.driver)}" for e in verdict.effects]
-        return capital(f"{joined(names)}, which the model lacks")
+        return re.sub(r" \([^()]*\)", "", verdict.reason.partition(". ")[0])
     return capital(TITLES[verdict.word])
 
 
