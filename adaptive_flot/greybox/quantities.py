@@ -93,9 +93,6 @@ class Parameter:
         "estimated" where a calibration fits it unless told otherwise, else "fixed".
     disturbance
         Whether it varies by itself and may be measured, as a feed grade does.
-    drifts
-        Whether it is known to change slowly by itself, so that an estimator tracks it: a slow change of one that is
-        fitted is then no missing effect.
     """
 
     name: str
@@ -109,7 +106,6 @@ class Parameter:
     prior_std: float | None = None
     role: ParameterRole = "fixed"
     disturbance: bool = False
-    drifts: bool = False
 
     def with_value(self, value: float) -> Parameter:
         """The same parameter with another value, in its unit; one a rounding error beyond its range is at the end.

@@ -96,7 +96,7 @@ def test_a_drift_is_all_there_is_only_where_nothing_was_added_beside_it(
     own = found.alternatives[0]
     model = heated_tank().with_effects([drift])
     alternatives = (replace(own, fit=replace(own.fit, model=model)), found.alternatives[1])
-    found = replace(found, alternatives=alternatives, common_nuisance=nuisance, drifting_sites=("heat_loss",))
+    found = replace(found, alternatives=alternatives, common_nuisance=nuisance, adapted_sites=("heat_loss",))
     judged = judge(found)
     assert judged.word == word and judged.best is alternatives[0]
 

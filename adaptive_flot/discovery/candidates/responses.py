@@ -204,23 +204,17 @@ class Responses:
         return inverse
 
     def adapted_sites(self) -> tuple[str, ...]:
-        """Sites whose constant change does what a change of an adapted parameter does, and nothing else."""
-        return self._sites_of(self.problem.adapted)
+        """Sites whose constant change does what a change of an adapted parameter does, and nothing else.
 
-    def drifting_sites(self) -> tuple[str, ...]:
-        """The same of those adapted parameters that are known to drift: a slow change there is what is tracked."""
-        drifts = {p.name for p in self.fit.model.parameters if p.drifts}
-        return self._sites_of(tuple(n for n in self.problem.adapted if n in drifts))
-
-    def _sites_of(self, adapted: tuple[str, ...]) -> tuple[str, ...]:
-        """Sites whose constant change is that of one of these adapted parameters."""
-        if not adapted:
+        A change in time at such a site is a drift of that parameter: what the adaptation is there for.
+        """
+        count = len(self.problem.adapted)
+        if not count:
             return ()
-        own = [self.problem.adapted.index(name) for name in adapted]
         responses = self.of([TimeProfile(s, np.ones(len(self.problem.record)), self._offset[s]) for s in self.sites])
         scale = np.maximum(np.abs(responses).max(axis=(0, 2)), 1e-300)[None, :, None]
         a = (responses / scale).reshape(-1, len(self.sites))
-        b = (self.nuisance[:, :, own] / scale).reshape(-1, len(own))
+        b = (self.nuisance[:, :, :count] / scale).reshape(-1, count)
         a, b = (x / np.maximum(np.linalg.norm(x, axis=0), 1e-300) for x in (a, b))
         alike = np.abs(a.T @ b).max(axis=1)
         return tuple(s for s, c in zip(self.sites, alike, strict=True) if c > 1 - 1e-6)

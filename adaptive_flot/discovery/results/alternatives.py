@@ -107,14 +107,14 @@ class SearchResult:
         First-order gain that the best alternative leaves on the table: what it still lacks.
     left_threshold
         The same quantity that noise alone would show once in a hundred records.
-    drifting_sites
-        Sites whose constant change is that of an adapted parameter that is known to drift.
+    adapted_sites
+        Sites whose constant change is that of an adapted parameter.
     rows_per_effective_sample
         Rows of the best alternative's innovations for each effective sample: evidence counts once for so many.
     common_nuisance
         Site and driver of the effect that was added to the leading alternatives to compare them, if any.
     slow_s
-        Seconds from which a change of such a parameter is a drift.
+        Seconds from which a change of an adapted parameter is a drift.
     """
 
     base: Fit
@@ -123,7 +123,7 @@ class SearchResult:
     verification: Verification | None
     left: float
     left_threshold: float
-    drifting_sites: tuple[str, ...]
+    adapted_sites: tuple[str, ...]
     rows_per_effective_sample: float = 1.0
     common_nuisance: tuple[str, str] | None = None
     slow_s: float = SLOW_S

@@ -108,12 +108,12 @@ def ranked(problem: Problem, base: Fit, alternatives: list[Alternative]) -> tupl
 def scorer_of(
     problem: Problem, fit: Fit, responses: Responses | None = None, noise: Noise | None = None
 ) -> tuple[Scorer, tuple[str, ...]]:
-    """Scores along a fit, and the sites whose constant change is that of an adapted parameter that drifts.
+    """Scores along a fit, and the sites whose constant change is that of an adapted parameter.
 
     `responses` are those along this fit, and `noise` its noise model, where they are known already.
     """
     responses = responses or Responses(problem, fit)
-    return Scorer(problem, fit, responses, catalogue(fit.model, responses), noise), responses.drifting_sites()
+    return Scorer(problem, fit, responses, catalogue(fit.model, responses), noise), responses.adapted_sites()
 
 
 def threshold_of(scorer: Scorer) -> float:

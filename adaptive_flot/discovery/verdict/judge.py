@@ -179,6 +179,6 @@ def _only_adds_to(a: Alternative, b: Alternative) -> bool:
 
 
 def _only_drift(a: Alternative, result: SearchResult) -> bool:
-    """Whether parameters that are known to drift are all there is; a change at an onset is an event with a cause."""
-    in_time = all(site in result.drifting_sites and driver == "time" for site, driver in a.names)
+    """Whether adapted parameters that change slowly are all there is; a change at an onset is an event with a cause."""
+    in_time = all(site in result.adapted_sites and driver == "time" for site, driver in a.names)
     return in_time and all(slow(e, result.slow_s) for e in a.effects)
