@@ -53,9 +53,11 @@ def reason_words(
             "Look for what else has happened there."
         )
     if judgement.word == "none" and drift:
+        said = "; ".join(drift)
         return (
-            "The model lacks no effect that this record shows: a drift of its adapted parameters explains the residual "
-            f"({'; '.join(drift)}), and tracking them is the estimator's work."
+            f"{said[:1].upper()}{said[1:]}. This slow change of what is fitted explains the residual, and no other "
+            "effect shows. Where it should not change, look there for the cause. Else tracking it is the estimator's "
+            "work."
         )
     if judgement.word == "none":
         return (
