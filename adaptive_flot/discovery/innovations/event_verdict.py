@@ -21,7 +21,9 @@ from adaptive_flot.discovery.innovations.search import Explanation, Search
 
 
 def with_event(compared: Comparison, search: Search, told: Told, seconds: float) -> Comparison:
-    """The comparison with the event told; unchanged where free runs do not get better by it.
+    """The comparison with the event told; unchanged where free runs do not get better by it, or need not.
+
+    Where no output's error without the event is larger than on the reference, there is nothing for it to explain.
 
     Parameters
     ----------
@@ -51,6 +53,8 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))  # type: ignore[arg-type]
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, seconds)
+    if all(c.before <= c.noise for c in verdict.error):
+        return compared
     over_all = f"Over the whole record: {compared.verdict.reason}"
     return replace(
         compared,

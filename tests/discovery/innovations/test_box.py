@@ -1,9 +1,13 @@
 """The heated box: what is told of a lid that someone opens, on a process that is not flotation."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.hypotheses.telling import verdict_of
 from tests.discovery.innovations.box import DT, LIDS, model, record
 
 
@@ -30,3 +34,16 @@ def test_an_opened_lid_is_told_against_a_closed_reference() -> None:
     told = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
     assert verdict.word in ("named", "class") and "loss" in told and told <= {"loss", "other_heat"}, verdict.reason
     assert verdict.error[0].after < 0.3 * verdict.error[0].before and verdict.error[0].reduction95[0] > 0
+
+
+def test_an_event_is_not_told_where_no_error_is_larger_than_on_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same lid, with a reference as noisy as the record: there is nothing for an event to explain."""
+
+    def as_noisy(*given: Any) -> Any:
+        verdict = verdict_of(*given)
+        return replace(verdict, error=tuple(replace(c, noise=c.before) for c in verdict.error))
+
+    monkeypatch.setattr("adaptive_flot.discovery.innovations.event_verdict.verdict_of", as_noisy)
+    verdict = find_changes(model(), [record(seed=3)], [record((), seed=2)]).verdict
+    assert all(e.effect.form != "switch" for e in verdict.effects)
+    assert not any(note.startswith("Over the whole record") for note in verdict.notes)
