@@ -53,7 +53,7 @@ def reason_words(
             "Look for what else has happened there."
         )
     if judgement.word == "none" and drift:
-        said = "; ".join(drift)
+        said = "; ".join(drift).replace("_", " ")
         return (
             f"{said[:1].upper()}{said[1:]}. This slow change of what is fitted explains the residual, and no other "
             "effect shows. Where it should not change, look there for the cause. Else tracking it is the estimator's "
