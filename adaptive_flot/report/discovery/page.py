@@ -93,7 +93,7 @@ def _title(discovery: Discovery) -> str:
 
 def _repeats(fact: str, reason: str) -> bool:
     """Whether the reason says a fact already."""
-    return fact.partition(": ")[2].rstrip(".") in reason
+    return fact.partition(": ")[2].rstrip(".").lower() in reason.lower()
 
 
 def _evidence(
