@@ -220,7 +220,8 @@ def fit_without_report(state: State) -> State:
     best, before = state.judged.best, final(problem, base)
     if best is None:
         return replace(state, before=before, after=before)
-    beside, fit = without_constants(best.problem or problem, best.fit, constants_told(state.judged))
+    own = replace(best.problem or problem, deadline=state.ends)
+    beside, fit = without_constants(own, best.fit, constants_told(state.judged))
     return replace(state, before=before, after=final(beside, fit), problem_after=beside)
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.results import NamedEffect
+from adaptive_flot.discovery.results import Discovery, NamedEffect
 from adaptive_flot.discovery.verdict.curve import EffectCurve
 from adaptive_flot.discovery.verdict.sizes import words_of_effect, words_of_effects
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.report.discovery.tables import coefficient_table
 from tests.discovery.test_uncertain_constants import jacketed_tank
 
 MODEL = jacketed_tank()
@@ -93,3 +95,11 @@ def test_a_curve_in_time_is_told_by_its_largest_change_and_a_course_by_its_range
     wanders = told("heat_loss", "time", "polyline")
     up_and_down = curve(wanders, time, 1.0 + 0.2 * np.sin(time / 50), "s", relative=True)
     assert words_of_effect(MODEL, wanders, up_and_down) == "heat loss wanders in time, between 20 % less and 20 % more"
+
+
+def test_the_values_of_a_course_have_one_line_in_the_table_of_coefficients(draught: Discovery) -> None:
+    knots = tuple(float(k) for k in range(96))
+    values = {f"value_{k + 1}": 0.1 for k in range(96)}
+    wanders = NamedEffect(Effect("heat_loss", "time", "polyline", values, {"knots": knots}), "", {}, ())
+    table = coefficient_table(replace(draught, verdict=replace(draught.verdict, effects=(wanders,))))
+    assert [row[2] for row in table.rows] == ["96 values at knots"]

@@ -105,7 +105,7 @@ class Evidence:
         self.count = len(self._own)
         self._feeds = []
         for site in feeds:
-            offset = next(s for s in responses.fit.model.sites if s.name == site).mode == "offset"
+            offset = responses.is_offset(site)
             knots, lines = lines_of_course(problem, site, offset)
             usual = responses.usual(site) if offset else 1.0
             X = usual * scorer.projected(responses.of(lines))

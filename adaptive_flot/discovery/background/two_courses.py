@@ -116,17 +116,14 @@ class TwoCourses:
 
     def _lines(self, scorer: Scorer, site: str) -> FloatArray:
         """Projected responses (values, k) to a course at a site, as a share of its usual value."""
-        profiles = lines_of_course(self._problem, site, self._is_offset(site))[1]
+        profiles = lines_of_course(self._problem, site, self._responses.is_offset(site))[1]
         return self._usual(site) * scorer.projected(self._responses.of(profiles))
 
     def _course(self, site: str, std: float, time: float) -> Course:
-        return Course(site, std * self._usual(site), time, self._is_offset(site))
+        return Course(site, std * self._usual(site), time, self._responses.is_offset(site))
 
     def _usual(self, site: str) -> float:
-        return self._responses.usual(site) if self._is_offset(site) else 1.0
-
-    def _is_offset(self, site: str) -> bool:
-        return next(s for s in self._responses.fit.model.sites if s.name == site).mode == "offset"
+        return self._responses.usual(site) if self._responses.is_offset(site) else 1.0
 
 
 def _drop(information: FloatArray, along: FloatArray) -> float:

@@ -115,6 +115,10 @@ class Responses:
         self.drivers = {name: table[name] for name in names if not name.startswith(own)}
         self.site_values = {s.name: values[j] for j, s in enumerate(model.sites)}
 
+    def is_offset(self, site: str) -> bool:
+        """Whether effects add to the value at a site, or else multiply it."""
+        return self._offset[site]
+
     def usual(self, site: str) -> float:
         """Typical size of the value at a site: the median, or the mean of what is off most of the time.
 

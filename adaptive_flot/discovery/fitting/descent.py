@@ -65,6 +65,9 @@ class Descent:
     def __init__(self, problem: Problem, rows: BoolArray, model: Model, unknowns: Unknowns) -> None:
         self.problem, self.rows, self.model, self.unknowns = problem, rows, model, unknowns
         self.simulator = RecordSimulator(model, problem.record.dt, nodes_for(problem, model))
+        background = problem.background
+        # what the model has of it already is the same for all predictions
+        self._first_background = np.zeros(0) if background is None else background.first(model)
         self._white_background: tuple[Noise, FloatArray] | None = None
 
     def _predict(self, z: FloatArray) -> FloatArray:
@@ -74,11 +77,9 @@ class Descent:
     def _with_background(self, z: FloatArray, free: FloatArray) -> FloatArray:
         """A free run (N, m), and what the background adds to it."""
         background = self.problem.background
-        return (
-            free
-            if background is None
-            else free + background.outputs(z[self.unknowns.first_of_background :], self.model)
-        )
+        if background is None:
+            return free
+        return free + background.change(z[self.unknowns.first_of_background :] - self._first_background)
 
     def _jacobian(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Predictions (N, m) and their derivatives (N, m, unknowns) but those by the background, which never change."""

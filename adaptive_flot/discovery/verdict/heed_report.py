@@ -35,8 +35,9 @@ def heed_report(state: State) -> State:
         each = unknown_of_background(beside, after, ("estimate", "confirm"), "report")
         names = [after.model.outputs[c].name for c in problem.columns]
         unknown = each[[names.index(c.output) for c in error]]
-        likelier = drop_beside_background(problem, before, after, "report", beside)
-        likelier /= rows_per_effective_sample(problem, before, after)
+        if judgement.word in ("named", "class"):
+            likelier = drop_beside_background(problem, before, after, "report", beside)
+            likelier /= rows_per_effective_sample(problem, before, after)
     surely = likelier > LEAST_EVIDENCE
     alike = taken_up(problem, constants_told(judgement))
     against = contradiction(judgement, error, noise, unknown, surely, alike)
