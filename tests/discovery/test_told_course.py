@@ -28,6 +28,7 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Judgement, OutputChange, SearchResult
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.verdict.report_veto import contradiction
+from adaptive_flot.discovery.verdict.wording import beside_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -151,3 +152,14 @@ def test_likelier_rows_excuse_what_the_background_does_not_know() -> None:
     assert contradiction(judged, (alike,), noise[:1], likelier=True)
     assert contradiction(judged, (alike,), noise[:1], alike=True)
     assert not contradiction(judged, (alike,), noise[:1], likelier=True, alike=True)
+    unsure = OutputChange("water", "K", 2.0, 1.4, 0.1, (-0.01, 0.5))
+    assert contradiction(judged, (unsure,), noise[:1])
+    assert not contradiction(judged, (unsure,), noise[:1], likelier=True)
+    little = OutputChange("water", "K", 2.0, 1.85, 0.1, (-0.01, 0.15))
+    assert contradiction(judged, (little,), noise[:1], likelier=True)
+
+
+def test_the_reason_says_what_a_name_rests_on_where_no_error_is_surely_smaller() -> None:
+    assert not beside_words(0.0, smaller=True)
+    assert "stays as it is" in beside_words(40.0) and "e^20" in beside_words(40.0)
+    assert "interval reaches zero" in beside_words(40.0, smaller=True) and "e^20" in beside_words(40.0, smaller=True)

@@ -14,6 +14,7 @@ from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
 from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
 from adaptive_flot.discovery.verdict.locate import locate
+from adaptive_flot.discovery.verdict.report_veto import much_better
 from adaptive_flot.discovery.verdict.sizes import words_of_effects
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
@@ -75,7 +76,8 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
         told = words_of_effects(state.refitted[1].model, effects, _curves(state, effects)) if effects else ""
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
-        return " ".join(filter(None, (said, beside_words(state.likelihood), state.certain, state.background)))
+        likelier = beside_words(state.likelihood, much_better(state.error))
+        return " ".join(filter(None, (said, likelier, state.certain, state.background)))
     errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
     return f"{state.sentence} Error of the free run on held-out rows: {errors}."
 

@@ -50,5 +50,5 @@ def heed_report(state: State) -> State:
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
     if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
-    told = likelier if surely and alike and not against and not surely_better(error) else 0.0
+    told = likelier if surely and not against and not surely_better(error) else 0.0
     return replace(state, error=error, judgement=judgement, likelihood=told, contradiction=against, certain=certain)

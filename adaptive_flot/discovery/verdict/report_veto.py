@@ -1,9 +1,11 @@
 """The report split has a veto: what held-out rows contradict is not told as a name.
 
-A name is contradicted where an output gets worse on these rows, or where no output surely gets better. But the
-constants of a background, each a little off, may predict what one does that is far off: then these rows must say that
-the background alone is much less likely. A free curve in time at a sensor must also hold on the last of these rows,
-which lie beyond all that it was fitted to: such a curve can mimic any residual between rows that it has seen.
+A name is contradicted where an output gets worse on these rows, or where no output surely gets better. Beside a
+background the likelihood of these rows may stand for that, as it knows what a wandering feed does to the error: where
+they are surely likelier, one error must be much smaller. The constants of a background, each a little off, may also
+predict what one does that is far off: then no error need be smaller. A free curve in time at a sensor must also hold on
+the last of these rows, which lie beyond all that it was fitted to: such a curve can mimic any residual between rows
+that it has seen.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ def contradiction(
         Standard deviation of what the background leaves unknown in each of them (m,), see `unknown_of_background`.
     likelier
         Whether these rows are surely likelier than with the background alone. Then no error is worse that is within
-        what noise and background leave unknown.
+        what noise and background leave unknown, and one that is much smaller is reason enough (see `much_better`).
     alike
         Whether the background has what is told as one of its constants. Both then predict alike, and no output needs to
         get better where the rows are likelier.
@@ -71,7 +73,7 @@ def contradiction(
     if worse:
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
         return f"on held-out rows it makes the error larger ({said})"
-    if not (likelier and alike) and not surely_better(changes):
+    if not surely_better(changes) and not (likelier and (alike or much_better(changes))):
         said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""
@@ -80,6 +82,15 @@ def contradiction(
 def surely_better(changes: Sequence[OutputChange]) -> bool:
     """Whether the error of one output falls by more than chance, and by as much as a user would see."""
     return any(c.reduction95[0] > 0 and c.after < (1 - BETTER) * c.before for c in changes)
+
+
+def much_better(changes: Sequence[OutputChange]) -> bool:
+    """Whether the error of one output falls by more than MUCH_WORSE, whatever the interval of that.
+
+    The few blocks of these rows tell little where the course of a feed, which both fits have, is most of the error.
+    Where they are surely likelier with the effect, a wide interval is no reason to doubt what falls by so much.
+    """
+    return any(c.after < (1 - MUCH_WORSE) * c.before for c in changes)
 
 
 def unexplained(changes: Sequence[OutputChange], noise: FloatArray) -> str:

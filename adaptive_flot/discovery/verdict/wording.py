@@ -86,13 +86,19 @@ def reason_words(
     )
 
 
-def beside_words(likelihood: float) -> str:
-    """Why a constant is told although the error on held-out rows stays as it is; empty without a `likelihood`."""
+def beside_words(likelihood: float, smaller: bool = False) -> str:
+    """Why a name is told although no error on held-out rows is surely smaller; empty without a `likelihood`."""
     if not likelihood:
         return ""
+    times = f"e^{likelihood / 2:.0f}"
+    if smaller:
+        return (
+            "The error on held-out rows is smaller, but its interval reaches zero: the course of a feed is most of it. "
+            f"Those rows are likelier with the effect by a factor of {times}."
+        )
     return (
         "The error on held-out rows stays as it is: several other constants, each a little off, would do there what "
-        f"this one does. Those rows make that less likely by a factor of e^{likelihood / 2:.0f}."
+        f"this one does. Those rows make that less likely by a factor of {times}."
     )
 
 
