@@ -15,6 +15,7 @@ from adaptive_flot.discovery.background.fitting import (
     with_course_told,
     without_constants,
 )
+from adaptive_flot.discovery.background.renewed import renewed
 from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
 from adaptive_flot.discovery.background.told_course import with_courses
 from adaptive_flot.discovery.background.wording import background_words, subject
@@ -134,6 +135,24 @@ def search_one_by_one(state: State) -> State:
     nominal = rescaled(state.model, factors_of(base.model))
     found = search(problem, base, nominal, scored=scored, processes=state.processes, progress=state.progress)
     return replace(state, search=found)
+
+
+def search_beside_renewed_background(state: State) -> State:
+    """Search once more where the background has other numbers beside the best effect than it had before."""
+    problem, result = state.searched
+    if problem.background is None or not result.alternatives:
+        return state
+    state.progress("look for the background beside the best effect")
+    again = renewed(problem, result.base, result.alternatives[0].fit)
+    if again is None:
+        return state
+    state.progress("search once more, beside another background")
+    problem, base = again
+    nominal = rescaled(state.model, factors_of(base.model))
+    found = search(problem, base, nominal, processes=state.processes, progress=state.progress)
+    if not found.alternatives or problem.time_is_up:
+        return state
+    return replace(state, problem=problem, base=base, search=found)
 
 
 def search_at_once(state: State) -> State:

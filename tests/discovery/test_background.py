@@ -10,7 +10,8 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from adaptive_flot.discovery.background.evidence import Spread, drops
-from adaptive_flot.discovery.background.fitting import background_of
+from adaptive_flot.discovery.background.fitting import background_of, fit_with_background
+from adaptive_flot.discovery.background.renewed import renewed
 from adaptive_flot.discovery.background.spread import spread_of
 from adaptive_flot.discovery.background.wording import background_words
 from adaptive_flot.discovery.candidates.responses import Responses
@@ -27,6 +28,7 @@ from adaptive_flot.discovery.record.background import (
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.record.robust import without_spikes
 from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.discovery.search.search import search
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Scope
 from tests.discovery.heated import CAPACITY, DT, ROOM, heated_tank, moves
@@ -205,6 +207,23 @@ def test_the_outputs_of_a_course_are_linear_in_it() -> None:
     np.testing.assert_array_equal(
         background.outputs(np.array([1.0, 2.0]), tank_in_a_room()), background.responses @ [1.0, 2.0]
     )
+
+
+def test_the_background_is_looked_for_once_more_beside_the_best_effect() -> None:
+    """A room that is said to wander by eight times as much takes up the draught; beside the draught it has its size."""
+    problem, fit, responses = _fitted(record_in_a_room(STD, exponent=0.6))
+    beside = fit_with_background(problem, Spread(Course("room", 8 * STD, TIME / 5, True), 0.0, 0.0), fit, responses)
+    assert beside is not None
+    found = search(*beside, tank_in_a_room()).alternatives[0]
+    assert found.names == (("heat_loss", "fan_speed"),)
+    again = renewed(*beside, found.fit)
+    assert again is not None
+    background = again[0].background
+    assert background is not None
+    assert background.course is not None
+    rate = background.course.std / np.sqrt(background.course.time)
+    assert 1 / 1.5 < rate / (STD / np.sqrt(TIME)) < 1.5
+    assert renewed(*again, search(*again, tank_in_a_room()).alternatives[0].fit) is None  # it stays
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -193,8 +193,14 @@ def test_what_the_background_leaves_unknown_is_its_posterior() -> None:
     own: FloatArray = background.responses[problem.rows("report"), 0]
     expected = np.sqrt(np.mean([h @ np.linalg.solve(precision, h) for h in own]))
     splits = ("estimate", "confirm"), "report"
-    assert unknown_of_background(problem, fit, *splits)[0] == pytest.approx(expected, rel=1e-6)
-    assert not unknown_of_background(replace(problem, background=None), fit, *splits).any()
+    size, limit = unknown_of_background(problem, fit, *splits)
+    assert size[0] == pytest.approx(expected, rel=1e-6)
+    covariance = np.linalg.inv(precision)
+    drawn = np.random.default_rng(0).multivariate_normal(np.zeros(len(covariance)), covariance, 20_000)
+    errors = np.sqrt(np.mean((drawn @ own.T) ** 2, axis=1))
+    assert np.mean(errors > limit[0]) == pytest.approx(0.05 / len(problem.columns), abs=0.012)
+    for none in unknown_of_background(replace(problem, background=None), fit, *splits):
+        assert not none.any()
 
 
 def test_a_little_worse_within_what_the_background_leaves_unknown_contradicts_nothing() -> None:

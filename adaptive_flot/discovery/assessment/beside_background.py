@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.greybox.model import FloatArray
 
 CLIPPED_TURNS = 3
+BY_CHANCE = 0.05
+"""Share of records in which one of the outputs may err beyond its limit, though nothing is wrong."""
 
 
 def drop_beside_background(problem: Problem, before: Fit, after: Fit, split: str, own: Problem | None = None) -> float:
@@ -49,20 +52,42 @@ def _beside_background(problem: Problem, fit: Fit, split: str) -> float:
     return float(left @ left + u @ u + np.linalg.slogdet(A)[1]) + clipped + spread
 
 
-def unknown_of_background(problem: Problem, fit: Fit, fitted: Sequence[str], split: str) -> FloatArray:
-    """Standard deviation (m,) of what the background of a fit leaves unknown in each output on the rows of a split.
+def unknown_of_background(
+    problem: Problem, fit: Fit, fitted: Sequence[str], split: str
+) -> tuple[FloatArray, FloatArray]:
+    """What the background of a fit leaves unknown in each output on the rows of a split: its size, and its limit.
 
-    With the whitened responses H of the rows of the `fitted` splits, and those h_k of an output in row k::
+    With the whitened responses H of the rows of the `fitted` splits, and those h_k of an output in row k of K::
 
-        v^2 = mean over k of h_k (I + H'H)^-1 h_k'
+        v^2 = tr M    with M = 1/K sum over k of h_k' h_k (I + H'H)^-1
 
-    Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (2.9). Zero without a background.
+    is the expected square of what stays unknown. Rasmussen & Williams (2006), eq. (2.9). A feed takes few independent
+    values over these rows, so that the square that shows may be much larger. It has the distribution of a weighted sum
+    of chi-squared variables, which is close to v^2 / d times one of d = (tr M)^2 / tr(M^2) degrees of freedom::
+
+        limit^2 = v^2 / d * quantile of chi^2_d at 1 - 0.05/m
+
+    Satterthwaite, *Biometrics Bull.* 2 (1946) 110; one of m outputs is beyond it by chance in 5 % of records at most.
+
+    Returns
+    -------
+    tuple
+        v (m,) and the limit (m,), in the units of the outputs; both zero without a background.
     """
+    outputs = len(problem.columns)
     if problem.background is None:
-        return np.zeros(len(problem.columns))
+        return np.zeros(outputs), np.zeros(outputs)
     responses, rows = problem.background.responses, problem.rows(*fitted)
     white = fit.noise.whiten(responses / problem.weights[:, :, None])[rows]
     H = white[np.isfinite(white).all(axis=2) & np.isfinite(problem.measured[rows])]
     covariance = np.linalg.inv(np.eye(responses.shape[2]) + H.T @ H)
     shown = responses[problem.rows(split)]
-    return np.asarray(np.sqrt(np.mean(np.einsum("kji,il,kjl->kj", shown, covariance, shown, optimize=True), axis=0)))
+    sizes, limits = np.zeros(outputs), np.zeros(outputs)
+    for j in range(outputs):
+        M = shown[:, j].T @ shown[:, j] @ covariance / len(shown)
+        mean, square = float(np.trace(M)), float(np.sum(M * M.T))
+        if mean > 0 and square > 0:
+            freedom = mean**2 / square
+            sizes[j] = np.sqrt(mean)
+            limits[j] = np.sqrt(mean * chi2.ppf(1 - BY_CHANCE / outputs, freedom) / freedom)
+    return sizes, limits

@@ -33,9 +33,9 @@ def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None
 
     Beside a background, the rows may be surely likelier: by LEAST_EVIDENCE for each effective sample, with the
     background as it is before any fit (see `drop_beside_background`). An error that is within what noise and background
-    leave unknown (see `unknown_of_background`) is not worse where it grew by less than MUCH_WORSE, or the rows are
-    likelier. A background may take up what an effect does, so that both predict alike; then likelier rows confirm it.
-    That is reason enough not to say `none`. A name asks more of the report rows.
+    leave unknown (the limit of `unknown_of_background`) is not worse where it grew by less than MUCH_WORSE, or the rows
+    are likelier. A background may take up what an effect does, so that both predict alike; then likelier rows confirm
+    it. That is reason enough not to say `none`. A name asks more of the report rows.
 
     `own` is the problem of the fit after, where its background is another.
     """
@@ -43,7 +43,7 @@ def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None
     size = problem.weights * after.noise.stationary_std()
     old, new = squared_errors(problem, before, size, rows), squared_errors(problem, after, size, rows)
     smaller, interval = reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
-    unknown = unknown_of_background(own or problem, after, ("estimate",), "confirm") / np.sqrt(
+    unknown = unknown_of_background(own or problem, after, ("estimate",), "confirm")[1] / np.sqrt(
         np.nanmean(size[rows] ** 2, axis=0)
     )
     drop = drop_beside_background(problem, before, after, "confirm", own)

@@ -95,7 +95,7 @@ class Evidence:
 
     def __init__(self, problem: Problem, scorer: Scorer, responses: Responses, feeds: Sequence[str]) -> None:
         self._price, self._time = price(problem), problem.record.time
-        C = scorer.projected(responses.of(uncertain_profiles(problem, responses)))
+        C = _usable(scorer.projected(responses.of(uncertain_profiles(problem, responses))))
         left, strength, turned = np.linalg.svd(C, full_matrices=False)
         self._turned = strength[:, None] * turned  # C = left @ _turned
         e = scorer.residual + C @ logarithms_of_factors(
@@ -108,7 +108,7 @@ class Evidence:
             offset = responses.is_offset(site)
             knots, lines = lines_of_course(problem, site, offset)
             usual = responses.usual(site) if offset else 1.0
-            X = usual * scorer.projected(responses.of(lines))
+            X = usual * _usable(scorer.projected(responses.of(lines)))
             self._feeds.append(_Feed(site, offset, usual, knots, X.T @ X, X.T @ e, left.T @ X))
 
     @cached_property
@@ -161,6 +161,11 @@ class Evidence:
     def _times(self, knots: FloatArray) -> list[float]:
         shortest, longest = 2 * (knots[1] - knots[0]), LONGEST * (self._time[-1] - self._time[0])
         return [float(t) for t in np.geomspace(shortest, max(longest, shortest), TIMES)]
+
+
+def _usable(responses: FloatArray) -> FloatArray:
+    """Responses (values, k) with zeros for what can not be simulated beside a change: it explains nothing."""
+    return np.where(np.isfinite(responses).all(axis=0), responses, 0.0)
 
 
 def drops(information: FloatArray, along: FloatArray, root: FloatArray) -> Iterator[tuple[float, float]]:

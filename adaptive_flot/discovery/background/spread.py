@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.background.evidence import LARGEST, Evidence, Spread, price
@@ -36,11 +39,12 @@ def may_have_background(problem: Problem, responses: Responses) -> bool:
 def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer | None = None) -> Spread | None:
     """The background of a record, where that explains the residual better than any effect; else None.
 
-    It competes with the effects, by first order (see `evidence`). Where one of these explains more, the best is fitted
+    It competes with the effects. Where one of these explains more to first order (see `evidence`), the best is fitted
     first, and the background is looked for in what that leaves; MOST_BEFORE at most, and one at least: an effect
-    that is far from linear must not be taken for a background. Each that is found is looked for once more, along the
-    fit that has it. Of those that were found beside more or fewer effects, that one counts whose fit together with
-    them is best: a wrong effect leaves more for the background.
+    that is far from linear must not be taken for a background. Where it explains more than any effect does nowhere,
+    all that were tried count. Each is looked for once more, along the fit that has it. Of those beside more or fewer
+    effects, that one counts whose fit together with them is best, by LEAST_EVIDENCE for each more: a wrong effect
+    leaves more for the background. It must be better than the effects alone.
 
     Parameters
     ----------
@@ -51,35 +55,47 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
     """
     if not may_have_background(problem, responses):
         return None
-    feeds, found = feeds_unseen(problem, responses), list[tuple[Spread, float]]()
-    fit, scorer = base, scorer or scorer_of(problem, base, responses)[0]
+    feeds, tried = feeds_unseen(problem, responses), list[_Tried]()
+    fit, scorer, alone = base, scorer or scorer_of(problem, base, responses)[0], base.bic
     for before in range(MOST_BEFORE + 1):
         evidence = Evidence(problem, scorer, responses, feeds)
         best = evidence.best
+        if best.evidence <= LEAST_EVIDENCE:
+            break
         # a free curve in time at any site that acts on the same output is what a course would be taken for: no rival
         rival = max((s.penalised for s in scorer.scores() if not _free_in_time(s)), default=0.0)
-        explains = best.evidence > max(LEAST_EVIDENCE, rival)
-        if explains:
-            found += _fitted(problem, evidence.but_for_what_stands_out(best), fit, responses, feeds)
-        if best.evidence <= LEAST_EVIDENCE or (explains and before):
-            break
-        extended = _with_best_effect(problem, fit, scorer) if before < MOST_BEFORE else None
+        explains = best.evidence > rival
+        tried.append(_Tried(evidence.but_for_what_stands_out(best), fit, responses, explains))
+        extended = (
+            _with_best_effect(problem, fit, scorer) if before < MOST_BEFORE and not (before and explains) else None
+        )
         if extended is None:
             break
         fit, responses = extended, Responses(problem, extended)
-        scorer = scorer_of(problem, fit, responses)[0]
-    if not explains or not found:
-        return None
-    best = min(found, key=lambda f: f[1])[0]
+        scorer, alone = scorer_of(problem, fit, responses)[0], min(alone, fit.bic)
+    chosen, cost = None, np.inf
+    for t in [t for t in tried if t.explains] or tried:
+        spread, own = min(_fitted(problem, t, feeds), key=lambda found: found[1], default=(None, np.inf))
+        if own < cost - LEAST_EVIDENCE:
+            chosen, cost = spread, own
     # what fits best as far as the last of the sizes is something else
-    return best if best.share < LARGEST else None
+    return chosen if chosen and cost < alone - LEAST_EVIDENCE and chosen.share < LARGEST else None
 
 
-def _fitted(
-    problem: Problem, first: Spread, fit: Fit, responses: Responses, feeds: Sequence[str]
-) -> list[tuple[Spread, float]]:
+@dataclass(frozen=True)
+class _Tried:
+    """A background that was found along a fit, and whether it explains more than any further effect does there."""
+
+    spread: Spread
+    fit: Fit
+    responses: Responses
+    explains: bool
+
+
+def _fitted(problem: Problem, tried: _Tried, feeds: Sequence[str]) -> list[tuple[Spread, float]]:
     """A background, and what is found along the fit that has it, each with the BIC of its fit and its own numbers."""
-    fitted = fit_with_background(problem, first, fit, responses, turns=0)
+    first = tried.spread
+    fitted = fit_with_background(problem, first, tried.fit, tried.responses, turns=0)
     if fitted is None:
         return []
     found = [(first, fitted[1].bic + first.numbers * price(problem))]
@@ -91,9 +107,13 @@ def _fitted(
 
 
 def _with_best_effect(problem: Problem, fit: Fit, scorer: Scorer) -> Fit | None:
-    """The fit with the best of the few effects that score best on top; None where none brings evidence."""
+    """The fit with the best of the few effects that score best on top; None where none brings evidence.
+
+    A free curve in time is none of them: it would be the course of the feed, at any site that acts on the same output.
+    """
     fitter = Fitter(problem)
-    fits = [fit_variant(fitter, fit, score, MOST_STEPS) for score in shortlist(scorer, FITTED)]
+    named = [score for score in shortlist(scorer) if not _free_in_time(score)]
+    fits = [fit_variant(fitter, fit, score, MOST_STEPS) for score in named[:FITTED]]
     good = [again for again in fits if again is not None and again.bic < fit.bic - LEAST_EVIDENCE]
     return min(good, key=lambda again: again.bic, default=None)
 

@@ -30,17 +30,18 @@ def heed_report(state: State) -> State:
     beside = state.problem_after or problem
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
-    unknown, likelier = np.zeros(len(error)), 0.0
+    unknown = limit = np.zeros(len(error))
+    likelier = 0.0
     if state.report_record is None:
-        each = unknown_of_background(beside, after, ("estimate", "confirm"), "report")
         names = [after.model.outputs[c].name for c in problem.columns]
-        unknown = each[[names.index(c.output) for c in error]]
+        shown = [names.index(c.output) for c in error]
+        unknown, limit = (v[shown] for v in unknown_of_background(beside, after, ("estimate", "confirm"), "report"))
         if judgement.word in ("named", "class"):
             likelier = drop_beside_background(problem, before, after, "report", beside)
             likelier /= rows_per_effective_sample(problem, before, after)
     surely = likelier > LEAST_EVIDENCE
     alike = taken_up(problem, constants_told(judgement))
-    against = contradiction(judgement, error, noise, unknown, surely, alike)
+    against = contradiction(judgement, error, noise, limit, surely, alike)
     if not against and state.report_record is None:
         last = last_report_rows(problem)
         at_the_end = changes(last, before, after, "report")

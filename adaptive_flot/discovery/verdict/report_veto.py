@@ -41,8 +41,8 @@ def contradiction(
 
     An output is worse where its error after, a, is above ``AT_NOISE s`` and either ``a > (1 + MUCH_WORSE) b`` or
     ``a > (1 + WORSE) b`` with a 95 % interval of the reduction below zero; b is its error before and s its noise. The
-    second does not count below ``AT_NOISE sqrt(s^2 + v^2)``, where v is what the background leaves unknown there: so
-    small a difference is the course of a feed, which these rows did not fit.
+    second does not count below ``AT_NOISE sqrt(s^2 + v^2)``, where v is the limit of what the background leaves unknown
+    there: so small a difference is the course of a feed, which these rows did not fit.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def contradiction(
     noise
         Noise of each of these outputs from row to row, which no model has fitted (m,).
     unknown
-        Standard deviation of what the background leaves unknown in each of them (m,), see `unknown_of_background`.
+        Limit of what the background leaves unknown in each of them (m,), see `unknown_of_background`.
     likelier
         Whether these rows are surely likelier than with the background alone. Then no error is worse that is within
         what noise and background leave unknown, and one that is much smaller is reason enough (see `much_better`).
