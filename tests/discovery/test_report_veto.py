@@ -12,6 +12,7 @@ from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,
+    explains_little,
     last_report_rows,
     noise_from_row_to_row,
     unexplained,
@@ -124,6 +125,18 @@ def test_none_asks_for_a_residual_at_the_level_of_a_noise_that_no_model_has_fitt
     far, near = _change(5.77, 5.4, 0.0, 0.1), _change(0.2, 0.2, 0.0, 0.1)
     assert "5.4 K (54 times)" in unexplained([far], NOISE)
     assert unexplained([near], NOISE) == "" == unexplained([far], np.array([0.0]))
+
+
+def test_what_leaves_nearly_all_of_a_large_error_is_no_name() -> None:
+    """Measured: the slip of the gas was named for a bubble size. It removed 7 % of the error and left 40 noises."""
+    noise = np.array([0.1, 0.1])
+    little, hardly = _change(0.7, 0.56, 0.1, 0.3), replace(_change(4.0, 3.95, -0.01, 0.1), output="flow")
+    said = explains_little([little, hardly], noise)
+    assert "removes only 3 % of the squared error" in said
+    assert "flow 3.95 K (40 times)" in said
+    assert not explains_little([little, replace(hardly, after=2.0)], noise)  # most of the error is gone
+    assert not explains_little([_change(0.4, 0.39, 0.01, 0.1)], noise[:1])  # little is left
+    assert not explains_little([little, hardly], np.array([0.1, 0.9]))  # what is left is noise, or a feed
 
 
 def test_the_stage_turns_a_none_that_explains_nothing_into_an_abstention(draught: Discovery) -> None:

@@ -17,6 +17,7 @@ from adaptive_flot.discovery.verdict.outputs import certain_words
 from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,
+    explains_little,
     last_report_rows,
     noise_from_row_to_row,
     surely_better,
@@ -46,6 +47,8 @@ def heed_report(state: State) -> State:
         last = last_report_rows(problem)
         at_the_end = changes(last, before, after, "report")
         against = contradiction_at_the_end(judgement, at_the_end, noise_from_row_to_row(last, before.model, at_the_end))
+    if not against and judgement.word in ("named", "class"):
+        against = explains_little(error, np.hypot(noise, unknown))
     if against:
         judgement = replace(judgement, word="abstain", members=(), part=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""

@@ -1,11 +1,11 @@
 """The report split has a veto: what held-out rows contradict is not told as a name.
 
-A name is contradicted where an output gets worse on these rows, or where no output surely gets better. Beside a
-background the likelihood of these rows may stand for that, as it knows what a wandering feed does to the error: where
-they are surely likelier, one error must be much smaller. The constants of a background, each a little off, may also
-predict what one does that is far off: then no error need be smaller. A free curve in time at a sensor must also hold on
-the last of these rows, which lie beyond all that it was fitted to: such a curve can mimic any residual between rows
-that it has seen.
+A name is contradicted where an output gets worse on these rows, where no output surely gets better, or where nearly all
+of a large error is left. Beside a background the likelihood of these rows may stand for that, as it knows what a
+wandering feed does to the error: where they are surely likelier, one error must be much smaller. The constants of a
+background, each a little off, may also predict what one does that is far off: then no error need be smaller. A free
+curve in time at a sensor must also hold on the last of these rows, which lie beyond all that it was fitted to: such a
+curve can mimic any residual between rows that it has seen.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from adaptive_flot.greybox.model import FloatArray, Model
 
 BETTER = 0.01
 """Share by which the error of one output must fall: less is certain at times, and nothing that a user would see."""
+LITTLE = 0.1
+"""Share of the squared error that a name must remove where much is left: less may be any name's."""
 FAR_FROM_NOISE = 5.0
 """An error of so many times the noise is not explained, whatever the noise model says. Noise that is allowed to be
 coloured has up to three times what its differences show."""
@@ -102,6 +104,26 @@ def unexplained(changes: Sequence[OutputChange], noise: FloatArray) -> str:
     far = [(c, s) for c, s in zip(changes, noise, strict=True) if s > 0 and c.after > FAR_FROM_NOISE * s]
     said = ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({c.after / s:.0f} times)" for c, s in far)
     return f"The error is far above the noise from row to row: {said}." if far else ""
+
+
+def explains_little(changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """Why a name is not told that leaves nearly all of a large error, in words; empty where it does not.
+
+    With the errors b before and a after, and the noise s, of each output j::
+
+        sum_j (a_j / s_j)^2 > (1 - LITTLE) sum_j (b_j / s_j)^2
+
+    and an output is far from its noise (see `unexplained`, whose arguments these are). What is left then bends
+    whichever name is tried.
+    """
+    seen = [(c.before / s, c.after / s) for c, s in zip(changes, noise, strict=True) if s > 0]
+    before, after = (sum(e[k] ** 2 for e in seen) for k in (0, 1))
+    if not after > (1 - LITTLE) * before or not (left := unexplained(changes, noise)):
+        return ""
+    removed = 100 * max(0.0, 1 - after / before)
+    return (
+        f"on held-out rows it removes only {removed:.0f} % of the squared error, over all outputs. {left.rstrip('.')}"
+    )
 
 
 def _is_worse(change: OutputChange, noise: float, with_background: float = 0.0) -> bool:
