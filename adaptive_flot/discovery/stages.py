@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from adaptive_flot.discovery.results import State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
 from adaptive_flot.discovery.search.rounds import scorer_of
-from adaptive_flot.discovery.search.search import search
+from adaptive_flot.discovery.search.search import first_round, search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
@@ -126,33 +127,29 @@ def allow_for_background(state: State) -> State:
     return replace(state, problem=problem, base=base, responses=Responses(problem, base))
 
 
-def search_one_by_one(state: State) -> State:
-    """Add one effect after the other, as long as each brings evidence and substance; confirm the best."""
+def fit_single_effects(state: State) -> State:
+    """Fit single effects; where the background has other numbers beside the best of them, once more beside that."""
     problem, base = state.fitted
     state.progress("score")
     scored = state.scored or scorer_of(problem, base, state.responses)
+    run = partial(first_round, processes=state.processes, progress=state.progress)
+    first = run(problem, base, rescaled(state.model, factors_of(base.model)), scored=scored)
     state = replace(state, responses=None, scored=None)
-    nominal = rescaled(state.model, factors_of(base.model))
-    found = search(problem, base, nominal, scored=scored, processes=state.processes, progress=state.progress)
-    return replace(state, search=found)
+    if problem.background is not None and first.round.alternatives:
+        state.progress("look for the background beside the best effect")
+        again = renewed(problem, base, first.round.alternatives[0].fit)
+        if again is not None:
+            problem, base = again
+            first = run(problem, base, rescaled(state.model, factors_of(base.model)))
+    return replace(state, problem=problem, base=base, first=first)
 
 
-def search_beside_renewed_background(state: State) -> State:
-    """Search once more where the background has other numbers beside the best effect than it had before."""
-    problem, result = state.searched
-    if problem.background is None or not result.alternatives:
-        return state
-    state.progress("look for the background beside the best effect")
-    again = renewed(problem, result.base, result.alternatives[0].fit)
-    if again is None:
-        return state
-    state.progress("search once more, beside another background")
-    problem, base = again
+def search_one_by_one(state: State) -> State:
+    """Add one effect after the other, as long as each brings evidence and substance; confirm the best."""
+    problem, base = state.fitted
     nominal = rescaled(state.model, factors_of(base.model))
-    found = search(problem, base, nominal, processes=state.processes, progress=state.progress)
-    if not found.alternatives or problem.time_is_up:
-        return state
-    return replace(state, problem=problem, base=base, search=found)
+    found = search(problem, base, nominal, first=state.first, processes=state.processes, progress=state.progress)
+    return replace(state, search=found, first=None)
 
 
 def search_at_once(state: State) -> State:

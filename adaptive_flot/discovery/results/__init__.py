@@ -9,7 +9,15 @@ verdict.py       Of a discovery: the verdict, its named effects, and all of the 
 state.py         What the stages of `discover` hand on.
 """
 
-from adaptive_flot.discovery.results.alternatives import SURE, Alternative, Judgement, Round, SearchResult, Word
+from adaptive_flot.discovery.results.alternatives import (
+    SURE,
+    Alternative,
+    FirstRound,
+    Judgement,
+    Round,
+    SearchResult,
+    Word,
+)
 from adaptive_flot.discovery.results.evidence import Detection, Location, OutputChange, Place, Symptom, Verification
 from adaptive_flot.discovery.results.experiment import WATCHING, Experiment, Pair, Tried
 from adaptive_flot.discovery.results.state import State
@@ -22,6 +30,7 @@ __all__ = [
     "Detection",
     "Discovery",
     "Experiment",
+    "FirstRound",
     "Judgement",
     "Location",
     "NamedEffect",

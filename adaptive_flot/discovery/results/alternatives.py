@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.step_events import SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
@@ -87,6 +87,25 @@ class Round:
     threshold: float
     alternatives: tuple[Alternative, ...]
     compared: bool = True
+
+
+@dataclass(frozen=True)
+class FirstRound:
+    """Single effects on top of a base fit.
+
+    Attributes
+    ----------
+    scorer
+        Scores along that fit.
+    sites
+        Sites of its adapted parameters.
+    round
+        What the effects came to.
+    """
+
+    scorer: Scorer
+    sites: tuple[str, ...]
+    round: Round
 
 
 @dataclass(frozen=True)

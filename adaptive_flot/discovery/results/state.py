@@ -10,7 +10,7 @@ from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
-from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult
+from adaptive_flot.discovery.results.alternatives import FirstRound, Judgement, SearchResult
 from adaptive_flot.discovery.results.evidence import Detection, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
 from adaptive_flot.discovery.results.verdict import Discovery, Verdict
@@ -48,6 +48,8 @@ class State:
         Linear responses along that fit, until the search has used them.
     scored
         Scores along that fit and sites of adapted parameters, where a stage before the search has needed them.
+    first
+        Single effects on top of that fit, until the search goes on from there.
     detection
         What the residual of that fit shows.
     search, judgement
@@ -86,6 +88,7 @@ class State:
     base: Fit | None = None
     responses: Responses | None = None
     scored: tuple[Scorer, tuple[str, ...]] | None = None
+    first: FirstRound | None = None
     detection: Detection | None = None
     search: SearchResult | None = None
     judgement: Judgement | None = None

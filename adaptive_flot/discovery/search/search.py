@@ -12,7 +12,7 @@ from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.results import Alternative, Round, SearchResult
+from adaptive_flot.discovery.results import Alternative, FirstRound, Round, SearchResult
 from adaptive_flot.discovery.search.exchange import with_exchanges
 from adaptive_flot.discovery.search.rounds import run_round, scorer_of, threshold_of, what_is_left
 from adaptive_flot.discovery.search.substance import better, worth_extending
@@ -25,12 +25,32 @@ BEAM = 2
 """Alternatives of one round that the next extends."""
 
 
-def search(
+def first_round(
     problem: Problem,
     base: Fit,
     nominal: Model,
     *,
     scored: tuple[Scorer, tuple[str, ...]] | None = None,
+    processes: int = 1,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> FirstRound:
+    """Single effects on top of a base fit; arguments are as in `search`.
+
+    `scored` is what `scorer_of` gives for the base fit, where it is known already.
+    """
+    fitter = Fitter(problem)
+    scorer, sites = scored or scorer_of(problem, base)
+    near = _near(fitter, base, nominal)
+    scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
+    return FirstRound(scorer, sites, run_round(fitter, base, scorers, [None], processes, progress))
+
+
+def search(
+    problem: Problem,
+    base: Fit,
+    nominal: Model,
+    *,
+    first: FirstRound | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> SearchResult:
@@ -42,22 +62,20 @@ def search(
         The record and the fit of the model as it is, on the estimation split.
     nominal
         The model with the parameter values it came with.
-    scored
-        What `scorer_of` gives for the base fit, where it is known already.
+    first
+        What `first_round` gives for them, where it is known already.
     processes
         Fits that run at once.
     progress
         Called with a word for each stage.
     """
     fitter = Fitter(problem)
-    scorer, sites = scored or scorer_of(problem, base)
-    near = _near(fitter, base, nominal)
-    scorers = [scorer] if near is None else [scorer, scorer_of(problem, near)[0]]
-    rounds = [run_round(fitter, base, scorers, [None], processes, progress)]
+    first = first or first_round(problem, base, nominal, processes=processes, progress=progress)
+    rounds = [first.round]
     accepted: list[Round] = []
     best: Alternative | None = None
     beam: list[Alternative | None] = [None]
-    left = what_is_left(scorer, rounds[0].threshold)
+    left = what_is_left(first.scorer, rounds[0].threshold)
     while better(problem, base, best, rounds[-1]):
         if best is not None:
             rounds[-1] = with_exchanges(fitter, base, rounds[-1], beam, processes, progress)
@@ -71,7 +89,7 @@ def search(
         beam = _beam(rounds[-1], best, BEAM)
         rounds.append(run_round(fitter, base, [scorer], beam, processes, progress))
     slow_s = max(SLOW_S, SLOW_ROWS * problem.record.dt)
-    return _confirmed(problem, SearchResult(base, tuple(rounds), (), None, *left, sites, slow_s=slow_s), accepted)
+    return _confirmed(problem, SearchResult(base, tuple(rounds), (), None, *left, first.sites, slow_s=slow_s), accepted)
 
 
 def _near(fitter: Fitter, base: Fit, nominal: Model) -> Fit | None:
