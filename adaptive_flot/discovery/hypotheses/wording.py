@@ -12,6 +12,7 @@ from adaptive_flot.greybox.model import Model
 
 MOST_TIMES = 6
 """Times that a sentence lists at most."""
+NOTHING = "next to nothing"
 
 
 def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
@@ -63,7 +64,7 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.effect.mode == "offset":
         more = f"{abs(change):.3g}{unit} {'more' if change > 0 else 'less'}"
         return f"{name} depends on {driver}: {more} at {driver} {high:.3g} than at {low:.3g}"
-    return f"{name} depends on {driver}: {_factor(change)} at {driver} {high:.3g} than at {low:.3g}"
+    return f"{name} depends on {driver}: {_compared(change, f'{driver} {high:.3g}', f'{low:.3g}')}"
 
 
 def _at_its_end(value: float, h: Hypothesis) -> float:
@@ -77,10 +78,18 @@ def _at_its_end(value: float, h: Hypothesis) -> float:
 def _factor(log: float) -> str:
     factor = float(np.exp(log))
     if factor < 0.02:
-        return "next to nothing"
+        return NOTHING
     if 0.5 < factor < 2.0:
         return f"{abs(100 * (factor - 1)):.0f} % {'larger' if factor > 1 else 'smaller'}"
     return f"{factor:.2g} times as large"
+
+
+def _compared(log: float, here: str, there: str) -> str:
+    """How a value compares at two places: `2 times as large at flow 4 as at 1`, `20 % larger at flow 4 than at 1`."""
+    factor = _factor(log)
+    if factor.endswith("times as large"):
+        return f"{factor} at {here} as at {there}"
+    return f"{factor} at {here}, unlike at {there}" if factor == NOTHING else f"{factor} at {here} than at {there}"
 
 
 def _swings(size: float, period: float, mode: str, unit: str) -> str:
