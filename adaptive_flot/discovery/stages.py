@@ -16,6 +16,7 @@ from adaptive_flot.discovery.background.fitting import (
     with_course_told,
     without_constants,
 )
+from adaptive_flot.discovery.background.linear import feeds_unseen
 from adaptive_flot.discovery.background.renewed import renewed
 from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
 from adaptive_flot.discovery.background.told_course import with_courses
@@ -134,10 +135,10 @@ def fit_single_effects(state: State) -> State:
     scored = state.scored or scorer_of(problem, base, state.responses)
     run = partial(first_round, processes=state.processes, progress=state.progress)
     first = run(problem, base, rescaled(state.model, factors_of(base.model)), scored=scored)
-    state = replace(state, responses=None, scored=None)
-    if problem.background is not None and first.round.alternatives:
+    responses, state = state.responses, replace(state, responses=None, scored=None)
+    if problem.background is not None and responses is not None and first.round.alternatives:
         state.progress("look for the background beside the best effect")
-        again = renewed(problem, base, first.round.alternatives[0].fit)
+        again = renewed(problem, base, first.round.alternatives[0].fit, feeds_unseen(problem, responses))
         if again is not None:
             problem, base = again
             first = run(problem, base, rescaled(state.model, factors_of(base.model)))

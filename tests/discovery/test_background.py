@@ -209,6 +209,17 @@ def test_the_outputs_of_a_course_are_linear_in_it() -> None:
     )
 
 
+def test_what_can_not_be_simulated_explains_nothing() -> None:
+    """A response that is not finite ended the search with a defect (development record 43 of seed 2030)."""
+    problem, fit, responses = _fitted(record_in_a_room(0.0))
+    scorer = scorer_of(problem, fit, responses)[0]
+    two = np.ones((*problem.measured.shape, 2)) * np.arange(len(problem.record))[:, None, None]
+    two[50, :, 1] = np.nan
+    projected = scorer.projected(two)
+    assert projected[:, 0].any()
+    assert not projected[:, 1].any()
+
+
 def test_the_background_is_looked_for_once_more_beside_the_best_effect() -> None:
     """A room that is said to wander by eight times as much takes up the draught; beside the draught it has its size."""
     problem, fit, responses = _fitted(record_in_a_room(STD, exponent=0.6))
@@ -216,14 +227,14 @@ def test_the_background_is_looked_for_once_more_beside_the_best_effect() -> None
     assert beside is not None
     found = search(*beside, tank_in_a_room()).alternatives[0]
     assert found.names == (("heat_loss", "fan_speed"),)
-    again = renewed(*beside, found.fit)
+    again = renewed(*beside, found.fit, ["room"])
     assert again is not None
     background = again[0].background
     assert background is not None
     assert background.course is not None
     rate = background.course.std / np.sqrt(background.course.time)
     assert 1 / 1.5 < rate / (STD / np.sqrt(TIME)) < 1.5
-    assert renewed(*again, search(*again, tank_in_a_room()).alternatives[0].fit) is None  # it stays
+    assert renewed(*again, search(*again, tank_in_a_room()).alternatives[0].fit, ["room"]) is None  # it stays
 
 
 @pytest.mark.parametrize("seed", [0, 1])

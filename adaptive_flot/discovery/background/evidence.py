@@ -24,6 +24,7 @@ from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.background.linear import lines_of_course, uncertain_constants, uncertain_profiles
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
+from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.background import Course, root_of_covariance
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.model import FloatArray
@@ -77,6 +78,11 @@ def price(problem: Problem) -> float:
     return float(np.log(max(problem.count(problem.rows("estimate")), 2)))
 
 
+def cost(problem: Problem, fit: Fit, numbers: int) -> float:
+    """Criterion of a fit with the price of so many numbers of its background."""
+    return fit.bic + numbers * price(problem)
+
+
 @dataclass(frozen=True)
 class _Feed:
     """A course that is tried: its site, knots, and products of its responses X with each other, with e and with C."""
@@ -95,7 +101,7 @@ class Evidence:
 
     def __init__(self, problem: Problem, scorer: Scorer, responses: Responses, feeds: Sequence[str]) -> None:
         self._price, self._time = price(problem), problem.record.time
-        C = _usable(scorer.projected(responses.of(uncertain_profiles(problem, responses))))
+        C = scorer.projected(responses.of(uncertain_profiles(problem, responses)))
         left, strength, turned = np.linalg.svd(C, full_matrices=False)
         self._turned = strength[:, None] * turned  # C = left @ _turned
         e = scorer.residual + C @ logarithms_of_factors(
@@ -108,7 +114,7 @@ class Evidence:
             offset = responses.is_offset(site)
             knots, lines = lines_of_course(problem, site, offset)
             usual = responses.usual(site) if offset else 1.0
-            X = usual * _usable(scorer.projected(responses.of(lines)))
+            X = usual * scorer.projected(responses.of(lines))
             self._feeds.append(_Feed(site, offset, usual, knots, X.T @ X, X.T @ e, left.T @ X))
 
     @cached_property
@@ -161,11 +167,6 @@ class Evidence:
     def _times(self, knots: FloatArray) -> list[float]:
         shortest, longest = 2 * (knots[1] - knots[0]), LONGEST * (self._time[-1] - self._time[0])
         return [float(t) for t in np.geomspace(shortest, max(longest, shortest), TIMES)]
-
-
-def _usable(responses: FloatArray) -> FloatArray:
-    """Responses (values, k) with zeros for what can not be simulated beside a change: it explains nothing."""
-    return np.where(np.isfinite(responses).all(axis=0), responses, 0.0)
 
 
 def drops(information: FloatArray, along: FloatArray, root: FloatArray) -> Iterator[tuple[float, float]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
-from adaptive_flot.discovery.background.evidence import LARGEST, Evidence, Spread, price
+from adaptive_flot.discovery.background.evidence import LARGEST, Evidence, Spread, cost
 from adaptive_flot.discovery.background.fitting import fit_with_background, spread_along, without_background
 from adaptive_flot.discovery.background.linear import feeds_unseen, uncertain_constants
 from adaptive_flot.discovery.candidates.responses import Responses
@@ -73,13 +73,13 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
             break
         fit, responses = extended, Responses(problem, extended)
         scorer, alone = scorer_of(problem, fit, responses)[0], min(alone, fit.bic)
-    chosen, cost = None, np.inf
+    chosen, least = None, np.inf
     for t in [t for t in tried if t.explains] or tried:
         spread, own = min(_fitted(problem, t, feeds), key=lambda found: found[1], default=(None, np.inf))
-        if own < cost - LEAST_EVIDENCE:
-            chosen, cost = spread, own
+        if own < least - LEAST_EVIDENCE:
+            chosen, least = spread, own
     # what fits best as far as the last of the sizes is something else
-    return chosen if chosen and cost < alone - LEAST_EVIDENCE and chosen.share < LARGEST else None
+    return chosen if chosen and least < alone - LEAST_EVIDENCE and chosen.share < LARGEST else None
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,11 @@ def _fitted(problem: Problem, tried: _Tried, feeds: Sequence[str]) -> list[tuple
     fitted = fit_with_background(problem, first, tried.fit, tried.responses, turns=0)
     if fitted is None:
         return []
-    found = [(first, fitted[1].bic + first.numbers * price(problem))]
+    found = [(first, cost(problem, fitted[1], first.numbers))]
     more = spread_along(problem, *fitted, feeds)
     bare = without_background(*fitted)
     if more.numbers and (again := fit_with_background(problem, more, bare, Responses(problem, bare), turns=0)):
-        found.append((more, again[1].bic + more.numbers * price(problem)))
+        found.append((more, cost(problem, again[1], more.numbers)))
     return found
 
 

@@ -18,7 +18,7 @@ from adaptive_flot.discovery.assessment.likelihood import (
     rows_per_effective_sample,
 )
 from adaptive_flot.discovery.assessment.verification import verify
-from adaptive_flot.discovery.background.evidence import Spread, price
+from adaptive_flot.discovery.background.evidence import Spread, cost
 from adaptive_flot.discovery.background.fitting import fit_with_background, without_background
 from adaptive_flot.discovery.background.linear import LEAST_ROWS, MOST_KNOTS
 from adaptive_flot.discovery.background.two_courses import TwoCourses
@@ -164,7 +164,7 @@ class _Run:
 def _better_alone(problem: Problem, run: _Run, first: Spread, again: Spread) -> tuple[Problem, Fit, int]:
     """The feed alone, with the numbers that it has or those that are sought as for two courses, and how many."""
     made = fit_with_background(run.plain, again, run.bare, run.responses)
-    if made is None or _cost(problem, made[1], again.numbers) > _cost(problem, run.there, first.numbers):
+    if made is None or cost(problem, made[1], again.numbers) > cost(problem, run.there, first.numbers):
         return problem, run.there, first.numbers
     return *made, again.numbers
 
@@ -180,10 +180,6 @@ def _bic_with_constant(problem: Problem, base: Fit, site: str) -> float:
     return fit.bic if fit is not None else float("inf")
 
 
-def _cost(problem: Problem, fit: Fit, numbers: int) -> float:
-    return fit.bic + numbers * price(problem)
-
-
 def _paid(problem: Problem, fit: Fit, numbers: int) -> Fit:
     """The fit with the price of so many numbers more than the base fit has in its criterion."""
-    return replace(fit, bic=_cost(problem, fit, numbers))
+    return replace(fit, bic=cost(problem, fit, numbers))

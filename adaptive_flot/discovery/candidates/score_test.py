@@ -205,11 +205,14 @@ class Scorer:
         return self.problem.noise(full, self.rows)
 
     def projected(self, responses: FloatArray) -> FloatArray:
-        """Whitened responses M X (values present, r) of plain ones X (N, m, r), without what is free already."""
+        """Whitened responses M X (values present, r) of plain ones X (N, m, r), without what is free already.
+
+        Zeros for what can not be simulated beside a change: it explains nothing.
+        """
         weighted = (responses / self.problem.weights[:, :, None])[self._reached]
         white = self._whitened(weighted)
         white -= self._base @ (self._base.T @ white)
-        return white
+        return np.where(np.isfinite(white).all(axis=0), white, 0.0)
 
     def scores(self) -> list[Score]:
         """Scores of all candidates, best first."""
