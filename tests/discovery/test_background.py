@@ -213,7 +213,7 @@ def test_what_can_not_be_simulated_explains_nothing() -> None:
     """A response that is not finite ended the search with a defect (development record 43 of seed 2030)."""
     problem, fit, responses = _fitted(record_in_a_room(0.0))
     scorer = scorer_of(problem, fit, responses)[0]
-    two = np.ones((*problem.measured.shape, 2)) * np.arange(len(problem.record))[:, None, None]
+    two = np.ones((*problem.measured.shape, 2)) * np.arange(float(len(problem.record)))[:, None, None]
     two[50, :, 1] = np.nan
     projected = scorer.projected(two)
     assert projected[:, 0].any()
