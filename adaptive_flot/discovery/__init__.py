@@ -18,6 +18,7 @@ hypotheses/   Named hypotheses about several records: what has changed since a r
 innovations/  A second opinion with process noise: when something happened, and what it may be.
 discover.py   What is called for one record: the stages, one after the other.
 stages.py     The stages, from the data to the proposed test.
+fallbacks.py  What is still told where the whole is not: a course, or a part.
 changes.py    What has changed since a reference, events too.
 
 Where a statistic is computed

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.innovations.second_opinion import second_opinion
 from adaptive_flot.discovery.record.screening import Screening
@@ -123,6 +124,8 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     judge_alternatives,
     fit_without_report,
     heed_report,
+    try_as_course,
+    tell_part_alone,
     second_opinion,
     plan_test,
     conclude,

@@ -57,7 +57,7 @@ def with_exchanges(
             continue
         progress("what else it may be")
         scorer, _ = scorer_of(problem, rest.fit)
-        again = run_round(fitter, base, [scorer], [rest], processes, progress, EXCHANGED)
+        again = run_round(fitter, base, [scorer], [rest], processes, progress, EXCHANGED, best)
         alternatives = ranked(problem, base, [*latest.alternatives, *again.alternatives])
         latest = replace(latest, alternatives=alternatives, compared=latest.compared and again.compared)
     return latest

@@ -38,6 +38,7 @@ def run_round(
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
     further: int = SHORTLIST_FURTHER,
+    rival: Alternative | None = None,
 ) -> Round:
     """Fit the candidates that score best on top of each alternative of the beam, and rank what they came to.
 
@@ -53,6 +54,8 @@ def run_round(
         As in `search`.
     further
         Candidates that are refitted as further effects.
+    rival
+        A set of as many effects that is known already: what does not come near it after a few steps is left there.
     """
     problem, threshold = fitter.problem, max(map(threshold_of, scorers))
     scores = tuple(scorers[0].scores())
@@ -72,7 +75,10 @@ def run_round(
             wanted = [s for s in wanted if s.penalised > threshold]
             linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")
-        fitted, all_of_them = refit(fitter, base, linearisations, before, processes, lambda s: progress(f"fit {s}"))
+        rival = min([*filter(None, [rival]), *alternatives], key=lambda a: a.fit.bic, default=None)
+        fitted, all_of_them = refit(
+            fitter, base, linearisations, before, processes, lambda s: progress(f"fit {s}"), rival
+        )
         alternatives += fitted
         compared = compared and all_of_them
     if alternatives and beam[0] is not None and not problem.time_is_up:

@@ -67,16 +67,21 @@ def refit(
     before: Alternative | None = None,
     processes: int = 1,
     done: Callable[[str], None] = lambda what: None,
+    rival: Alternative | None = None,
 ) -> tuple[list[Alternative], bool]:
     """Fit each shortlisted candidate on top of `before` (the base model by default), best first; and whether all were.
 
     They were not where the time was up before every finalist had been fitted to the end.
 
     A candidate may start from several linearisations; only that in which it comes furthest in the first rung goes on.
+    Where a `rival` of as many effects is known already, only those go on that come near it.
     """
     halving = _SuccessiveHalving(fitter, base, linearisations, before, processes, done)
     first = halving.first()
-    last = halving.last(first)
+    went_on = [fitted for fitted in first if halving.keeps_up(fitted.alternative, rival, NEAR_FINALIST)]
+    if not went_on:
+        return [fitted.alternative for fitted in best_of_each(first)], not fitter.problem.time_is_up
+    last = halving.last(went_on)
     compared = not fitter.problem.time_is_up
     followers = halving.followers(last)
     bent = halving.bent(followers, last)
@@ -84,8 +89,9 @@ def refit(
     best = best_of_each([*halving.trimmed(best[:MOST_FREED]), *best])
     ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(best, last), *best])]
     done("the leaders at every row")
-    exact = _all_exact(fitter, base, ranked[:LEADERS], processes)
-    return sorted([*exact, *ranked[LEADERS:]], key=lambda a: a.fit.bic), compared
+    leaders = [a for a in ranked[:LEADERS] if halving.keeps_up(a, rival or ranked[0], CLOSE_GAIN)]
+    exact = _all_exact(fitter, base, leaders, processes)
+    return sorted([*exact, *(a for a in ranked if a not in leaders)], key=lambda a: a.fit.bic), compared
 
 
 class _SuccessiveHalving:
@@ -131,6 +137,13 @@ class _SuccessiveHalving:
             if fit
         ]
         return sorted(done, key=lambda fitted: fitted.alternative.fit.bic)
+
+    def keeps_up(self, a: Alternative, rival: Alternative | None, share: float) -> bool:
+        """Whether an alternative gained at least a share of what a rival did, over what both stand on."""
+        if rival is None:
+            return True
+        begun = self.before.gain if self.before else 0.0
+        return a.gain - begun >= share * (rival.gain - begun)
 
     def _start(self, linearisation: int) -> Fit:
         return self.linearisations[linearisation].scorer.fit

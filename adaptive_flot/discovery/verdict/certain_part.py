@@ -11,10 +11,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import changes, verify
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, SearchResult
-from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, Name, same_site
+from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, SearchResult, Verification
+from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN, MOST_RIVALS, Name, same_site
 
 VISIBLE = 1.4
 """An output is wrong without the part: its error is so many times its noise, so half of its square is no noise."""
@@ -35,8 +36,7 @@ def with_certain_part(problem: Problem, result: SearchResult, judged: Judgement)
         return judged
     near = [best, *(a for a in result.alternatives if a is not best and judged.near(a))]
     known = dict(zip(best.names, best.known, strict=True))
-    sure = [n for n in best.names if all(n in a.names for a in near) and n not in same_site(best.names)]
-    part = tuple(n for n in sure if _rests_on_an_output(problem, result, best, {n}))
+    part = tuple(n for n in _in_all(near) if _rests_on_an_output(problem, result, best, {n}))
     if named := tuple(n for n in part if known[n]):
         return replace(judged, word="named", part=named)
     if part:
@@ -45,6 +45,34 @@ def with_certain_part(problem: Problem, result: SearchResult, judged: Judgement)
         if _rests_on_an_output(problem, result, best, set(members)):
             return replace(judged, word="class", members=members, part=(members[0],))
     return judged
+
+
+def part_alone(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[Judgement, Verification] | None:
+    """The effect that may be named alone where a set of effects is not told, and its verification; None for no such.
+
+    It is surely the best of the single effects, and every set that comes near the best one has it. What else is off
+    stays open, so sets count as near by LEAST_MARGIN and SURE alone (see `judge`), not by what the best one lacks. The
+    effect must be known by name, and as a model of its own surely better than none on the confirm split.
+    """
+    best, singles = judged.best, result.rounds[0].alternatives
+    if judged.word != "abstain" or best is None or len(best.names) < 2 or not problem.whiten or not singles:
+        return None
+    part, margin = singles[0], LEAST_MARGIN * result.rows_per_effective_sample
+    sds = loglik_difference_sds(problem, part.fit, [a.fit for a in singles])
+    rivals = [replace(a, loglik_difference_sd=sd) for a, sd in zip(singles[1:], sds[1:], strict=True)]
+    near = [best, *(a for a in result.alternatives if a is not best and a.near(best, margin))]
+    if not all(part.known) or part.names[0] not in _in_all(near) or any(a.near(part, margin) for a in rivals):
+        return None
+    checked = verify(problem, result.base, part.fit, part.problem)
+    if not checked.confirmed:
+        return None
+    return Judgement("named", part, (), tuple(rivals[:MOST_RIVALS]), margin), checked
+
+
+def _in_all(near: Sequence[Alternative]) -> list[Name]:
+    """Names of the first set that all have, but for two dependences of one quantity: these are no two causes."""
+    best, twice = near[0], same_site(near[0].names)
+    return [n for n in best.names if all(n in a.names for a in near) and n not in twice]
 
 
 def _one_of_each(near: Sequence[Alternative]) -> Iterator[tuple[Name, ...]]:
