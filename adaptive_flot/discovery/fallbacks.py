@@ -13,6 +13,7 @@ from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.stages import fit_without_report, judge_alternatives, tell_background
 from adaptive_flot.discovery.verdict.certain_part import part_alone
 from adaptive_flot.discovery.verdict.heed_report import heed_report
+from adaptive_flot.discovery.verdict.wording import beside_a_part
 
 TELLS = ("named", "class")
 
@@ -52,7 +53,8 @@ def tell_part_alone(state: State) -> State:
     told = _heard(replace(state, judgement=judgement, search=replace(result, verification=checked)), state)
     if told is state:
         return state
-    return replace(told, certain="Something else is off beside it, which this record does not tell.")
+    beside = beside_a_part(replace(state.judged, part=judgement.best.names if judgement.best else ()))
+    return replace(told, certain=beside.rstrip())
 
 
 def _heard(anew: State, state: State) -> State:

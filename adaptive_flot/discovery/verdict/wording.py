@@ -74,11 +74,11 @@ def reason_words(
     evidence = evidence[:1].upper() + evidence[1:]
     if judgement.word == "named":
         lacks = "these effects" if len(effects) > 1 else "this"
-        return f"{said}. The model lacks {lacks}. {_beside(judgement)}{evidence}."
+        return f"{said}. The model lacks {lacks}. {beside_a_part(judgement)}{evidence}."
     if judgement.word == "class":
         return f"{_class_words(judgement, wrong)} {evidence}."
     if judgement.word == "unnamed":
-        return f"{said}. The model lacks this, and it has no name. {_beside(judgement)}{evidence}."
+        return f"{said}. The model lacks this, and it has no name. {beside_a_part(judgement)}{evidence}."
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
@@ -109,7 +109,7 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         alone = {a.names[0]: words_alone(a) for a in reversed(sets) if len(a.names) == 1}
         members = "; or ".join(alone.get(name, " by ".join(name)) for name in judgement.members)
         said = f"The model lacks one of these, which this record can not tell apart: {members}."
-        return f"{said} {_beside(judgement)}".rstrip()
+        return f"{said} {beside_a_part(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
     either = [n for n in same_site(judgement.best.names) if n in shared]
     words = ["The model lacks several effects."]
@@ -126,7 +126,7 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     return " ".join(words)
 
 
-def _beside(judgement: Judgement) -> str:
+def beside_a_part(judgement: Judgement) -> str:
     """What stands beside a part that is certain, in a sentence; empty where the whole is told."""
     if judgement.best is None or not judgement.part:
         return ""
