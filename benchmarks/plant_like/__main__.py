@@ -1,4 +1,4 @@
-"""Command line: `python -m benchmarks.plant_like generate|score`."""
+"""Command line: `python -m benchmarks.plant_like generate|score|limit`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
+import pandas as pd
 import typer
 
 from adaptive_flot.files import replace_file, write_text
 from benchmarks.hidden_effects.__main__ import progress
 from benchmarks.hidden_effects.score.commands import run_command
 from benchmarks.hidden_effects.score.figures import discover_command
+from benchmarks.plant_like.limit import limit_of, summary
 from benchmarks.plant_like.record import make_record
 from benchmarks.plant_like.score import figures, results
 
@@ -74,6 +76,26 @@ def score(
         table.to_csv(stream, index=False, lineterminator="\n")
     print(table.to_string(index=False))
     print(figures(table).to_string(index=False))
+
+
+@app.command()
+def limit(
+    folder: Annotated[Path, typer.Argument(help="Folder of the records.")],
+    jobs: Jobs = 2,
+) -> None:
+    """Give each record its effect, and print whether it gains enough over the background alone to be told."""
+    names = sorted(f.stem for f in (folder / "answers").glob("*.json"))
+    rows = []
+    with progress() as bar, ProcessPoolExecutor(jobs) as pool:
+        task = bar.add_task("limit", total=len(names))
+        for row in pool.map(limit_of, [(folder, name) for name in names]):
+            rows += [row] if row else []
+            bar.advance(task)
+    table = pd.DataFrame(rows)
+    with replace_file(folder / "limit.csv") as stream:
+        table.to_csv(stream, index=False, lineterminator="\n")
+    print(table.to_string(index=False))
+    print(summary(table))
 
 
 if __name__ == "__main__":
