@@ -10,6 +10,7 @@ background.py   What is wrong on every record: constants, feed, noise, gaps.
 draw.py         Moves of an operator, and the effect of a record.
 record.py       Record k of a seed: its table and its answer.
 score.py        Outcome of a verdict, and the figures.
+sizes.py        Sizes of constants that are named rightly.
 limit.py        What can be told at all: the gain of the effect when it is given.
 __main__.py     `generate`, `score`, `limit`.
 """

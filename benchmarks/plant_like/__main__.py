@@ -18,6 +18,7 @@ from benchmarks.hidden_effects.score.figures import discover_command
 from benchmarks.plant_like.limit import limit_of, summary
 from benchmarks.plant_like.record import make_record
 from benchmarks.plant_like.score import figures, results
+from benchmarks.plant_like.sizes import size_words, sizes
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False)
 Jobs = Annotated[int, typer.Option(min=1, max=64, help="Processes.")]
@@ -76,6 +77,7 @@ def score(
         table.to_csv(stream, index=False, lineterminator="\n")
     print(table.to_string(index=False))
     print(figures(table).to_string(index=False))
+    print(size_words(sizes(folder, label)))
 
 
 @app.command()

@@ -1,5 +1,7 @@
 """Plant-like records: what is wrong on all of them is drawn as it is told, and is no wrong name."""
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from benchmarks.hidden_effects.score.verdict import SubmittedVerdict
 from benchmarks.plant_like.background import BURN, EVERY, ROWS, draw_background
 from benchmarks.plant_like.draw import draw_experiment, entry_of
 from benchmarks.plant_like.score import outcome
+from benchmarks.plant_like.sizes import size_words, sizes
 
 WASH = ("entrainment", "air_flow")
 TRUTH = (WASH,)
@@ -87,3 +90,28 @@ def test_inputs_move_only_between_rows_and_a_third_of_the_records_has_no_effect(
     assert np.ptp(experiment.moves, axis=0).min() > LEAST_MOVE * experiment.moves.min()
     assert [entry_of(1, k) is None for k in range(6)] == [False, False, True] * 2
     assert len({entry_of(1, k) for k in range(60)} - {None}) == 40
+
+
+def test_the_size_of_a_constant_counts_with_what_is_wrong_on_every_record(tmp_path: Path) -> None:
+    """Bubbles half as large, of a cell whose bubbles are 10 % smaller: 0.45 of the model's."""
+    effect = {"site": "bubble_size", "driver": "constant", "shape": "level", "amplitude": -0.5}
+    logarithm = float(np.log(0.5 * 0.9))
+    cases = [("named", logarithm, 0.01), ("named", logarithm + 0.1, 0.01), ("class", logarithm, 0.01)]
+    verdicts = tmp_path / "runs" / "discover" / "verdicts"
+    verdicts.mkdir(parents=True)
+    (tmp_path / "answers").mkdir()
+    for k, (word, told, half) in enumerate(cases):
+        said = {
+            "site": "bubble_size",
+            "driver": "constant",
+            "coefficients": {"amplitude": told},
+            "interval95": {"amplitude": [told - half, told + half]},
+        }
+        answer = {"effects": [effect], "background": {"bubble_size": -0.1}}
+        (tmp_path / "answers" / f"record_{k:04d}.json").write_text(json.dumps(answer))
+        (verdicts / f"record_{k:04d}.json").write_text(json.dumps({"verdict": word, "effects": [said]}))
+    table = sizes(tmp_path, "discover")
+    assert list(table.held) == [True, False]
+    np.testing.assert_allclose(table.off, [0.0, np.expm1(0.1)], atol=1e-12)
+    assert "off by 5.3% in the middle, 10.5% at most; 1 of 2 intervals" in size_words(table)
+    assert size_words(sizes(tmp_path, "another")) == "sizes of named constants: none"
