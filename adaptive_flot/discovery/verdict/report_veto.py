@@ -133,10 +133,13 @@ def _is_worse(change: OutputChange, noise: float, with_background: float = 0.0) 
     return (surely and change.after > AT_NOISE * with_background) or change.after > (1 + MUCH_WORSE) * change.before
 
 
-def contradiction_at_the_end(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
+def contradiction_at_the_end(
+    judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray, unknown: FloatArray | None = None
+) -> str:
     """What the last report rows say against a sensor whose error is a free curve in time; empty where nothing.
 
-    Arguments are as in `contradiction`, for the rows of `last_report_rows` alone.
+    Arguments are as in `contradiction`, for the rows of `last_report_rows` alone. They lie beyond all that fitted the
+    background as well. So `unknown` is what it leaves open there, where the report rows are surely likelier.
     """
     best = judgement.best
     if judgement.word not in ("named", "class") or best is None:
@@ -144,7 +147,12 @@ def contradiction_at_the_end(judgement: Judgement, changes: Sequence[OutputChang
     sensors = {site.name for site in best.fit.model.sites if site.role == "sensor"}
     if not any(e.driver == "time" and e.family.is_curve and e.site in sensors for e in best.effects):
         return ""
-    worse = [c for c, s in zip(changes, noise, strict=True) if _is_worse(c, float(s))]
+    both = noise if unknown is None else np.hypot(noise, unknown)
+    worse = [
+        c
+        for c, s, v in zip(changes, noise, both, strict=True)
+        if _is_worse(c, float(s), float(v)) and c.after > AT_NOISE * v
+    ]
     if not worse:
         return ""
     said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
