@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.background.told_course import with_courses
 from adaptive_flot.discovery.results import State
-from adaptive_flot.discovery.stages import fit_without_report, judge_alternatives, tell_background
+from adaptive_flot.discovery.stages import fit_without_report, judge_alternatives
 from adaptive_flot.discovery.verdict.certain_part import part_alone
 from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.discovery.verdict.wording import beside_a_part
@@ -36,8 +36,7 @@ def try_as_course(state: State) -> State:
     beside, found = with_courses(problem, result, state.processes, state.progress)
     if found is result:
         return state
-    anew = replace(state, problem=beside, base=found.base, search=found, background="")
-    return _heard(judge_alternatives(tell_background(anew)), state)
+    return _heard(judge_alternatives(replace(state, problem=beside, base=found.base, search=found)), state)
 
 
 def tell_part_alone(state: State) -> State:

@@ -47,6 +47,20 @@ def make_missing(make: Callable[[tuple[Path, int, int]], None], out: Path, seed:
             bar.advance(task)
 
 
+def _records(folder: Path) -> list[str]:
+    """Names of the records that a folder has answers of.
+
+    Raises
+    ------
+    typer.BadParameter
+        There are none.
+    """
+    names = sorted(f.stem for f in (folder / "answers").glob("*.json"))
+    if not names:
+        raise typer.BadParameter(f"{folder}: no answers; make some with `python -m benchmarks.plant_like generate`")
+    return names
+
+
 @app.command()
 def generate(
     out: Annotated[Path, typer.Option(help="Folder of the records; what it holds already is kept.")],
@@ -68,7 +82,7 @@ def score(
     count: Annotated[int | None, typer.Option(min=1, help="Only the first records.")] = None,
 ) -> None:
     """Judge every record and print how often the verdict is right; what is judged already is kept."""
-    total = count or len(list((folder / "answers").glob("*.json")))
+    total = count or len(_records(folder))
     with progress() as bar:
         task = bar.add_task(label, total=total)
         run_command(folder, label, command or discover_command(), jobs, timeout, lambda: bar.advance(task), count)
@@ -86,7 +100,7 @@ def limit(
     jobs: Jobs = 2,
 ) -> None:
     """Give each record its effect, and print whether it gains enough over the background alone to be told."""
-    names = sorted(f.stem for f in (folder / "answers").glob("*.json"))
+    names = _records(folder)
     rows = []
     with progress() as bar, ProcessPoolExecutor(jobs) as pool:
         task = bar.add_task("limit", total=len(names))

@@ -1,8 +1,8 @@
 """What can be told at all: the effect is given, and how much its model gains over the background alone.
 
-A name needs a gain of 10 in BIC for each effective sample, and so does any other method that judges by likelihood with
-the same background. An effect that gains less, though its site and driver are given, can not be told by it: n, C and
-constants that are a little off, and a feed that wanders, do there what it does.
+A name needs a gain of 10 in BIC for each effective sample. An effect that gains less, though its site and driver are
+given, is not told: n, C and constants that are a little off, and a feed that wanders, do there what it does. Or no form
+of the catalogue has its shape: then the gain says nothing of the record.
 """
 
 from __future__ import annotations

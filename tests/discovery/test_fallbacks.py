@@ -12,6 +12,7 @@ from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, Round, SearchResult, State
 from adaptive_flot.discovery.search.rounds import scorer_of
+from adaptive_flot.discovery.stages import tell_background
 from adaptive_flot.discovery.verdict.certain_part import part_alone
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.test_told_course import OFF, beside_the_room
@@ -99,7 +100,7 @@ def wandering_exchange() -> State:
         jacketed_tank(wanders=True), problem.adapted, None, None, 1, lambda stage: None,
         Screening(problem.record, (), ()), problem=problem, base=base, search=result,
         judgement=Judgement("abstain", best, (), (), 10.0), before=base, after=fit,
-        contradiction="on held-out rows it makes the error larger", background="the curve's",
+        contradiction="on held-out rows it makes the error larger",
     )  # fmt: skip
 
 
@@ -109,7 +110,8 @@ def test_what_wanders_is_told_as_a_course_where_its_curve_is_contradicted(wander
     assert told.judged.word in ("named", "class") and not told.contradiction
     assert told.judged.best is not None
     assert told.judged.best.names[0] in {("exchange", "time"), ("circulation", "time")}
-    assert told.background != "the curve's"
+    told = tell_background(told)
+    assert "room" in f"{told.background} {told.screening.notes}"
 
 
 def test_a_curve_that_nothing_contradicts_stays_a_curve(wandering_exchange: State) -> None:
