@@ -18,7 +18,7 @@ from adaptive_flot.discovery.background.fitting import (
 )
 from adaptive_flot.discovery.background.linear import feeds_unseen
 from adaptive_flot.discovery.background.renewed import renewed
-from adaptive_flot.discovery.background.spread import may_have_background, rows_of_block, spread_of
+from adaptive_flot.discovery.background.spread import BLOCK_ROWS, may_have_background, spread_of
 from adaptive_flot.discovery.background.told_course import with_courses
 from adaptive_flot.discovery.background.wording import background_words, subject
 from adaptive_flot.discovery.candidates.responses import Responses
@@ -119,8 +119,8 @@ def allow_for_background(state: State) -> State:
     if spread is None:
         return replace(state, scored=scored)  # the search begins with the same
     cycle = CYCLE if state.report_record is None else WITHOUT_REPORT
-    if (least := rows_of_block(spread, problem.record.dt)) is not None:
-        problem = split_finer(problem, cycle, least)
+    if spread.course is not None:  # constants are the same in every split
+        problem = split_finer(problem, cycle, BLOCK_ROWS)
     fitted = fit_with_background(problem, spread, base, responses)
     if fitted is None:
         return state

@@ -55,6 +55,22 @@ def test_a_name_is_contradicted(draught: Discovery, change: OutputChange, said: 
         assert f"{change.before:.3g} -> {change.after:.3g} K" in against
 
 
+@pytest.mark.parametrize(
+    ("change", "contradicts"),
+    [
+        (_change(2.0, 2.8, -2.0, 0.2), False),  # two fifths, and not surely
+        (_change(2.0, 2.8, -2.0, -0.2), True),
+        (_change(2.43, 8.96, -5.94, 0.62), True),  # the opened box: on few rows too
+    ],
+)
+def test_on_the_few_rows_of_an_event_an_error_must_surely_be_larger_or_by_half(
+    draught: Discovery, change: OutputChange, contradicts: bool
+) -> None:
+    better, noise = _change(2.0, 1.0, 0.3, 0.6), np.array([0.1, 0.1])
+    assert bool(contradiction(_judged(draught), [better, change], noise, few=True)) == contradicts
+    assert contradiction(_judged(draught), [better, change], noise)
+
+
 def test_an_output_at_its_noise_contradicts_nothing(draught: Discovery) -> None:
     """Two outputs: one gets much better, the other wanders by a fifth within its noise."""
     other = OutputChange("flow", "m3/s", 0.10, 0.12, 0.1, (-0.3, -0.1))

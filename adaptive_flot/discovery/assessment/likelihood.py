@@ -7,12 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.assessment.reduction import MANY_BLOCKS, SHORTEST_BLOCK, column_means, squared_errors
+from adaptive_flot.discovery.assessment.telling_rows import telling_rows
 from adaptive_flot.discovery.fitting.fit import Fit, row_losses
 from adaptive_flot.discovery.record.effective_samples import correlation_times
-from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.greybox.model import FloatArray
 
 LEAST_EVIDENCE = 10.0
 """Drop of a criterion that counts: "very strong" evidence (Kass & Raftery, *J. Am. Statist. Assoc.* 90 (1995) 773)."""
+FEWEST_BLOCKS = 4
 COMPARISON_BLOCK_ROWS = 60
 """Rows of a block in which two fits are compared: what both lack is slower than the noise."""
 
@@ -27,19 +30,48 @@ def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) ->
     The likelihood ratio test of models that are not nested: Vuong, *Econometrica* 57 (1989) 307, eq. (4.2), with blocks
     of rows instead of rows, as these depend on one another; the fits stay as they are (Kishino & Hasegawa, *J. Mol.
     Evol.* 29 (1989) 170). A fit that is worse by less than `SURE` of these would be the better one in some records like
-    this. Zero of a record with fewer than MANY_BLOCKS blocks.
+    this. Zero of a record with fewer than MANY_BLOCKS blocks. A pulse is compared on the rows that it touches, where
+    these are enough: on all others both are the same, and the record of which this is a sample is that of the pulse.
     """
     rows = problem.rows("estimate")
-    length = int(np.clip(rows.sum() // MANY_BLOCKS, SHORTEST_BLOCK, COMPARISON_BLOCK_ROWS))
-    count = int(rows.sum()) // length
-    if count < MANY_BLOCKS:
+    if rows.sum() < MANY_BLOCKS * SHORTEST_BLOCK:
         return tuple(0.0 for _ in others)
-    own = row_losses(problem, best, rows)
-    deviations = []
-    for fit in others:
-        blocks = (row_losses(problem, fit, rows) - own)[: count * length].reshape(count, length).sum(axis=1)
-        deviations.append(float(np.std(blocks, ddof=1) * np.sqrt(count)))
-    return tuple(deviations)
+    return tuple(_difference_sd(problem, best, fit) for fit in others)
+
+
+def _difference_sd(problem: Problem, best: Fit, fit: Fit) -> float:
+    rows = _compared(problem, best, fit)
+    return _sd_of_sum(row_losses(problem, fit, rows) - row_losses(problem, best, rows))
+
+
+def _compared(problem: Problem, best: Fit, fit: Fit) -> BoolArray:
+    """Fitted rows (N,) on which two fits are compared: those that tell of a pulse, where they are enough."""
+    telling = telling_rows(problem, (best, fit), "estimate")
+    return telling if telling.sum() >= MANY_BLOCKS * SHORTEST_BLOCK else problem.rows("estimate")
+
+
+def _sd_of_sum(difference: FloatArray) -> float:
+    """Standard deviation of the sum of differences (n,) of neighbouring rows, by blocks."""
+    length = int(np.clip(len(difference) // MANY_BLOCKS, SHORTEST_BLOCK, COMPARISON_BLOCK_ROWS))
+    count = len(difference) // length
+    if count < FEWEST_BLOCKS:  # too few to say: as if all of it were chance
+        return float(np.abs(difference).sum())
+    blocks = difference[: count * length].reshape(count, length).sum(axis=1)
+    return float(np.std(blocks, ddof=1) * np.sqrt(count))
+
+
+def difference_with_confirm_rows(problem: Problem, best: Fit, fit: Fit) -> tuple[float, float]:
+    """How much worse minus two log-likelihood of a fit is on the confirm rows as well, and the deviation of it all.
+
+    A pulse has few rows to estimate it, and a wrong one can be bent to draw these. So the rows that fitted neither are
+    asked too: those that tell anything (see `telling_rows`). The deviation is that of the sum of both, each by blocks
+    as in `loglik_difference_sds`: rows that were fitted differ by less than those that were not.
+    """
+    asked = telling_rows(problem, (best, fit), "confirm", ("estimate",))
+    both = _compared(problem, best, fit), asked
+    differences = [row_losses(problem, fit, rows) - row_losses(problem, best, rows) for rows in both]
+    seen, unseen = map(_sd_of_sum, differences)
+    return float(differences[1].sum()), float(np.hypot(seen, unseen))
 
 
 def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> float:

@@ -8,6 +8,7 @@ from statsmodels.stats.diagnostic import acorr_ljungbox
 from adaptive_flot.discovery.assessment.beside_background import drop_beside_background, unknown_of_background
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE, rows_per_effective_sample
 from adaptive_flot.discovery.assessment.reduction import reduction, squared_errors
+from adaptive_flot.discovery.assessment.telling_rows import largest_by_chance, on_telling_rows
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import OutputChange, Verification
@@ -37,9 +38,17 @@ def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None
     are likelier. A background may take up what an effect does, so that both predict alike; then likelier rows confirm
     it. That is reason enough not to say `none`. A name asks more of the report rows.
 
+    Of a pulse, only the rows that it touches are compared (see `telling_rows`). They are few, and noise with a memory
+    errs in them alike. So an output is worse there where its error grew by more than MUCH_WORSE, and is larger than
+    such noise makes it by chance.
+
     `own` is the problem of the fit after, where its background is another.
     """
+    whole, problem = problem, on_telling_rows(problem, before, after, "confirm", ("estimate",))
+    own = own and on_telling_rows(own, before, after, "confirm", ("estimate",))
     rows, block = problem.rows("confirm"), block_rows(problem, before, after)
+    if not rows.any():
+        return Verification(0.0, (float("-inf"), float("inf")), (), False)
     size = problem.weights * after.noise.stationary_std()
     old, new = squared_errors(problem, before, size, rows), squared_errors(problem, after, size, rows)
     smaller, interval = reduction(np.nansum(old, axis=1), np.nansum(new, axis=1), block)
@@ -48,13 +57,15 @@ def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None
     )
     drop = drop_beside_background(problem, before, after, "confirm", own)
     likelier = drop > LEAST_EVIDENCE * rows_per_effective_sample(problem, before, after)
-    worse, outputs = [], len(problem.columns)
+    worse, outputs, larger = [], len(problem.columns), WORSE if problem is whole else MUCH_WORSE
+    by_chance = largest_by_chance(after.noise, int(rows.sum()))
     for j, c in enumerate(problem.columns):
         left = float(np.nanmean(new[:, j]))
         ratio = float(np.sqrt(left / np.maximum(np.nanmean(old[:, j]), 1e-300)))
         little = ratio < 1 + MUCH_WORSE or likelier
         within = unknown[j] > 0 and little and left < AT_NOISE**2 * (1 + unknown[j] ** 2)
-        if ratio > 1 + WORSE and not within and reduction(old[:, j], new[:, j], block, outputs)[1][1] < 0:
+        within = within or (problem is not whole and left < by_chance[j] ** 2)
+        if ratio > 1 + larger and not within and reduction(old[:, j], new[:, j], block, outputs)[1][1] < 0:
             worse.append(after.model.outputs[c].name)
     confirmed = not worse and bool(interval[0] > 0 or likelier)
     return Verification(smaller, interval, tuple(worse), confirmed, likelihood=drop if likelier else 0.0)

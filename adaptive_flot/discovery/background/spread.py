@@ -25,8 +25,9 @@ little to tell a dozen constants beside an effect."""
 MOST_BEFORE, FITTED = 3, 2
 """Effects that are fitted one on top of the other before a background is looked for, and how many are tried for
 each."""
-LEAST_BLOCK_ROWS = 60
-"""Least rows of a split: more than noise remembers, and than a plant takes to settle."""
+BLOCK_ROWS = 24
+"""Rows of a split beside a feed that wanders: more than noise remembers, and short against the feed. So held-out rows
+say more of an effect than of the feed, and a change that lasts for some minutes has rows of each split."""
 
 
 def may_have_background(problem: Problem, responses: Responses) -> bool:
@@ -120,11 +121,3 @@ def _with_best_effect(problem: Problem, fit: Fit, scorer: Scorer) -> Fit | None:
 
 def _free_in_time(score: Score) -> bool:
     return score.candidate.driver == "time" and score.variant.effect.family.is_curve
-
-
-def rows_of_block(spread: Spread, dt: float) -> int | None:
-    """Least rows of a split: short against the course, so that held-out rows say more of an effect than of the feed.
-
-    None without a course: constants are the same in every split.
-    """
-    return None if spread.course is None else max(LEAST_BLOCK_ROWS, round(spread.course.time / dt / 2))

@@ -204,6 +204,25 @@ class Scorer:
         full[self.rows] = table * std
         return self.problem.noise(full, self.rows)
 
+    @property
+    def measurements(self) -> int:
+        """Number of measurements on the estimation rows."""
+        return self._count
+
+    def energy(self) -> FloatArray:
+        """Squared projected residual of each row (N,), summed over the outputs; zero where a row is not estimated."""
+        squares = np.zeros(self._present.shape)
+        squares[self._present] = self.residual[: int(self._present.sum())] ** 2
+        by_row = np.zeros(len(self.rows))
+        by_row[self._reached] = squares.sum(axis=1)
+        return by_row
+
+    def projected_profiles(self, profiles: list[TimeProfile]) -> FloatArray:
+        """Whitened responses M X (values present, r) to r profiles, without what is free already."""
+        columns = self._whitened(self._weighted_responses(profiles))
+        columns -= self._base @ (self._base.T @ columns)
+        return columns
+
     def projected(self, responses: FloatArray) -> FloatArray:
         """Whitened responses M X (values present, r) of plain ones X (N, m, r), without what is free already.
 
@@ -263,7 +282,7 @@ class Scorer:
         Of one response x each, the score statistic is (x'M e)^2 / x'M x, and the amplitude x'M e / x'M x.
         """
         effect, start = score.variant.effect, dict(score.variant.start)
-        if not effect.family.is_event:
+        if not effect.family.is_event or effect.family.passes:  # the edges of a pulse are refined where it is sought
             return score
         (onset_name,) = effect.names(CoefficientRole.ONSET)
         lengths = effect.names(CoefficientRole.DURATION, CoefficientRole.TIME_CONSTANT)
@@ -277,8 +296,7 @@ class Scorer:
             for factor in (LENGTHS if length else (1.0,))
             if time[0] < onset < time[-1]
         ]
-        columns = self._whitened(self._weighted_responses([v.profiles[0] for v in variants]))
-        columns -= self._base @ (self._base.T @ columns)
+        columns = self.projected_profiles([v.profiles[0] for v in variants])
         gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
         best = int(np.argmax(gains))
         if gains[best] <= score.gain:

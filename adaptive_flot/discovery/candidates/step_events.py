@@ -63,7 +63,7 @@ def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
 
     `span` is the length of the record [s].
     """
-    length = _length(fitted) if fitted.family.is_event else None
+    length = _length(fitted) if fitted.family.is_event and not fitted.family.passes else None
     if length is None or length > SUDDEN * span:
         return None
     (amplitude,), (onset,) = fitted.levels, fitted.values(CoefficientRole.ONSET)
@@ -86,9 +86,11 @@ def _event(
 def freer(effect: Effect, low: float, high: float) -> tuple[Variant, dict[str, float]] | None:
     """A curve with more knots than a fitted curve, or around a fitted ramp or washout, and values to start from.
 
-    The record lasts from `low` to `high` [s]. None for a step, which has no shape, for a curve that has the knots, and
-    for a slow ramp, of which a curve with even knots is the freer form.
+    The record lasts from `low` to `high` [s]. None for a step, which has no shape, for a pulse, for a curve that has
+    the knots, and for a slow ramp, of which a curve with even knots is the freer form.
     """
+    if effect.family.passes:
+        return None
     if effect.family.is_curve:
         if len(knots_of(effect)) >= MOST_KNOTS:
             return None
@@ -116,7 +118,8 @@ def slow(effect: Effect, shortest: float = SLOW_S) -> bool:
     if effect.family.is_curve:
         knots = knots_of(effect)
         return is_even(knots) and not _jumps(effect, knots, shortest)
-    return any(duration >= shortest for duration in effect.values(CoefficientRole.DURATION))
+    lasts = effect.values(CoefficientRole.DURATION)
+    return not effect.family.passes and any(duration >= shortest for duration in lasts)
 
 
 def _length(effect: Effect) -> float | None:

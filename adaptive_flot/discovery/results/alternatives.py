@@ -37,7 +37,8 @@ class Alternative:
     loglik_difference_sd
         Standard deviation of the difference between its minus two log-likelihood and that of the best one.
     adjusted_bic
-        Its criterion with the common nuisance added, where that was worked out (see `adjust_for_common_nuisance`).
+        Its criterion with the common nuisance added, where that was worked out (see `adjust_for_common_nuisance`). Of
+        alternatives to a pulse, with the confirm rows added.
     problem
         Its own problem, where it has a background of its own: a course that is told as an effect.
     """
@@ -52,7 +53,7 @@ class Alternative:
     problem: Problem | None = None
 
     def worse_than(self, best: Alternative) -> float:
-        """How much worse its criterion is than that of another, adjusted for a common nuisance where both are."""
+        """How much worse its criterion is than that of another, adjusted where both are."""
         if self.adjusted_bic is not None and best.adjusted_bic is not None:
             return self.adjusted_bic - best.adjusted_bic
         return self.fit.bic - best.fit.bic

@@ -32,17 +32,19 @@ WORTH_A_RESTART = 10.0
 """Gain of another start of a free time profile, which has most places to rest in, that is worth yet another."""
 EACH_OUTPUT = 2
 """Candidates for each output that is still wrong: over all outputs they may rank low."""
+LEAST_PULSE_ROWS = 10
+"""Least rows that a change which comes and goes lasts."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
 
-def shortlist(scorer: Scorer, count: int = SHORTLIST) -> list[Score]:
+def shortlist(scorer: Scorer, count: int = SHORTLIST, scores: Sequence[Score] | None = None) -> list[Score]:
     """Candidates worth a full fit, best first.
 
     Left out is what adds nothing to a constant at its own site, and of two drivers that are one another's mirror (level
     and froth depth) the one without a name; else the one that scores worse; else the later one in the model.
     """
-    scores = scorer.scores()
+    scores = scorer.scores() if scores is None else scores
     best = scores[0].gain if scores else 0.0
     constant = {s.candidate.site.name: s.penalised for s in scores if s.candidate.driver == "constant"}
     kept: list[Score] = []
@@ -194,4 +196,6 @@ def shape_bounds(problem: Problem, effect: Effect) -> dict[str, tuple[float, flo
         CoefficientRole.TIME_CONSTANT: (0.2 * problem.record.dt, span),
         CoefficientRole.DEAD_TIME: (2.0 * problem.record.dt, LONGEST_DELAY * span),
     }
+    if effect.family.passes:  # what is shorter is an outlier, or noise
+        by_role[CoefficientRole.DURATION] = LEAST_PULSE_ROWS * problem.record.dt, span
     return {effect.parameter(c.name): by_role[c.role] for c in effect.terms if c.role in by_role}

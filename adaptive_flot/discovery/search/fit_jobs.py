@@ -86,6 +86,8 @@ def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
             jobs.append(Job(fitted.linearisation, replace(s, variant=fine[0], start=fine[1]), warm))
         else:
             jobs.append(Job(fitted.linearisation, s, warm))
+    if score.variant.effect.family.passes:
+        jobs.append(Job(fitted.linearisation, score))
     return jobs
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.candidates.catalogue import catalogue
+from adaptive_flot.discovery.candidates.pulses import with_pulses
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -67,7 +68,9 @@ def run_round(
         linearisations = []
         most = further if before else SHORTLIST if len(scorers) == 1 else SHORTLIST_NEAR
         for scorer in scorers:
-            wanted = shortlist(scorer, most)
+            ranking = scorer.scores()
+            # a further effect that comes and goes would be whatever the first ones leave
+            wanted = shortlist(scorer, most, ranking if before else with_pulses(scorer, ranking))
             if before is not None:
                 # a further effect must have a name: a pair of curves without one would explain anything
                 wanted = [s for s in wanted if s.candidate.known]

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds, rows_per_effective_sample
+from adaptive_flot.discovery.assessment.likelihood import (
+    difference_with_confirm_rows,
+    loglik_difference_sds,
+    rows_per_effective_sample,
+)
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
@@ -119,10 +123,23 @@ def _confirmed(problem: Problem, result: SearchResult, accepted: list[Round]) ->
             compared = tuple(
                 replace(a, loglik_difference_sd=d) for a, d in zip(r.alternatives, differences, strict=True)
             )
+            compared = _with_confirm_rows(problem, compared)
             return replace(
                 result, alternatives=compared, verification=verification, left=left, rows_per_effective_sample=rows_each
             )
     return result
+
+
+def _with_confirm_rows(problem: Problem, alternatives: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+    """Alternatives to a pulse, compared on the confirm rows as well; as they are, where the best is none."""
+    best = alternatives[0]
+    if not any(e.family.passes for e in best.effects):
+        return alternatives
+    compared = [replace(best, adjusted_bic=best.fit.bic)]
+    for a in alternatives[1:]:
+        more, deviation = difference_with_confirm_rows(problem, best.fit, a.fit)
+        compared.append(replace(a, adjusted_bic=a.fit.bic + more, loglik_difference_sd=deviation))
+    return tuple(compared)
 
 
 def _best_bic(rounds: list[Round]) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.beside_background import drop_beside_background, unknown_of_background
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE, rows_per_effective_sample
-from adaptive_flot.discovery.assessment.verification import changes
+from adaptive_flot.discovery.assessment.telling_rows import largest_by_chance, off_the_edges, on_telling_rows
+from adaptive_flot.discovery.assessment.verification import AT_NOISE, changes
 from adaptive_flot.discovery.background.fitting import taken_up
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
@@ -22,17 +23,25 @@ from adaptive_flot.discovery.verdict.report_veto import (
     contradiction_at_the_end,
     explains_little,
     last_report_rows,
+    made_worse,
     noise_from_row_to_row,
     surely_better,
     unexplained,
 )
 from adaptive_flot.greybox.model import FloatArray
 
+FITTED = ("estimate", "confirm")
+"""Splits that the last fits have seen."""
+
 
 def heed_report(state: State) -> State:
     """Take a name back where the held-out rows contradict it."""
-    problem, (before, after), judgement = state.known_problem, state.refitted, state.judged
-    beside = state.problem_after or problem
+    whole, (before, after), judgement = state.known_problem, state.refitted, state.judged
+    told = judgement.word in ("named", "class")
+    problem = whole
+    if told and state.report_record is None:
+        problem = on_telling_rows(whole, before, after, "report", FITTED)
+    beside = replace(state.problem_after or whole, splits=problem.splits)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
     unknown = limit = np.zeros(len(error))
@@ -40,24 +49,47 @@ def heed_report(state: State) -> State:
     if state.report_record is None:
         names = [after.model.outputs[c].name for c in problem.columns]
         shown = [names.index(c.output) for c in error]
-        unknown, limit = (v[shown] for v in unknown_of_background(beside, after, ("estimate", "confirm"), "report"))
-        if judgement.word in ("named", "class"):
+        unknown, limit = (v[shown] for v in unknown_of_background(beside, after, FITTED, "report"))
+        if told:
             likelier = drop_beside_background(problem, before, after, "report", beside)
             likelier /= rows_per_effective_sample(problem, before, after)
     surely = likelier > LEAST_EVIDENCE
     alike = taken_up(problem, constants_told(judgement))
-    against = contradiction(judgement, error, with_memory(problem, error, noise), limit, surely, alike)
+    remembered, few = with_memory(problem, error, noise), problem is not whole
+    if few:
+        remembered = remembered * _few_rows(problem, after, error)
+    against = contradiction(judgement, error, remembered, limit, surely, alike, few)
+    if not against and few:
+        against = _worse_elsewhere(whole, state.problem_after or whole, before, after, surely)
     if not against and state.report_record is None:
-        against = _at_the_end(judgement, problem, beside, before, after, surely)
-    if not against and judgement.word in ("named", "class"):
+        against = _at_the_end(judgement, whole, state.problem_after or whole, before, after, surely)
+    if not against and told:
         against = explains_little(error, np.hypot(noise, unknown))
     if against:
         judgement = replace(judgement, word="abstain", members=(), part=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
     if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
-    told = likelier if surely and not against and not surely_better(error) else 0.0
-    return replace(state, error=error, judgement=judgement, likelihood=told, contradiction=against, certain=certain)
+    by_likelihood = likelier if surely and not against and not surely_better(error) else 0.0
+    state = replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
+    return replace(_with_rows_said(state, whole, problem), likelihood=by_likelihood)
+
+
+def _few_rows(problem: Problem, after: Fit, error: Sequence[OutputChange]) -> FloatArray:
+    """Factors (m,) by which noise may be larger by chance on few rows than on many, where that counts as noise."""
+    names = [after.model.outputs[c].name for c in problem.columns]
+    largest = largest_by_chance(after.noise, int(problem.rows("report").sum()))
+    return np.maximum(largest[[names.index(c.output) for c in error]] / AT_NOISE, 1.0)
+
+
+def _worse_elsewhere(whole: Problem, beside: Problem, before: Fit, after: Fit, likelier: bool) -> str:
+    """What all report rows say against a pulse, but those that could not know when it came."""
+    there = off_the_edges(whole, after, "report", FITTED)
+    error = changes(there, before, after, "report")
+    noise = with_memory(there, error, noise_from_row_to_row(there, before.model, error))
+    names = [after.model.outputs[c].name for c in whole.columns]
+    limit = unknown_of_background(replace(beside, splits=there.splits), after, FITTED, "report")[1]
+    return made_worse(error, noise, limit[[names.index(c.output) for c in error]], likelier)
 
 
 def _at_the_end(
@@ -71,8 +103,17 @@ def _at_the_end(
     if not likelier:
         return contradiction_at_the_end(judgement, error, noise)
     own = replace(beside, splits=last.splits)
-    limit = unknown_of_background(own, after, ("estimate", "confirm"), "report")[1]
+    limit = unknown_of_background(own, after, FITTED, "report")[1]
     return contradiction_at_the_end(judgement, error, noise, limit[[names.index(c.output) for c in error]])
+
+
+def _with_rows_said(state: State, whole: Problem, problem: Problem) -> State:
+    """The state with a note where the errors are those of some held-out rows only."""
+    if problem is whole:
+        return state
+    some, of = (int(p.rows("report").sum()) for p in (problem, whole))
+    said = f"the errors before and after are those on the {some} of {of} held-out rows that the event touches"
+    return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
 def with_memory(problem: Problem, error: Sequence[OutputChange], noise: FloatArray) -> FloatArray:

@@ -26,6 +26,8 @@ BETTER = 0.01
 """Share by which the error of one output must fall: less is certain at times, and nothing that a user would see."""
 LITTLE = 0.1
 """Share of the squared error that a name must remove where much is left: less may be any name's."""
+WORSE_ON_FEW_ROWS = 0.5
+"""Share by which an error on the few rows of an event is worse whatever its interval."""
 FAR_FROM_NOISE = 5.0
 """An error of so many times the noise is not explained, whatever the noise model says. Noise that is allowed to be
 coloured has up to three times what its differences show."""
@@ -38,6 +40,7 @@ def contradiction(
     unknown: FloatArray | None = None,
     likelier: bool = False,
     alike: bool = False,
+    few: bool = False,
 ) -> str:
     """What the report rows say against a name; empty where they do not, and where no name is given.
 
@@ -62,23 +65,38 @@ def contradiction(
     alike
         Whether the background has what is told as one of its constants. Both then predict alike, and no output needs to
         get better where the rows are likelier.
+    few
+        Whether these are the few rows of an event that passes. Then an error is larger that surely is, or by half.
     """
     if judgement.word not in ("named", "class"):
         return ""
+    if said := made_worse(changes, noise, unknown, likelier, few):
+        return said
+    if not surely_better(changes) and not (likelier and (alike or much_better(changes))):
+        said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
+        return f"on held-out rows no output surely gets better ({said})"
+    return ""
+
+
+def made_worse(
+    changes: Sequence[OutputChange],
+    noise: FloatArray,
+    unknown: FloatArray | None = None,
+    likelier: bool = False,
+    few: bool = False,
+) -> str:
+    """The outputs that are worse, in words; empty where none is. Arguments are as in `contradiction`."""
     both = noise if unknown is None else np.hypot(noise, unknown)
     least = both if likelier else noise
     worse = [
         c
         for c, s, v, e in zip(changes, noise, both, least, strict=True)
-        if _is_worse(c, float(s), float(v)) and c.after > AT_NOISE * e
+        if _is_worse(c, float(s), float(v)) and c.after > AT_NOISE * e and not (few and _may_be_chance(c))
     ]
-    if worse:
-        said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
-        return f"on held-out rows it makes the error larger ({said})"
-    if not surely_better(changes) and not (likelier and (alike or much_better(changes))):
-        said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
-        return f"on held-out rows no output surely gets better ({said})"
-    return ""
+    if not worse:
+        return ""
+    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
+    return f"on held-out rows it makes the error larger ({said})"
 
 
 def surely_better(changes: Sequence[OutputChange]) -> bool:
@@ -124,6 +142,11 @@ def explains_little(changes: Sequence[OutputChange], noise: FloatArray) -> str:
     return (
         f"on held-out rows it removes only {removed:.0f} % of the squared error, over all outputs. {left.rstrip('.')}"
     )
+
+
+def _may_be_chance(change: OutputChange) -> bool:
+    """Whether an error on few rows may be larger by chance: its interval says so, and it grew by less than half."""
+    return change.reduction95[1] > 0 and change.after < (1 + WORSE_ON_FEW_ROWS) * change.before
 
 
 def _is_worse(change: OutputChange, noise: float, with_background: float = 0.0) -> bool:

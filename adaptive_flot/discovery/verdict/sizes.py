@@ -93,6 +93,12 @@ def _always(site: Site, effect: Effect) -> str:
 def _event(site: Site, effect: Effect) -> str:
     (level,), (onset,) = effect.levels, effect.values(CoefficientRole.ONSET)
     durations = effect.values(CoefficientRole.DURATION)
+    if effect.family.passes:
+        verb, stood = ("showed", "more") if site.role == "sensor" else ("was", "larger")
+        if level < 0:
+            stood = "less" if site.role == "sensor" else "smaller"
+        end = onset + durations[0]
+        return f"{verb} {_amount(site, effect, level)} {stood} from {onset:.0f} s to {end:.0f} s than before and after"
     lasts = [*durations, *(SETTLED * t for t in effect.values(CoefficientRole.TIME_CONSTANT))]
     when = f"from {onset:.0f} s to {onset + lasts[0]:.0f} s" if lasts else f"at {onset:.0f} s"
     factor = float(np.exp(level)) if _is_factor(site, effect) else None

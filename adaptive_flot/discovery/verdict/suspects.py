@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.telling_rows import edges
 from adaptive_flot.discovery.candidates.spline import knots_of
 from adaptive_flot.discovery.record.screening import Suspect
 from adaptive_flot.greybox.effects import Effect
@@ -18,13 +19,16 @@ ROWS_BESIDE = 5
 def event_times(effect: Effect) -> tuple[tuple[float, float], ...]:
     """When an effect of time changes most, first and last time [s] of each; none for other effects.
 
-    An onset is an instant; a curve changes most between the two knots whose values differ most.
+    An onset is an instant, and so is the end of a pulse. A curve changes most between the two knots whose values differ
+    most.
     """
     if effect.driver != "time":
         return ()
     onsets = tuple(
         (effect.coefficients[n],) * 2 for n in effect.names(CoefficientRole.ONSET) if n in effect.coefficients
     )
+    if effect.family.passes:
+        return tuple((t, t) for t in edges(effect))
     if onsets or not effect.family.is_curve:
         return onsets
     knots, moves = knots_of(effect), np.abs(np.diff(effect.levels))

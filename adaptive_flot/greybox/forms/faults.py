@@ -157,6 +157,7 @@ FAULT_FORMS: tuple[Form, ...] = (
         {"width": "s"},
         static=_switch,
         abrupt=True,
+        passes=True,
     ),
     Form(
         "periodic",

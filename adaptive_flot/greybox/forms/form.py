@@ -155,6 +155,8 @@ class Form:
         "constant", "time", "signal" (any quantity of the model), or a dynamic form's own name.
     abrupt
         Whether its effect may change much within seconds, so that a coarse grid of times would miss it.
+    passes
+        Whether an event is over after its duration: the value is then where it would have been without it.
     is_beside
         Whether it is a flow of its own beside the value: what other effects do to the value does not touch it.
     """
@@ -170,6 +172,7 @@ class Form:
     direct: DirectLaw | None = None
     states: Callable[[Settings], tuple[str, ...]] = lambda settings: ()
     abrupt: bool = False
+    passes: bool = False
     is_beside: bool = False
 
     @property
