@@ -21,26 +21,21 @@ at the price of its prior.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from typing import cast
 
 import numpy as np
 
-from adaptive_flot.discovery.candidates.catalogue import ONSETS, Candidate, event
+from adaptive_flot.discovery.candidates.catalogue import Candidate
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.noise import Noise, with_rows_before
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import CLIP, noise_by_differences, without_spikes
-from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 
-REFINED = 33
-"""Onsets that are tried around one of the catalogue."""
-LENGTHS = (0.3, 0.55, 1.0, 1.8)
-"""Factors of a duration or time constant that are tried with each."""
 PRIOR_SHARE = 0.3
 """Prior standard deviation of a change at a site, as a share of its value, in the ridge fit of the noise."""
 DEPENDENT = 1e-12
@@ -275,36 +270,6 @@ class Scorer:
         values = beta * self._size[columns]
         start = {n: float(v) for n, v in zip(variant.coefficients, values, strict=True) if n}
         return Score(candidate, variant, gain, gain - penalty, {**start, **dict(variant.start)})
-
-    def refined(self, score: Score) -> Score:
-        """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima.
-
-        Of one response x each, the score statistic is (x'M e)^2 / x'M x, and the amplitude x'M e / x'M x.
-        """
-        effect, start = score.variant.effect, dict(score.variant.start)
-        if not effect.family.is_event or effect.family.passes:  # the edges of a pulse are refined where it is sought
-            return score
-        (onset_name,) = effect.names(CoefficientRole.ONSET)
-        lengths = effect.names(CoefficientRole.DURATION, CoefficientRole.TIME_CONSTANT)
-        time = self.problem.record.time
-        reach = (time[-1] - time[0]) / (ONSETS + 1)
-        length = next((start[name] for name in lengths), 0.0)
-        site, form = score.candidate.site, effect.form
-        variants = [
-            event(site, form, time, float(onset), length * factor, site.mode == "offset")
-            for onset in start[onset_name] + reach * np.linspace(-1, 1, REFINED)
-            for factor in (LENGTHS if length else (1.0,))
-            if time[0] < onset < time[-1]
-        ]
-        columns = self.projected_profiles([v.profiles[0] for v in variants])
-        gains = (columns.T @ self.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
-        best = int(np.argmax(gains))
-        if gains[best] <= score.gain:
-            return score
-        amplitude = float(columns[:, best] @ self.residual / np.sum(columns[:, best] ** 2))
-        penalised = score.penalised + float(gains[best]) - score.gain
-        values = {"amplitude": amplitude, **dict(variants[best].start)}
-        return replace(score, variant=variants[best], gain=float(gains[best]), penalised=penalised, start=values)
 
     def null_gains(self, draws: int, seed: int) -> FloatArray:
         """Largest penalised score (draws,) of the catalogue on white noise: the null law of the search.

@@ -11,17 +11,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.candidates.catalogue import ONSETS, event
 from adaptive_flot.discovery.candidates.knots import MOST_KNOTS, is_even
-from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.spline import drawn, knots_of, through
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 
+REFINED = 33
+"""Onsets that are tried around one of the catalogue."""
+LENGTHS = (0.3, 0.55, 1.0, 1.8)
+"""Factors of a duration or time constant that are tried with each."""
 POINTS = 300
 """Times at which a curve is compared with an event."""
-ONSETS = 60
+PLACES = 60
+"""Onsets that are compared with a curve."""
 DURATIONS = (0.03, 0.08, 0.15, 0.25, 0.4, 0.6)
 """Durations of ramps and washouts that are tried, as shares of the record."""
 SLOW_S, SLOW_ROWS = 120.0, 50
@@ -56,6 +62,38 @@ def event_scores(score: Score, curve: Effect) -> list[Score]:
         amplitude, onset, length = _best(role, t, values, span)
         scores.append(_event(score, form, amplitude, (("onset", onset), (role.name.lower(), length)), curve, {}))
     return scores
+
+
+def refined(scorer: Scorer, score: Score) -> Score:
+    """The same event with its onset and length on a grid around the catalogue's: an onset has many local optima.
+
+    Of one response x each, the score statistic is (x'M e)^2 / x'M x, and the amplitude x'M e / x'M x. A score that is
+    no event comes back as it is, and so does a pulse: its edges are refined where it is sought.
+    """
+    effect, start = score.variant.effect, dict(score.variant.start)
+    if not effect.family.is_event or effect.family.passes:
+        return score
+    (onset_name,) = effect.names(CoefficientRole.ONSET)
+    lengths = effect.names(CoefficientRole.DURATION, CoefficientRole.TIME_CONSTANT)
+    time = scorer.problem.record.time
+    reach = (time[-1] - time[0]) / (ONSETS + 1)
+    length = next((start[name] for name in lengths), 0.0)
+    site, form = score.candidate.site, effect.form
+    variants = [
+        event(site, form, time, float(onset), length * factor, site.mode == "offset")
+        for onset in start[onset_name] + reach * np.linspace(-1, 1, REFINED)
+        for factor in (LENGTHS if length else (1.0,))
+        if time[0] < onset < time[-1]
+    ]
+    columns = scorer.projected_profiles([v.profiles[0] for v in variants])
+    gains = (columns.T @ scorer.residual) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-300)
+    best = int(np.argmax(gains))
+    if gains[best] <= score.gain:
+        return score
+    amplitude = float(columns[:, best] @ scorer.residual / np.sum(columns[:, best] ** 2))
+    penalised = score.penalised + float(gains[best]) - score.gain
+    values = {"amplitude": amplitude, **dict(variants[best].start)}
+    return replace(score, variant=variants[best], gain=float(gains[best]), penalised=penalised, start=values)
 
 
 def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
@@ -150,7 +188,7 @@ def _best(role: CoefficientRole, t: FloatArray, values: FloatArray, span: float)
     """Amplitude, onset and duration whose event, up to a constant, is nearest to the values."""
     best = (np.inf, 0.0, float(t[len(t) // 2]), 0.1 * span)
     centred = values - values.mean()
-    for onset in np.linspace(t[0], t[-1], ONSETS + 2)[1:-1]:
+    for onset in np.linspace(t[0], t[-1], PLACES + 2)[1:-1]:
         for share in DURATIONS:
             length = share * span
             if role is CoefficientRole.TIME_CONSTANT:

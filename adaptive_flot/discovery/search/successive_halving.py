@@ -19,6 +19,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.likelihood import worth_its_freedom
 from adaptive_flot.discovery.candidates.direction import nameable
 from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.candidates.step_events import refined
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
@@ -108,7 +109,7 @@ class _SuccessiveHalving:
     ) -> None:
         self.fitter, self.base, self.before, self.processes, self.done = fitter, base, before, processes, done
         self.linearisations = [
-            replace(linearisation, scores=[linearisation.scorer.refined(s) for s in linearisation.scores])
+            replace(linearisation, scores=[refined(linearisation.scorer, s) for s in linearisation.scores])
             for linearisation in linearisations
         ]
         time = fitter.problem.record.time

@@ -8,13 +8,17 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.discovery.assessment.telling_rows import edges
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import number
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 POINTS = 161
+EDGE_WIDTHS = 6
+"""Widths of an edge around it, over which it is drawn."""
 BAND = 1.96
 FREE = 3.0
 """Where the curve at its middle is so many times as uncertain as its shape, only the shape is shown."""
@@ -95,7 +99,7 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     site = next(s for s in model.sites if s.name == effect.site)
     units = {q.name: q.unit for q in (*model.inputs, *model.states, *model.signals)} | {"time": "s"}
     relative = effect.family.static is not None and (effect.mode or site.mode) == "factor"
-    x = np.linspace(float(np.min(seen)), float(np.max(seen)), POINTS)
+    x = _places(effect, float(np.min(seen)), float(np.max(seen)))
     g, slope = _law(effect, value)
     names = [effect.parameter(c.name) for c in effect.terms]
     c = np.array([effect.coefficients[t.name] for t in effect.terms])
@@ -113,6 +117,16 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     low, change, high = (shown(middle + k * BAND * std) for k in (-1, 0, 1))
     unit = "-" if relative else (site.unit or "")
     return EffectCurve(effect, units.get(effect.driver, ""), unit, relative, x, change, low, high, seen, anchor)
+
+
+def _places(effect: Effect, low: float, high: float) -> FloatArray:
+    """Values of the driver (K,) at which an effect is drawn: even ones, and close ones where a pulse has its edges."""
+    even = np.linspace(low, high, POINTS)
+    if not effect.family.passes:
+        return even
+    around = float(number(effect.full_settings, "width")) * np.linspace(-EDGE_WIDTHS, EDGE_WIDTHS, 2 * EDGE_WIDTHS + 1)
+    close = np.concatenate([t + around for t in edges(effect)])
+    return np.unique(np.concatenate([even, close[(close > low) & (close < high)]]))
 
 
 def _spread(gradient: FloatArray, covariance: FloatArray) -> FloatArray:

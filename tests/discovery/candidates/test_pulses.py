@@ -14,6 +14,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.record.screening import Suspect
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of
+from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.discovery.verdict.sizes import words_of_effects
 from adaptive_flot.discovery.verdict.suspects import event_times, suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -80,7 +81,8 @@ def test_a_short_record_keeps_its_scores() -> None:
 
 
 def test_a_pulse_is_told_with_its_size_and_both_its_times() -> None:
-    verdict = discover(heated_tank(), with_a_pulse()).verdict
+    found = discover(heated_tank(), with_a_pulse())
+    verdict = found.verdict
     assert verdict.word == "named", verdict.reason
     (told,) = verdict.effects
     assert (told.effect.site, told.effect.driver, told.effect.form) == ("thermometer", "time", PULSE)
@@ -90,6 +92,10 @@ def test_a_pulse_is_told_with_its_size_and_both_its_times() -> None:
     assert said.startswith("Thermometer showed 0.6")
     on, lasted = told.effect.coefficients["on_1"], told.effect.coefficients["for_1"]
     assert f"from {on:.0f} s to {on + lasted:.0f} s than before and after" in said
+    assert found.problem is not None and found.after is not None
+    (curve,) = effect_curves(found.problem, found.after, 1)
+    assert np.any((curve.change > 0.1 * SIZE) & (curve.change < 0.9 * SIZE)), "an edge is drawn, and not a slope"
+    assert np.interp(on + lasted / 2, curve.driver, curve.change) == pytest.approx(SIZE, rel=0.1)
 
 
 def test_both_edges_of_a_pulse_may_lie_where_the_record_is_suspect() -> None:
