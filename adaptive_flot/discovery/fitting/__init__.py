@@ -2,11 +2,12 @@
 
 Map
 ---
-base_fit.py      The record in splits, and the fit of the model as it is.
-unknowns.py      What a fit is free to move.
-descent.py       The search for one fit, with a noise model of its own.
-fitter.py        Fits to one problem.
-fit.py           A fitted alternative and its criterion.
-node_spacing.py  How far apart a densely sampled record may be simulated.
-parallel.py      Independent fits on several processes.
+base_fit.py          The record in splits, and the fit of the model as it is.
+unknowns.py          What a fit is free to move.
+descent.py           The search for one fit, with a noise model of its own.
+normal_equations.py  Its linear problem along one run.
+fitter.py            Fits to one problem.
+fit.py               A fitted alternative and its criterion.
+node_spacing.py      How far apart a densely sampled record may be simulated.
+parallel.py          Independent fits on several processes.
 """

@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
+from adaptive_flot.discovery.fitting.normal_equations import NormalEquations
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
 from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
@@ -68,7 +69,7 @@ class Descent:
         background = problem.background
         # what the model has of it already is the same for all predictions
         self._first_background = np.zeros(0) if background is None else background.first(model)
-        self._white_background: tuple[Noise, FloatArray] | None = None
+        self._equations = NormalEquations(problem, rows, unknowns)
 
     def _predict(self, z: FloatArray) -> FloatArray:
         p, x0 = self.unknowns.unpack(z)
@@ -179,7 +180,7 @@ class Descent:
         for _ in range(steps):
             if self.problem.time_is_up:
                 break
-            A, b = self._system(z, predicted, slope, noise)
+            A, b = self._equations.system(z, predicted, slope, noise)
             gain_step = self._tried(z, value, noise, self._step(z, A, b), damping)
             if gain_step is None and exact:
                 break
@@ -228,34 +229,6 @@ class Descent:
             damping *= 10
         return None
 
-    def _system(
-        self, z: FloatArray, predicted: FloatArray, slope: FloatArray, noise: Noise
-    ) -> tuple[FloatArray, FloatArray]:
-        """Normal equations (A, b) of the whitened, clipped, regularised problem."""
-        rows, w = self.rows, self.problem.weights
-        e = noise.whiten((self.problem.measured - predicted) / w)[rows]
-        present = np.isfinite(e)
-        inside = present & (np.abs(np.where(present, e, 0)) <= self.problem.clip)
-        e = e[inside]
-        everywhere = np.zeros(w.shape, dtype=bool)
-        everywhere[rows] = inside
-        J = noise.whiten_some(slope / w[:, :, None], everywhere)
-        if self.problem.background is not None:
-            J = np.hstack([J, self._whitened_background(noise)[inside.ravel()]])
-        prior = 1 / self.unknowns.prior**2
-        A = J.T @ J + np.diag(prior)
-        b = J.T @ e - prior * (z - self.unknowns.prior_centre)
-        return A, b
-
-    def _whitened_background(self, noise: Noise) -> FloatArray:
-        """Whitened responses (values of the rows, k) to the background, once for each noise model."""
-        if self._white_background is None or self._white_background[0] is not noise:
-            assert self.problem.background is not None  # asked by the caller
-            responses = self.problem.background.responses / self.problem.weights[:, :, None]
-            all_of_them = np.broadcast_to(self.rows[:, None], responses.shape[:2])
-            self._white_background = noise, noise.whiten_some(responses, all_of_them)
-        return self._white_background[1]
-
     def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:
         """Step (unknowns,) for a damping; what is at a limit and pulled beyond it stays."""
         size = np.diag(A) + 1e-12 * np.max(np.diag(A), initial=0.0)
@@ -281,7 +254,7 @@ class Descent:
             return z, predicted
         own = slice(self.unknowns.first_of_background, None)
         for _ in range(BACKGROUND_STEPS):  # which values are clipped may change
-            A, b = self._system(z, predicted, slope, noise)
+            A, b = self._equations.system(z, predicted, slope, noise)
             moved = np.zeros(len(z))
             moved[own] = np.linalg.solve(A[own, own], b[own])
             z, predicted = z + moved, predicted + self.problem.background.change(moved[own])
@@ -295,7 +268,7 @@ class Descent:
         z, predicted = self._with_best_background(z, predicted, slope, noise)
         if problem.background is not None:
             loss, noise = loss_of(problem, predicted, rows)
-        A, _ = self._system(z, predicted, slope, noise)
+        A, _ = self._equations.system(z, predicted, slope, noise)
         first = self.unknowns.first_of_background
         background = z[first:]
         if problem.background is not None:
