@@ -87,6 +87,20 @@ def test_a_dependence_is_told_between_the_extremes_of_its_curve() -> None:
     assert rising == "heat loss depends on fan speed: 4.5 times as much at fan speed 19.5 1/s as at 0.5 1/s"
 
 
+def test_an_event_that_is_not_over_is_told_as_far_as_the_record_goes() -> None:
+    """A feed that goes on rising: neither a time after the end, nor a size that nobody saw."""
+    onset, constant, end = 12000.0, 9000.0, 28800.0
+    effect = told("heat_loss", "time", "washout", half=0.01, amplitude=0.1, onset=onset, time_constant=constant)
+    time = np.linspace(0.0, end, 161)
+    change = np.exp(0.1 * (1 - np.exp(-np.maximum(time - onset, 0.0) / constant)))
+    reached = 100 * float(np.expm1(0.1 * (1 - np.exp(-(end - onset) / constant))))
+    said = words_of_effect(MODEL, effect, curve(effect, time, change, "s", relative=True))
+    assert said == f"heat loss rose by {reached:.2g} % from 12000 s to the end of the record"
+    over = replace(effect, effect=replace(effect.effect, coefficients={**effect.effect.coefficients, "onset": 100.0}))
+    shown = curve(over, time, change, "s", relative=True)
+    assert "from 100 s to 27100 s" in words_of_effect(MODEL, over, shown)
+
+
 def test_a_curve_in_time_is_told_by_its_largest_change_and_a_course_by_its_range() -> None:
     time = np.linspace(0.0, 1000.0, 161)
     effect = told("heat_loss", "time", "curve")

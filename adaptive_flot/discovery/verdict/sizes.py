@@ -54,6 +54,9 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     elif effect.driver == "saturation":
         (limit,) = effect.values(CoefficientRole.LIMIT)
         said = f"{name} does not go beyond {limit:.3g}{_unit(site)}"
+    elif curve is not None and effect.family.is_event and _ends(effect) > curve.driver[-1]:
+        # what has happened until then is told, without the interval of all that would
+        return f"{name} {_until_the_end(site, curve)}" + (f" ({told.meaning})" if told.meaning else "")
     elif effect.family.is_event:
         said = f"{name} {_event(site, effect)}"
     elif curve is None and effect.driver == "time":
@@ -90,6 +93,13 @@ def _always(site: Site, effect: Effect) -> str:
     return f"is {_amount(site, effect, level)} {'more' if level > 0 else 'less'} than {where}"
 
 
+def _ends(effect: Effect) -> float:
+    """Time [s] at which an event is over, an exponential approach but for a twentieth; its last onset where at once."""
+    onsets, durations = effect.values(CoefficientRole.ONSET), effect.values(CoefficientRole.DURATION)
+    settled = SETTLED * max(effect.values(CoefficientRole.TIME_CONSTANT), default=0.0)
+    return max(onsets) + max(durations, default=0.0) + settled
+
+
 def _event(site: Site, effect: Effect) -> str:
     (level,), (onset,) = effect.levels, effect.values(CoefficientRole.ONSET)
     durations = effect.values(CoefficientRole.DURATION)
@@ -103,6 +113,14 @@ def _event(site: Site, effect: Effect) -> str:
     when = f"from {onset:.0f} s to {onset + lasts[0]:.0f} s" if lasts else f"at {onset:.0f} s"
     factor = float(np.exp(level)) if _is_factor(site, effect) else None
     return f"{_moved(site, _amount(site, effect, level), rises=level > 0, factor=factor)} {when}"
+
+
+def _until_the_end(site: Site, curve: EffectCurve) -> str:
+    """An event that is not over when the record ends: how far it has come by then."""
+    rises, factor = bool(curve.change[-1] > curve.change[0]), _ratio(curve, 0, -1) if curve.relative else None
+    onset = max(curve.effect.values(CoefficientRole.ONSET))
+    moved = _moved(site, _between(site, curve, 0, -1), rises=rises, factor=factor)
+    return f"{moved} from {onset:.0f} s to the end of the record"
 
 
 def _in_time(site: Site, curve: EffectCurve) -> str:
