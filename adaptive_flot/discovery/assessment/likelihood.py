@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.assessment.reduction import MANY_BLOCKS, SHORTEST_BLOCK, column_means, squared_errors
-from adaptive_flot.discovery.assessment.telling_rows import telling_rows
+from adaptive_flot.discovery.assessment.telling_rows import pulse_rows, touched_rows
 from adaptive_flot.discovery.fitting.fit import Fit, row_losses
 from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
@@ -16,6 +16,7 @@ from adaptive_flot.greybox.model import FloatArray
 LEAST_EVIDENCE = 10.0
 """Drop of a criterion that counts: "very strong" evidence (Kass & Raftery, *J. Am. Statist. Assoc.* 90 (1995) 773)."""
 FEWEST_BLOCKS = 4
+"""Blocks without which a deviation can not be told."""
 COMPARISON_BLOCK_ROWS = 60
 """Rows of a block in which two fits are compared: what both lack is slower than the noise."""
 
@@ -30,8 +31,8 @@ def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) ->
     The likelihood ratio test of models that are not nested: Vuong, *Econometrica* 57 (1989) 307, eq. (4.2), with blocks
     of rows instead of rows, as these depend on one another; the fits stay as they are (Kishino & Hasegawa, *J. Mol.
     Evol.* 29 (1989) 170). A fit that is worse by less than `SURE` of these would be the better one in some records like
-    this. Zero of a record with fewer than MANY_BLOCKS blocks. A pulse is compared on the rows that it touches, where
-    these are enough: on all others both are the same, and the record of which this is a sample is that of the pulse.
+    this. Zero of a record with fewer than MANY_BLOCKS blocks. The rows that a pulse touches have
+    blocks of their own, where they are enough: it is over in one or two of the others.
     """
     rows = problem.rows("estimate")
     if rows.sum() < MANY_BLOCKS * SHORTEST_BLOCK:
@@ -40,14 +41,17 @@ def loglik_difference_sds(problem: Problem, best: Fit, others: Sequence[Fit]) ->
 
 
 def _difference_sd(problem: Problem, best: Fit, fit: Fit) -> float:
-    rows = _compared(problem, best, fit)
-    return _sd_of_sum(row_losses(problem, fit, rows) - row_losses(problem, best, rows))
+    return _fitted_sd(problem, best, fit, touched_rows(problem, (best, fit)))
 
 
-def _compared(problem: Problem, best: Fit, fit: Fit) -> BoolArray:
-    """Fitted rows (N,) on which two fits are compared: those that tell of a pulse, where they are enough."""
-    telling = telling_rows(problem, (best, fit), "estimate")
-    return telling if telling.sum() >= MANY_BLOCKS * SHORTEST_BLOCK else problem.rows("estimate")
+def _fitted_sd(problem: Problem, best: Fit, fit: Fit, touched: BoolArray) -> float:
+    """Deviation on the fitted rows: of those that a pulse touches, where they are enough, and of all others."""
+    rows = problem.rows("estimate")
+    difference = np.zeros(len(rows))
+    difference[rows] = row_losses(problem, fit, rows) - row_losses(problem, best, rows)
+    if (rows & touched).sum() < MANY_BLOCKS * SHORTEST_BLOCK:
+        return _sd_of_sum(difference[rows])
+    return float(np.hypot(_sd_of_sum(difference[rows & touched]), _sd_of_sum(difference[rows & ~touched])))
 
 
 def _sd_of_sum(difference: FloatArray) -> float:
@@ -67,11 +71,10 @@ def difference_with_confirm_rows(problem: Problem, best: Fit, fit: Fit) -> tuple
     asked too: those that tell anything (see `telling_rows`). The deviation is that of the sum of both, each by blocks
     as in `loglik_difference_sds`: rows that were fitted differ by less than those that were not.
     """
-    asked = telling_rows(problem, (best, fit), "confirm", ("estimate",))
-    both = _compared(problem, best, fit), asked
-    differences = [row_losses(problem, fit, rows) - row_losses(problem, best, rows) for rows in both]
-    seen, unseen = map(_sd_of_sum, differences)
-    return float(differences[1].sum()), float(np.hypot(seen, unseen))
+    touched = touched_rows(problem, (best, fit))
+    asked = pulse_rows(problem, (best, fit), "confirm", ("estimate",), touched)
+    unseen = row_losses(problem, fit, asked) - row_losses(problem, best, asked)
+    return float(unseen.sum()), float(np.hypot(_fitted_sd(problem, best, fit, touched), _sd_of_sum(unseen)))
 
 
 def rows_per_effective_sample(problem: Problem, before: Fit, after: Fit) -> float:

@@ -26,14 +26,16 @@ from adaptive_flot.greybox.stepping.record import RecordSimulator
 DIFFERS = 0.5
 """What changes no output by more than so many standard deviations of the noise changes nothing."""
 BY_CHANCE = 0.95
+"""Share of records in which noise stays below what counts as its largest by chance."""
 LEAST_ROWS = 16
 """Least rows for an interval: four of the shortest blocks."""
 
 
 def telling_rows(problem: Problem, fits: Sequence[Fit], split: str, fitted: Sequence[str] = ()) -> BoolArray:
-    """Rows (N,) of a split on which a pulse of some fits changes an output; all of them, where no fit has a pulse.
+    """Rows (N,) of a split on which a pulse of some fits changes an output; all of them, unless only pulses differ.
 
-    The rows beside an edge are left out (see above) where the split is none of those that were `fitted`.
+    The rows beside an edge are left out (see above) where the split is none of those that were `fitted`. A pulse that
+    the model came with is no question to the record, and another effect acts on all rows.
 
     Parameters
     ----------
@@ -42,16 +44,34 @@ def telling_rows(problem: Problem, fits: Sequence[Fit], split: str, fitted: Sequ
     split, fitted
         Name of the split that is asked, and names of those that the fits have seen.
     """
-    rows, pulses = problem.rows(split), _pulses(fits)
-    if not pulses:
-        return rows
-    touched: BoolArray = rows & np.any([_touched(problem, fit, pulse) for fit, pulse in pulses], axis=0)
-    sure: BoolArray = touched & ~_beside_an_edge(problem, [pulse for _, pulse in pulses], fitted)
-    return sure if sure.sum() >= LEAST_ROWS else touched
+    found = [e for fit in fits for e in fit.model.fitted_effects() if _is_free(fit, e)]
+    if not all(e.family.passes for e in found):
+        return problem.rows(split)
+    return pulse_rows(problem, fits, split, fitted, touched_rows(problem, fits))
+
+
+def pulse_rows(
+    problem: Problem, fits: Sequence[Fit], split: str, fitted: Sequence[str], touched: BoolArray
+) -> BoolArray:
+    """Rows (N,) as in `telling_rows`, whatever else differs; `touched` is what `touched_rows` gives for these fits."""
+    there: BoolArray = problem.rows(split) & touched
+    sure: BoolArray = there & ~_beside_an_edge(problem, [pulse for _, pulse in _pulses(fits)], fitted)
+    return sure if sure.sum() >= LEAST_ROWS else there
+
+
+def touched_rows(problem: Problem, fits: Sequence[Fit]) -> BoolArray:
+    """Rows (N,) on which a pulse of some fits changes a measured output; all, where none has one."""
+    masks = [_touched(problem, fit, pulse) for fit, pulse in _pulses(fits)]
+    return np.any(masks, axis=0) if masks else np.ones(len(problem.record), dtype=bool)
 
 
 def _pulses(fits: Sequence[Fit]) -> list[tuple[Fit, Effect]]:
-    return [(fit, e) for fit in fits for e in fit.model.fitted_effects() if e.family.passes]
+    """Pulses that some fits have found."""
+    return [(fit, e) for fit in fits for e in fit.model.fitted_effects() if e.family.passes and _is_free(fit, e)]
+
+
+def _is_free(fit: Fit, effect: Effect) -> bool:
+    return any(effect.parameter(c.name) in fit.names for c in effect.terms)
 
 
 def _beside_an_edge(problem: Problem, pulses: Sequence[Effect], fitted: Sequence[str]) -> BoolArray:
@@ -91,7 +111,7 @@ def largest_by_chance(noise: Noise, rows: int) -> FloatArray:
     Squares of noise whose neighbours have the correlation rho are worth n of the N rows, and so their mean is close to
     chi-squared with n degrees of freedom over n::
 
-        n = N(1 - rho ^ 2) / (1 + rho ^ 2)
+        n / N = (1 - rho^2) / (1 + rho^2)
 
     Bayley & Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184, for the squares.
     """

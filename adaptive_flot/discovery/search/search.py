@@ -119,24 +119,22 @@ def _confirmed(problem: Problem, result: SearchResult, accepted: list[Round]) ->
             left = result.left if last else max(result.left, r.alternatives[0].fit.bic - _best_bic(accepted))
             best = r.alternatives[0].fit
             rows_each = rows_per_effective_sample(problem, result.base, best)
-            differences = loglik_difference_sds(problem, best, [a.fit for a in r.alternatives])
-            compared = tuple(
-                replace(a, loglik_difference_sd=d) for a, d in zip(r.alternatives, differences, strict=True)
-            )
-            compared = _with_confirm_rows(problem, compared)
+            compared = _compared(problem, r.alternatives)
             return replace(
                 result, alternatives=compared, verification=verification, left=left, rows_per_effective_sample=rows_each
             )
     return result
 
 
-def _with_confirm_rows(problem: Problem, alternatives: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
-    """Alternatives to a pulse, compared on the confirm rows as well; as they are, where the best is none."""
-    best = alternatives[0]
-    if not any(e.family.passes for e in best.effects):
-        return alternatives
+def _compared(problem: Problem, alternatives: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+    """Alternatives with how certain their difference from the best is; those to a pulse on the confirm rows as well."""
+    best, others = alternatives[0], alternatives[1:]
+    if not all(e.family.passes for e in best.effects):
+        deviations = loglik_difference_sds(problem, best.fit, [a.fit for a in others])
+        told = (replace(a, loglik_difference_sd=d) for a, d in zip(others, deviations, strict=True))
+        return best, *told
     compared = [replace(best, adjusted_bic=best.fit.bic)]
-    for a in alternatives[1:]:
+    for a in others:
         more, deviation = difference_with_confirm_rows(problem, best.fit, a.fit)
         compared.append(replace(a, adjusted_bic=a.fit.bic + more, loglik_difference_sd=deviation))
     return tuple(compared)

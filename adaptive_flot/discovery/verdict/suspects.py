@@ -24,11 +24,11 @@ def event_times(effect: Effect) -> tuple[tuple[float, float], ...]:
     """
     if effect.driver != "time":
         return ()
+    if effect.family.passes:
+        return tuple((t, t) for t in edges(effect))
     onsets = tuple(
         (effect.coefficients[n],) * 2 for n in effect.names(CoefficientRole.ONSET) if n in effect.coefficients
     )
-    if effect.family.passes:
-        return tuple((t, t) for t in edges(effect))
     if onsets or not effect.family.is_curve:
         return onsets
     knots, moves = knots_of(effect), np.abs(np.diff(effect.levels))

@@ -88,6 +88,20 @@ def test_where_no_other_rows_tell_those_beside_an_edge_do(fits: tuple[Problem, F
     assert telling.sum() > 0.9 * inside.sum()
 
 
+def test_all_rows_tell_where_the_pulse_came_with_the_model_or_another_effect_is_compared(
+    fits: tuple[Problem, Fit, Fit],
+) -> None:
+    """A model that was extended once has its pulse; it is no question to the record any more."""
+    problem, base, fit = fits
+    known = replace(fit, names=base.names)
+    assert (telling_rows(problem, (base, known), "confirm", ("estimate",)) == problem.rows("confirm")).all()
+    draught = Effect("heat_loss", "fan_speed", "power", settings={"reference": 10.0})
+    names = tuple(draught.parameter(c.name) for c in draught.terms)
+    other = Fitter(problem).fit(base.model.with_effects([draught]), names, like=base)
+    assert other is not None
+    assert (telling_rows(problem, (other, fit), "confirm", ("estimate",)) == problem.rows("confirm")).all()
+
+
 def test_only_the_split_that_is_asked_loses_rows(fits: tuple[Problem, Fit, Fit]) -> None:
     problem, base, fit = fits
     fewer = on_telling_rows(problem, base, fit, "report", ("estimate", "confirm"))
