@@ -212,6 +212,15 @@ def apply(effect: Effect, scope: Any, value: ca.SX, driver: ca.SX, mode: Mode) -
     return value + g if mode == "offset" else value * ca.exp(g)
 
 
+def remembered(effect: Effect, scope: Any, driver: ca.SX) -> ca.SX:
+    """What the law of an effect sees: its driver, or what states of its own make of it. Asked once for each effect."""
+    family = effect.family
+    if family.memory is None:
+        return driver
+    coefficients = {c.name: scope.parameter(effect.parameter(c.name)) for c in effect.terms}
+    return family.memory(_Own(scope, effect.label), driver, coefficients, effect.full_settings)
+
+
 @dataclass(frozen=True)
 class _Own:
     """The states of one effect in the scope of its model."""

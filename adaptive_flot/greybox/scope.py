@@ -9,7 +9,7 @@ from typing import Literal
 import casadi as ca
 
 from adaptive_flot.errors import ModelError, near_match
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply, remembered
 from adaptive_flot.greybox.quantities import Kind
 
 Role = Literal["process", "sensor", "actuator", "feed", "flow"]
@@ -70,6 +70,7 @@ class Scope:
         self.sites: dict[str, Site] = {}
         self.site_values: dict[str, ca.SX] = {}
         self.factors: Mapping[str, float] = {}
+        self._seen: dict[str, ca.SX] = {}
 
     def _symbol(self, kind: Kind, name: str) -> ca.SX:
         table = self._symbols[kind]
@@ -112,9 +113,11 @@ class Scope:
         self.site_values.setdefault(name, value)
         at_site = (effect for effect in self._effects if effect.site == name)
         for effect in sorted(at_site, key=lambda e: e.family.is_beside):
-            if before.passed and effect.states():
+            if before.passed and effect.states() and effect.family.memory is None:
                 raise ModelError(f"{effect.label}: form {effect.form!r} has states, but the site has components")
-            value = apply(effect, self, value, self._driver(effect), effect.mode or mode)
+            if effect.label not in self._seen:  # the components of a site have one driver in common
+                self._seen[effect.label] = remembered(effect, self, self._driver(effect))
+            value = apply(effect, self, value, self._seen[effect.label], effect.mode or mode)
         return value
 
     def _driver(self, effect: Effect) -> ca.SX:

@@ -10,6 +10,7 @@ spline.py       Free curves over a driver.
 knots.py        Knots that a curve does not need.
 step_events.py  Steps, ramps and washouts in time.
 pulses.py       Changes that come and go, by the best pair of edges.
+relays.py       Switches with two thresholds of a signal.
 dynamics.py     Sensors that respond late; actuators that follow late, stick or reach a limit.
 direction.py    Which way a physical cause goes.
 """

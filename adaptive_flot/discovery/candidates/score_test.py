@@ -42,6 +42,8 @@ DEPENDENT = 1e-12
 """Share of the strongest combination of a variant's responses below which one is rounding, in squares."""
 AT_ONCE = 100
 """Rows or columns of a catalogue's responses (150 MB) that are worked on in one go: fresh memory is slow."""
+EXPLODED = 1e9
+"""Responses of so many units of noise are of a run that would not hold, as where a fitted curve feeds itself: none."""
 ABSORBED = 1e-7
 """Share of a response that must be left after projection; less is rounding, in which anything can be found."""
 
@@ -135,6 +137,8 @@ class Scorer:
         """Weighted responses to r profiles on the rows of `_reached` (rows, m, r)."""
         weighted = self._responses.of(profiles, self._reached)
         weighted /= self.problem.weights[self._reached][:, :, None]
+        for part in _parts(weighted.shape[2]):
+            weighted[:, :, part][:, :, ~(np.abs(weighted[:, :, part]).max(axis=(0, 1)) < EXPLODED)] = 0.0
         return weighted
 
     def _whitened(self, weighted: FloatArray) -> FloatArray:

@@ -138,10 +138,36 @@ def fit_variant(
     shape = {effect.parameter(k) for k, _ in score.variant.start}
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
     first = first if drawn else limited(model, effect, first)
-    fit = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
+    thresholds = {effect.parameter(n) for n in effect.names(CoefficientRole.THRESHOLD) if effect.family.memory}
+    if thresholds and warm is None:
+        fit = _size_first(fitter, model, free, thresholds, (first, start, bounds, rounds, steps, shrink))
+    else:
+        fit = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
     in_time = effect.driver == "time" and effect.family.is_curve and len(names) <= FINE_TIME_KNOTS
     if fit is not None and steps == MOST_STEPS and in_time:
         return fitter.settled(fit, bounds, WORTH_A_RESTART)
+    return fit
+
+
+def _size_first(
+    fitter: Fitter,
+    model: Model,
+    free: tuple[str, ...],
+    thresholds: set[str],
+    how: tuple[dict[str, float], Fit, dict[str, tuple[float, float]], int, int, list[str]],
+) -> Fit | None:
+    """The fit of a switch by a signal: its size with the thresholds of its score, then the thresholds as well.
+
+    While the size is far off, a threshold moves to where it hides the switch. So a few steps are for the size alone.
+    """
+    first, start, bounds, rounds, steps, shrink = how
+    size = fitter.fit(model, tuple(n for n in free if n not in thresholds), first, start, bounds, rounds, steps, shrink)
+    if size is None:
+        return None
+    there = {n: first[n] for n in thresholds}
+    fit = fitter.fit(size.model, free, there, size, bounds, rounds, steps) if steps == MOST_STEPS else None
+    if fit is None or fit.loss > size.loss:
+        return fitter.fit(size.model, free, there, size, bounds, 0) or fit
     return fit
 
 

@@ -57,7 +57,9 @@ class FittedJob:
 
 
 def first_forms(linearisation: ScoredLinearisation, score: Score) -> list[Score]:
-    """The forms of the first rung: the best one, and for what depends on time its curve too."""
+    """The forms of the first rung: the best one, for what depends on time its curve too, and what a switch replaced."""
+    if score.variant.effect.family.memory:
+        return [score, *linearisation.scorer.variant_scores(score.candidate)[:1]]
     if score.candidate.driver != "time":
         return [score]
     curves = [s for s in linearisation.scorer.variant_scores(score.candidate) if s.variant.effect.family.is_curve][:1]
@@ -129,7 +131,8 @@ def unbent(constant: FittedJob, ended: list[FittedJob], scorer: Scorer) -> list[
             continue
         if fitted.alternative.gain < (1 + ADDS) * reached.gain:
             level = effect.coefficients["amplitude"] * scorer.in_mode(effect.site, effect.mode, own.mode)
-            start = {c.name: level if c.is_level else 0.0 for c in own.terms}
+            shape = dict(fitted.score.variant.start)
+            start = {c.name: level if c.is_level else shape.get(c.name, 0.0) for c in own.terms}
             jobs.append(Job(constant.linearisation, replace(fitted.score, start=start), reached.fit))
     return jobs
 
@@ -140,7 +143,8 @@ def _bend(fit: Fit, effect: Effect) -> float:
     With the coefficients v that are zero where it is flat (of a curve, the differences of its values) and their
     covariance C: v' C^-1 v, Wald's statistic, *Trans. Am. Math. Soc.* 54 (1943) 426.
     """
-    names = map(effect.parameter, effect.names(CoefficientRole.KNOT_VALUE, CoefficientRole.SLOPE))
+    size = (CoefficientRole.LEVEL,) if effect.family.memory else (CoefficientRole.KNOT_VALUE, CoefficientRole.SLOPE)
+    names = map(effect.parameter, effect.names(*size))
     where = [fit.names.index(n) for n in names if n in fit.names]
     values, covariance = fit.values[where], fit.covariance[np.ix_(where, where)]
     if effect.family.is_curve:

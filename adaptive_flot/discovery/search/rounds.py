@@ -9,6 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.candidates.catalogue import catalogue
 from adaptive_flot.discovery.candidates.pulses import with_pulses
+from adaptive_flot.discovery.candidates.relays import with_relays
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -68,7 +69,7 @@ def run_round(
         linearisations = []
         most = further if before else SHORTLIST if len(scorers) == 1 else SHORTLIST_NEAR
         for scorer in scorers:
-            ranking = scorer.scores()
+            ranking = with_relays(scorer, scorer.scores())
             # a further effect that comes and goes would be whatever the first ones leave
             wanted = shortlist(scorer, most, ranking if before else with_pulses(scorer, ranking))
             if before is not None:

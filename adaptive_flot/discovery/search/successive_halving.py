@@ -173,7 +173,20 @@ class _SuccessiveHalving:
         finalists = _finalists(self._start(0).loss, list(furthest.values()), tied)
         drawn = {(f.linearisation, f.score.candidate.name): f for f in reversed(first) if is_curve(f)}
         coarse = [drawn.get((f.linearisation, f.score.candidate.name), f) for f in finalists]
-        return self._run([job for f in coarse for job in forms(self.linearisations[f.linearisation], f)])
+        jobs = [job for f in coarse for job in forms(self.linearisations[f.linearisation], f)]
+        return self._run([*jobs, *self._switches({f.score.candidate.name for f in finalists})])
+
+    def _switches(self, names: set[tuple[str, str]]) -> list[Job]:
+        """Switches by a signal of these names, from each linearisation that proposes one.
+
+        A few steps tell little of them: the name may have come further as a curve, along another linearisation.
+        """
+        return [
+            Job(i, s)
+            for i, linearisation in enumerate(self.linearisations)
+            for s in linearisation.scores
+            if s.candidate.name in names and s.variant.effect.family.memory
+        ]
 
     def followers(self, last: list[FittedJob]) -> list[FittedJob]:
         """Constants and events, which only a finished fit can start."""

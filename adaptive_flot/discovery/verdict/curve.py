@@ -12,11 +12,13 @@ from adaptive_flot.discovery.assessment.telling_rows import edges
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.forms.form import number
+from adaptive_flot.greybox.forms.form import CoefficientRole, number
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 POINTS = 161
+EDGE_SHARE = 1e-6
+"""Width of an edge of a switch, as a share of what the driver covers."""
 EDGE_WIDTHS = 6
 """Widths of an edge around it, over which it is drawn."""
 BAND = 1.96
@@ -42,6 +44,8 @@ class EffectCurve:
         The change and its 95 % band (K,), linearised in the coefficients.
     seen
         Values of the driver on the rows from the first that any split has.
+    falling
+        The change (K,) while the driver falls, of a switch with two thresholds; `change` is then that while it rises.
     anchor
         Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
         adapted parameters; None where it can.
@@ -57,6 +61,7 @@ class EffectCurve:
     high: FloatArray
     seen: FloatArray
     anchor: float | None = None
+    falling: FloatArray | None = None
 
 
 def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, ...]:
@@ -103,30 +108,46 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     g, slope = _law(effect, value)
     names = [effect.parameter(c.name) for c in effect.terms]
     c = np.array([effect.coefficients[t.name] for t in effect.terms])
-    middle = np.array([float(g(v, c)) for v in x])
-    gradient = np.array([np.array(slope(v, c)).ravel() for v in x])
+    sees, back = _branches(effect, x)
+    middle = np.array([float(g(v, c)) for v in sees])
+    gradient = np.array([np.array(slope(v, c)).ravel() for v in sees])
     covariance, anchor = _covariance(fit, names), None
     std = _spread(gradient, covariance)
     if effect.family.static is not None:
         typical = float(np.median(seen))
-        there = np.array(slope(typical, c)).ravel()
+        (at_typical,), _ = _branches(effect, np.array([typical]))
+        there = np.array(slope(at_typical, c)).ravel()
         shape_only = _spread(gradient - there, covariance)
         if _spread(there[None], covariance)[0] > FREE * np.max(shape_only):
-            anchor, std, middle = typical, shape_only, middle - float(g(typical, c))
+            anchor, std, middle = typical, shape_only, middle - float(g(at_typical, c))
     shown = np.exp if relative else np.asarray
     low, change, high = (shown(middle + k * BAND * std) for k in (-1, 0, 1))
     unit = "-" if relative else (site.unit or "")
-    return EffectCurve(effect, units.get(effect.driver, ""), unit, relative, x, change, low, high, seen, anchor)
+    falling = None if back is None else shown(np.array([float(g(v, c)) for v in back]))
+    driver_unit = units.get(effect.driver, "")
+    return EffectCurve(effect, driver_unit, unit, relative, x, change, low, high, seen, anchor, falling)
 
 
 def _places(effect: Effect, low: float, high: float) -> FloatArray:
-    """Values of the driver (K,) at which an effect is drawn: even ones, and close ones where a pulse has its edges."""
+    """Values of the driver (K,) at which an effect is drawn: even ones, and close ones where it has edges."""
     even = np.linspace(low, high, POINTS)
-    if not effect.family.passes:
+    if effect.family.memory:
+        width, at = EDGE_SHARE * (high - low), tuple(effect.values(CoefficientRole.THRESHOLD))
+    elif effect.family.passes:
+        width, at = float(number(effect.full_settings, "width")), edges(effect)
+    else:
         return even
-    around = float(number(effect.full_settings, "width")) * np.linspace(-EDGE_WIDTHS, EDGE_WIDTHS, 2 * EDGE_WIDTHS + 1)
-    close = np.concatenate([t + around for t in edges(effect)])
+    around = width * np.linspace(-EDGE_WIDTHS, EDGE_WIDTHS, 2 * EDGE_WIDTHS + 1)
+    close = np.concatenate([t + around for t in at])
     return np.unique(np.concatenate([even, close[(close > low) & (close < high)]]))
+
+
+def _branches(effect: Effect, x: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    """What the law of an effect sees at values of its driver (K,): as it rises, and as it falls where that differs."""
+    if not effect.family.memory:
+        return x, None
+    on_above, off_below = (effect.coefficients[n] for n in effect.names(CoefficientRole.THRESHOLD))
+    return (x > on_above).astype(float), (x > off_below).astype(float)
 
 
 def _spread(gradient: FloatArray, covariance: FloatArray) -> FloatArray:

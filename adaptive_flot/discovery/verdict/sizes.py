@@ -59,6 +59,8 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
         return f"{name} {_until_the_end(site, curve)}" + (f" ({told.meaning})" if told.meaning else "")
     elif effect.family.is_event:
         said = f"{name} {_event(site, effect)}"
+    elif effect.family.memory:
+        said = f"{name} {_switched(model, site, effect)}"
     elif curve is None and effect.driver == "time":
         low, high = (_deviation(site, effect, v) for v in (min(effect.levels), max(effect.levels)))
         said = f"{name} {'wanders' if effect.form == 'polyline' else 'changes'} in time, between {low} and {high}"
@@ -113,6 +115,21 @@ def _event(site: Site, effect: Effect) -> str:
     when = f"from {onset:.0f} s to {onset + lasts[0]:.0f} s" if lasts else f"at {onset:.0f} s"
     factor = float(np.exp(level)) if _is_factor(site, effect) else None
     return f"{_moved(site, _amount(site, effect, level), rises=level > 0, factor=factor)} {when}"
+
+
+def _switched(model: Model, site: Site, effect: Effect) -> str:
+    """A switch with two thresholds: `is 20 % smaller once level has risen above 0.4 m, until it falls below 0.3 m`."""
+    (level,) = effect.levels
+    on_above, off_below = (effect.coefficients[n] for n in effect.names(CoefficientRole.THRESHOLD))
+    units = {q.name: q.unit for q in (*model.inputs, *model.states, *model.signals)}
+    unit = units.get(effect.driver, "-")
+    unit = "" if unit == "-" else f" {unit}"
+    if site.role == "sensor":
+        what = f"shows {_amount(site, effect, level)} {'more' if level > 0 else 'less'}"
+    else:
+        what = f"is {_amount(site, effect, level)} {'larger' if level > 0 else 'smaller'}"
+    begun = f"once {spaced(effect.driver)} has risen above {on_above:.3g}{unit}"
+    return f"{what} {begun}, until it falls below {off_below:.3g}{unit}"
 
 
 def _until_the_end(site: Site, curve: EffectCurve) -> str:
@@ -206,7 +223,8 @@ def _percent(factor: float) -> str:
 def _interval(site: Site, told: NamedEffect) -> str:
     """The 95 % interval of a single size, a time constant or a dead time; empty for a curve."""
     effect = told.effect
-    if effect.driver not in ("constant", "lag", "delay") and not effect.family.is_event:
+    has_one = effect.driver in ("constant", "lag", "delay") or effect.family.is_event or effect.family.memory
+    if not has_one:
         return ""
     level = effect.driver not in ("lag", "delay")
     roles = (CoefficientRole.LEVEL,) if level else (CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME)

@@ -128,6 +128,7 @@ class SiteScope(Protocol):
 Coefs = Mapping[str, ca.SX]
 StaticLaw = Callable[[ca.SX, Coefs, Settings], ca.SX]
 DirectLaw = Callable[[SiteScope, ca.SX, ca.SX, Coefs, Settings], ca.SX]
+MemoryLaw = Callable[[SiteScope, ca.SX, Coefs, Settings], ca.SX]
 
 
 @dataclass(frozen=True)
@@ -149,6 +150,8 @@ class Form:
     static, direct
         Its law, one of the two: `(driver, coefficients, settings) -> g` or
         `(scope, value, driver, coefficients, settings) -> value`.
+    memory
+        What a static law sees in place of its driver, by states of the form: `(scope, driver, coefficients, settings)`.
     states
         Names of the states it owns, from the settings.
     drivers
@@ -170,6 +173,7 @@ class Form:
     setting_units: Mapping[str, str] = field(default_factory=dict)
     static: StaticLaw | None = None
     direct: DirectLaw | None = None
+    memory: MemoryLaw | None = None
     states: Callable[[Settings], tuple[str, ...]] = lambda settings: ()
     abrupt: bool = False
     passes: bool = False
@@ -204,7 +208,7 @@ class Form:
     @property
     def has_memory(self) -> bool:
         """Whether the value answers to its own past, by states of the form."""
-        return self.kind is FormKind.MEMORY
+        return self.kind is FormKind.MEMORY or self.memory is not None
 
 
 def number(settings: Settings, name: str) -> float:

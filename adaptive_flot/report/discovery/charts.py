@@ -16,6 +16,8 @@ from adaptive_flot.report.kit.heat import Cell, HeatMap, shares
 from adaptive_flot.report.kit.wording import spaced
 
 BINS = 60
+BACK = 1
+"""Place in the palette of what a switch does while its driver falls."""
 
 
 def score_map(scores: Sequence[Score], chosen: Sequence[tuple[str, str]] = ()) -> HeatMap:
@@ -40,15 +42,16 @@ def curve_chart(c: EffectCurve) -> Chart:
     power = exponent(c.driver)
     x, seen = c.driver * 10.0**-power, c.seen * 10.0**-power
     unit = c.unit or "-"
-    effect = (
-        Trace("model as it was", x, np.full(len(x), 1.0 if c.relative else 0.0), Role.CONSTANT, GREY),
-        Trace("fitted effect", x, c.change, Role.ESTIMATE, std=(c.high - c.low) / 4),
-    )
+    was = Trace("model as it was", x, np.full(len(x), 1.0 if c.relative else 0.0), Role.CONSTANT, GREY)
+    risen = "fitted effect" if c.falling is None else "fitted effect, while the driver rises"
+    effect = [was, Trace(risen, x, c.change, Role.ESTIMATE, std=(c.high - c.low) / 4)]
+    if c.falling is not None:
+        effect.append(Trace("while it falls", x, c.falling, Role.ESTIMATE, BACK))
     counts, edges = np.histogram(seen, bins=BINS, range=(float(x[0]), float(x[-1])))
     rows = Trace("rows", edges, np.concatenate([counts[:1], counts]).astype(float), Role.ESTIMATE, GREY, held=True)
     what = "factor on" if c.relative else "added to"
     panels = (
-        Panel(f"{what} {spaced(c.effect.site)}", unit, effect, height=1.6),
+        Panel(f"{what} {spaced(c.effect.site)}", unit, tuple(effect), height=1.6),
         Panel("rows of the record", "-", (rows,), height=0.6),
     )
     return Chart(panels, x_label=spaced(c.effect.driver), x_unit=unit_text(c.driver_unit or "-", power))

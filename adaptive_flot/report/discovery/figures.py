@@ -92,7 +92,10 @@ def curve_figure(curves: Sequence[EffectCurve]) -> Figure:
         own = exponent(c.low, c.high)
         low, middle, high = (v * 10.0**-own for v in (c.low, c.change, c.high))
         ax.fill_between(x, low, high, color=colour(0), alpha=0.22, lw=0, label="95 % band")
-        ax.plot(x, middle, color=colour(0), label="fitted effect")
+        rises = "fitted effect" if c.falling is None else "fitted effect, while the driver rises"
+        ax.plot(x, middle, color=colour(0), label=rises)
+        if c.falling is not None:
+            ax.plot(x, c.falling * 10.0**-own, color=colour(1), ls="--", label="while it falls")
         ax.axhline(1.0 if c.relative else 0.0, color=style.CONSTANT, lw=1.2, ls=(0, (5, 1.5)), label="model as it was")
         ax.set_ylabel(
             f"{'factor on' if c.relative else 'added to'}\n{spaced(c.effect.site)} [{unit_text(c.unit or '-', own)}]"

@@ -16,9 +16,10 @@ from adaptive_flot.discovery.candidates.spline import spline_values
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.noise import Noise, with_rows_before
-from adaptive_flot.discovery.record.problem import Problem, make_problem
+from adaptive_flot.discovery.record.problem import BoolArray, Problem, make_problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.static import spline_basis
+from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.nodes import place_nodes
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from tests.discovery.heated import DT, EXPONENT, Truth, heated_tank, tank_record
@@ -219,3 +220,21 @@ def test_what_a_candidate_explains_adds_up_over_the_outputs(weak: tuple[Problem,
     for score in scorer.scores():
         parts = [scorer.gain_in_output(score, j) for j in range(len(problem.columns))]
         assert sum(parts) == pytest.approx(score.gain, rel=0.02)  # columns nearly alike: the ridge
+
+
+def test_what_explodes_along_a_run_explains_nothing() -> None:
+    """A curve that feeds itself holds in the run and not in its linearisation: a status, and no crash."""
+    problem, fit = _fitted(Truth())
+    responses = Responses(problem, fit)
+    plain = responses.of
+
+    def exploding(profiles: list[TimeProfile], rows: BoolArray | None = None) -> FloatArray:
+        values = plain(profiles, rows)
+        values[:, :, [p.site == "heat_loss" for p in profiles]] *= 1e200
+        return values
+
+    responses.of = exploding  # type: ignore[method-assign]
+    scorer = Scorer(problem, fit, responses, catalogue(fit.model, responses))
+    gains = {s.candidate.name: s.gain for s in scorer.scores()}
+    assert all(np.isfinite(list(gains.values())))
+    assert gains["heat_loss", "fan_speed"] == 0.0 < gains["heating", "time"]

@@ -1,0 +1,111 @@
+"""A switch with two thresholds of a signal: on above the upper one, off below the lower one, as it was between.
+
+No curve over a signal draws one, since the same value of the signal goes with both levels. So each pair of some
+thresholds is tried. With the projected whitened responses x (values,) to the course of the switch along the fitted run,
+and the residual e::
+
+    gain = (x'e)^2 / (x'x)
+
+is the score statistic of the pair, and x'e over x'x its amplitude: Rao, *Proc. Cambridge Philos. Soc.* 44 (1948) 50.
+The thresholds are even ones over what the signal covers; then closer ones around the best two. A switch that moves once
+or twice is left out: a step or a pulse in time would be the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from adaptive_flot.discovery.candidates.responses import TimeProfile
+from adaptive_flot.discovery.candidates.score_test import Score, Scorer
+from adaptive_flot.discovery.candidates.variant import Variant
+from adaptive_flot.discovery.record.problem import BoolArray
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.model import FloatArray
+
+RELAY = "relay"
+"""The form of a switch with two thresholds."""
+MOST = 24
+"""Dependences, best first, that are tried as a switch."""
+THRESHOLDS, BETWEEN = 9, 5
+"""Even thresholds that are tried, and closer ones around each of the best two."""
+COVERED = (0.02, 0.98)
+"""Quantiles of a signal between which thresholds are tried."""
+LEAST_MOVES = 3
+"""Least times that a switch goes on or off: fewer are a step or a pulse."""
+PARAMETERS = 3
+"""Amplitude and two thresholds."""
+
+Thresholds = tuple[float, float]
+"""Where a switch goes on, and where off."""
+
+
+def course(driver: FloatArray, on_above: float, off_below: float) -> BoolArray:
+    """Whether a switch is on (N,) along a driver (N,); from the start as the nearer threshold says."""
+    told = (driver > on_above) | (driver < off_below)
+    told[0] = True
+    last = np.maximum.accumulate(np.where(told, np.arange(len(driver)), 0))
+    is_on: BoolArray = driver[last] > 0.5 * (on_above + off_below)
+    return is_on
+
+
+def with_relays(scorer: Scorer, scores: Sequence[Score]) -> list[Score]:
+    """The scores, best first, with a switch for each of the best dependences that scores better as one.
+
+    Parameters
+    ----------
+    scorer
+        Responses and residual along a fit.
+    scores
+        Scores of its candidates, best first.
+    """
+    wanted = [s for s in scores if s.candidate.driver not in STATELESS_DRIVERS][:MOST]
+    found = {s.candidate.name: _relay(scorer, s) for s in wanted}
+    better = [max(found.get(s.candidate.name) or s, s, key=lambda each: each.penalised) for s in scores]
+    return sorted(better, key=lambda s: -s.penalised)
+
+
+def _relay(scorer: Scorer, score: Score) -> Score | None:
+    """The best switch at the site and by the driver of a score; None where none moves often enough."""
+    driver = scorer.drivers[score.candidate.driver]
+    low, high = np.quantile(driver, COVERED)
+    even = np.linspace(low, high, THRESHOLDS + 2)[1:-1]
+    best = _best(scorer, score, [(on, off) for off, on in combinations(even.tolist(), 2)])
+    if best is None:
+        return None
+    step = (even[1] - even[0]) * np.linspace(-0.75, 0.75, BETWEEN)
+    on, off = best[0]
+    close = [(on + a, off + b) for a in step.tolist() for b in step.tolist() if on + a > off + b]
+    (on, off), gain, amplitude = _best(scorer, score, [(on, off), *close]) or best
+    start = {"amplitude": amplitude, "on_above": on, "off_below": off}
+    penalised = gain - PARAMETERS * float(np.log(scorer.measurements))
+    return replace(score, variant=_variant(scorer, score, start), gain=gain, penalised=penalised, start=start)
+
+
+def _best(scorer: Scorer, score: Score, pairs: Sequence[Thresholds]) -> tuple[Thresholds, float, float] | None:
+    """The best pair of thresholds with its gain and amplitude; None where no switch moves often enough."""
+    driver, site = scorer.drivers[score.candidate.driver], score.candidate.site
+    courses = {pair: course(driver, *pair) for pair in pairs}
+    often = {c.tobytes(): pair for pair, c in courses.items() if np.count_nonzero(c[1:] != c[:-1]) >= LEAST_MOVES}
+    if not often:
+        return None
+    kept = list(often.values())
+    profiles = [TimeProfile(site.name, courses[pair].astype(float), site.mode == "offset") for pair in kept]
+    X = scorer.projected_profiles(profiles)
+    along, strength = X.T @ scorer.residual, np.einsum("ij,ij->j", X, X)
+    sure = strength > 1e-9 * np.max(strength, initial=1e-300)
+    gains = np.where(sure, along**2 / np.where(sure, strength, 1.0), 0.0)
+    k = int(np.argmax(gains))
+    return kept[k], float(gains[k]), float(along[k] / max(strength[k], 1e-300))
+
+
+def _variant(scorer: Scorer, score: Score, start: dict[str, float]) -> Variant:
+    site, driver = score.candidate.site, score.candidate.driver
+    is_on = course(scorer.drivers[driver], start["on_above"], start["off_below"])
+    effect = Effect(site.name, driver, RELAY, settings={"follow_s": max(2.0, scorer.problem.record.dt)})
+    profile = TimeProfile(site.name, is_on.astype(float), site.mode == "offset")
+    shape = ("on_above", start["on_above"]), ("off_below", start["off_below"])
+    return Variant(effect, (profile,), ("amplitude",), shape)
