@@ -13,4 +13,5 @@ wording.py      The verdict in plain words.
 sizes.py        An effect that is told: what, by how much, in which direction and when.
 locate.py       Where in the process the missing effect acts.
 curve.py        The curve of a fitted effect with its band.
+thresholds.py   How far the thresholds of a switch may lie from where they were fitted.
 """

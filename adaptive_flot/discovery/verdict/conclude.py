@@ -17,6 +17,7 @@ from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.report_veto import much_better
 from adaptive_flot.discovery.verdict.sizes import words_of_effects
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
+from adaptive_flot.discovery.verdict.thresholds import with_ranges
 from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
@@ -46,6 +47,8 @@ def conclude(state: State) -> Verdict:
     labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
     values = final.values[: len(labels)]
     effects = _effects(judgement, after) if tells else ()
+    if any(e.effect.family.memory for e in effects):
+        effects = with_ranges(effects, _curves(state, effects))
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
     return Verdict(
         word=judgement.word,

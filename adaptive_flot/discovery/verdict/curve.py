@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.assessment.telling_rows import edges
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
-from adaptive_flot.discovery.record.problem import Problem
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, number
 from adaptive_flot.greybox.model import FloatArray
@@ -46,6 +46,8 @@ class EffectCurve:
         Values of the driver on the rows from the first that any split has.
     falling
         The change (K,) while the driver falls, of a switch with two thresholds; `change` is then that while it rises.
+    is_on
+        Whether such a switch is on, on the same rows as `seen`.
     anchor
         Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
         adapted parameters; None where it can.
@@ -62,6 +64,7 @@ class EffectCurve:
     seen: FloatArray
     anchor: float | None = None
     falling: FloatArray | None = None
+    is_on: BoolArray | None = None
 
 
 def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, ...]:
@@ -72,7 +75,10 @@ def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, 
         return ()
     series, values = _series(problem, fit)
     first = max(problem.first_row - 1, 0)  # the series begin at the second row
-    return tuple(_curve(fit, e, series[e.driver][first:], values[e.site]) for e in wanted)
+    curves = (_curve(fit, e, series[e.driver][first:], values[e.site]) for e in wanted)
+    return tuple(
+        replace(c, is_on=series[f"{c.effect.label}.on"][first:] > 0.5) if c.effect.family.memory else c for c in curves
+    )
 
 
 def _series(problem: Problem, fit: Fit) -> tuple[dict[str, FloatArray], dict[str, float]]:

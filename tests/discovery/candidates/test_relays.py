@@ -20,6 +20,7 @@ from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of
 from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.discovery.verdict.sizes import words_of_effects
+from adaptive_flot.discovery.verdict.thresholds import same_course
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -65,6 +66,23 @@ def test_the_course_of_a_switch_is_that_of_a_latch(seed: int, off_below: float, 
     driver = np.random.default_rng(seed).normal(size=80).cumsum() / 3
     expected = latched(driver, off_below + band, off_below)
     assert course(driver, off_below + band, off_below).tolist() == expected
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10_000), st.floats(-1, 1), st.floats(0.0, 1.5), st.floats(0.01, 0.99), st.floats(0.01, 0.99))
+def test_thresholds_may_lie_anywhere_in_their_ranges(
+    seed: int, off_below: float, band: float, first: float, second: float
+) -> None:
+    """Along a driver that stays for some rows wherever it goes."""
+    driver = np.repeat(np.random.default_rng(seed).normal(size=60).cumsum() / 3, 6)
+    plain = course(driver, off_below + band, off_below)
+    upper, lower = same_course(driver, plain)
+    assert upper[0] <= off_below + band <= upper[1]
+    assert lower[0] <= off_below <= lower[1]
+    if np.isfinite([*upper, *lower]).all():
+        on, off = (low + share * (high - low) for (low, high), share in ((upper, first), (lower, second)))
+        moved = course(driver, max(on, off), min(on, off))
+        assert np.array_equal(moved[1:], plain[1:]) or plain[0] != moved[0] or on < off
 
 
 def test_the_form_switches_as_a_latch_does() -> None:
@@ -134,6 +152,9 @@ def test_a_switch_is_told_with_its_size_and_both_thresholds() -> None:
     found_at = told.effect.coefficients["on_above"], told.effect.coefficients["off_below"]
     moved = course(record.inputs[:, 1], *found_at) != np.array(latched(record.inputs[:, 1], OPENS, CLOSES))
     assert moved.mean() < 0.03, "thresholds may lie anywhere between two speeds of the record, and nowhere else"
+    for name, true in (("on_above", OPENS), ("off_below", CLOSES)):
+        least, most = told.interval95[name]
+        assert least < true < most, "the threshold is where no row says anything, and the interval says so"
     said = words_of_effects(heated_tank(), [told], [])
     assert said.startswith("Heat loss is ") and "larger once fan speed has risen above" in said
     assert "until it falls below" in said
