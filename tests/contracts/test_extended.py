@@ -19,12 +19,13 @@ from adaptive_flot.testing import (
 )
 from tests.contracts.test_contracts import ESTIMATOR_CASES
 
+SWITCH = {"amplitude": 0.1, "on_above": 1.55e-3, "off_below": 1.35e-3}
 EXPONENT = "bubble_size_by_air_flow.exponent"
 
 
 @pytest.fixture(scope="module")
 def extended(model: Model) -> Model:
-    """Bubbles grow with air, the feed is late, the valve sticks, the flow lags (states), the froth changes in time."""
+    """Bubbles grow with air, the feed is late, the valve sticks, the flow lags (states), the froth changes, much air is a switch."""
     return model.with_effects(
         [
             Effect("bubble_size", "air_flow", "power", {"exponent": 0.3}, {"reference": 1.5e-3}),
@@ -34,6 +35,7 @@ def extended(model: Model) -> Model:
             Effect("tails_valve", "lag", "stiction", {"amplitude": 1.0, "band": 1e-6}, {"scale": 1.6e-4}),
             Effect("concentrate_flow", "lag", "lag", {"amplitude": 0.8, "time_constant": 12.0}, {"scale": 1e-6}),
             Effect("coalescence", "time", "ramp", {"amplitude": 0.1, "onset": 10.0, "duration": 20.0}),
+            Effect("floatability_gangue", "air_flow", "relay", SWITCH),
         ]
     )
 
