@@ -25,7 +25,7 @@ EXPONENT = "bubble_size_by_air_flow.exponent"
 
 @pytest.fixture(scope="module")
 def extended(model: Model) -> Model:
-    """Bubbles grow with air, the feed is late, the valve sticks, the flow lags (states), the froth changes, much air is a switch."""
+    """Bubbles grow with air, the feed is late, the valve sticks, the flow lags, the froth changes, air switches."""
     return model.with_effects(
         [
             Effect("bubble_size", "air_flow", "power", {"exponent": 0.3}, {"reference": 1.5e-3}),
