@@ -22,9 +22,11 @@ import numpy as np
 from adaptive_flot.discovery.candidates.responses import TimeProfile
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.variant import Variant
-from adaptive_flot.discovery.record.problem import BoolArray
+from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.stepper import Stepper
 
 RELAY = "relay"
 """The form of a switch with two thresholds."""
@@ -66,6 +68,21 @@ def with_relays(scorer: Scorer, scores: Sequence[Score]) -> list[Score]:
     found = {s.candidate.name: _relay(scorer, s) for s in wanted}
     better = [max(found.get(s.candidate.name) or s, s, key=lambda each: each.penalised) for s in scores]
     return sorted(better, key=lambda s: -s.penalised)
+
+
+def moves_often(problem: Problem, fit: Fit, effect: Effect) -> bool:
+    """Whether a switch of a fit moves often enough along its own run, where the effect is one; True of all others.
+
+    A fit may move a threshold to where the switch goes on once: that is a step in time by another name.
+    """
+    if effect.form != RELAY:
+        return True
+    record, model = problem.record, fit.model
+    run = Stepper(model, record.dt).simulate(
+        fit.initial_state, record.inputs[1:], parameters_of(fit), float(record.time[0])
+    )
+    is_on = run.states[:, model.names("states").index(f"{effect.label}.on")] > 0.5
+    return bool(np.count_nonzero(is_on[1:] != is_on[:-1]) >= LEAST_MOVES)
 
 
 def _relay(scorer: Scorer, score: Score) -> Score | None:

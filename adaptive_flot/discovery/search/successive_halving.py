@@ -18,6 +18,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import worth_its_freedom
 from adaptive_flot.discovery.candidates.direction import nameable
+from adaptive_flot.discovery.candidates.relays import moves_often
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.candidates.step_events import refined
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -135,7 +136,7 @@ class _SuccessiveHalving:
                 _alternative(self.base, self._start(job.linearisation), job.score, fit, self.before),
             )
             for job, fit in zip(jobs, fits, strict=True)
-            if fit
+            if fit and moves_often(self.fitter.problem, fit, job.score.variant.effect)
         ]
         return sorted(done, key=lambda fitted: fitted.alternative.fit.bic)
 

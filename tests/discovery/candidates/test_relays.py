@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.candidates.relays import LEAST_MOVES, RELAY, course, with_relays
+from adaptive_flot.discovery.candidates.relays import LEAST_MOVES, RELAY, course, moves_often, with_relays
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -164,3 +164,15 @@ def test_a_switch_is_told_with_its_size_and_both_thresholds() -> None:
     assert curve.falling is not None
     assert curve.change[between] == pytest.approx(1.0)
     assert curve.falling[between] == pytest.approx(1 + MORE, rel=0.1)
+
+
+def test_a_switch_that_a_fit_made_a_step_of_is_none() -> None:
+    """Thresholds so far apart that the switch goes on once: a step in time by another name."""
+    problem = make_problem(vented(), heated_tank(), ("efficiency", "loss"), burn_in=30, guard=5, cycles=20)
+    for thresholds, often in (((OPENS, CLOSES), True), ((OPENS, 1.0), False)):
+        size = {"amplitude": 0.4, "on_above": thresholds[0], "off_below": thresholds[1]}
+        relay = Effect("heat_loss", "fan_speed", RELAY, size, {"follow_s": DT})
+        fit = Fitter(problem).fit(heated_tank().with_effects([relay]), steps=1, rounds=1)
+        assert fit is not None
+        assert moves_often(problem, fit, relay) == often
+        assert moves_often(problem, fit, Effect("heat_loss", "constant", "shift"))
