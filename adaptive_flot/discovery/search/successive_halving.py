@@ -136,8 +136,9 @@ class _SuccessiveHalving:
                 _alternative(self.base, self._start(job.linearisation), job.score, fit, self.before),
             )
             for job, fit in zip(jobs, fits, strict=True)
-            if fit and moves_often(self.fitter.problem, fit, job.score.variant.effect)
+            if fit
         ]
+        done = [f for f in done if moves_often(self.fitter.problem, f.alternative.fit, f.alternative.effects[-1])]
         return sorted(done, key=lambda fitted: fitted.alternative.fit.bic)
 
     def keeps_up(self, a: Alternative, rival: Alternative | None, share: float) -> bool:
