@@ -12,6 +12,7 @@ tree/                 Plans whose first move keeps the limits in every scenario.
 chance_constraint.py  Back-off from limits for what the estimate leaves open.
 output_bias.py        Correction of the model by the last measured outputs.
 early.py              Plans before their time.
+modifiers/            Slopes of the plant where those of the model are wrong.
 probing/              Moves that are made to learn.
 taking_over.py        Going on from a smaller model.
 told.py               What a decision tells of its plan.

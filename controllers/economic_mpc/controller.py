@@ -13,6 +13,7 @@ from adaptive_flot.contracts import AnyController, ControllerSetup, Decision, Es
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from controllers.economic_mpc.early import Early, counted, narrowed
+from controllers.economic_mpc.modifiers.learning import Modifiers, answer_time, modifier_options
 from controllers.economic_mpc.output_bias import OutputBias
 from controllers.economic_mpc.planner import Planner, Uncertainty
 from controllers.economic_mpc.probing.choice import make_probing, probed
@@ -75,6 +76,9 @@ class EconomicMpc:
         Wall-clock time of a solve; there is no second try when the first took longer.
     early_plans
         Plan before the next move is due where an output has left its plan and lies beyond its limit (`early.py`).
+    modifiers
+        Correct the model's outputs in limits and economics by biases and slopes of the plant (`modifiers/learning.py`).
+        True, or options of `Modifiers` (`settling_s` by default the horizon); default none.
     probing
         Moves that tell the parameters apart: options of `Probing` (dips within a budget), or `by: value` and options of
         `Knowledge` (what a detour teaches is worth more than it costs); default none.
@@ -102,6 +106,7 @@ class EconomicMpc:
         bias_time_s: float = 20.0,
         budget_s: float = 5.0,
         early_plans: bool = False,
+        modifiers: bool | Mapping[str, Any] = False,
         probing: Mapping[str, Any] | None = None,
     ) -> None:
         limits, economics = setup.limits, setup.economics
@@ -117,7 +122,9 @@ class EconomicMpc:
         if probing is not None and scenarios != 1:
             raise ModelError("economic_mpc: probing compares nominal plans; give it or scenarios, not both")
         self.setup = setup
-        self.problem = OptimalControlProblem(setup.model, economics, limits, horizon, move_s)
+        asked = modifier_options(modifiers, horizon * move_s)
+        answer_s = None if asked is None else answer_time(asked["settling_s"])
+        self.problem = OptimalControlProblem(setup.model, economics, limits, horizon, move_s, answer_s=answer_s)
         self.layout = self.problem.layout
         self.solver: Solver = make_solver(self.problem, solver, budget_s)
         self.budget_s = budget_s
@@ -125,6 +132,7 @@ class EconomicMpc:
         own = [own[0], *[own[1]] * self.layout.slacks_size]
         self._scale = 1 / economics.typical_rate  # the objective is of order 1 to 100, as solvers want it
         self._bounds = Bounds.of(limits, self.layout)
+        self.modifiers = None if asked is None else Modifiers(setup, self.layout, bias_time_s, **asked)
         self.planner = Planner(
             setup,
             self.problem,
@@ -135,6 +143,7 @@ class EconomicMpc:
             uncertainty=Uncertainty(limit_probability, scenarios, branch),
             solver=solver,
             budget_s=budget_s,
+            modifiers=self.modifiers,
         )
         self._biases = [
             OutputBias(name, setup.model.index("outputs", name), setup.dt, bias_time_s) for name in self.layout.outputs
@@ -146,7 +155,8 @@ class EconomicMpc:
     def init(self, time: float) -> MpcState:
         """Nothing is planned yet."""
         count, probe = len(self._biases), None if self.probing is None else ProbeState(time)
-        return MpcState(0, time, None, None, None, 0, (0.0,) * count, (time,) * count, Misfit.none(count), probe)
+        state = MpcState(0, time, None, None, None, 0, (0.0,) * count, (time,) * count, Misfit.none(count), probe)
+        return state if self.modifiers is None else replace(state, modifiers=self.modifiers.init(time))
 
     def with_failing_solver(self) -> EconomicMpc:
         """The same controller, states included, whose optimisations find nothing: a drill of what decides then."""
@@ -160,7 +170,10 @@ class EconomicMpc:
         """Go on with the inputs and the plan of the same controller for a smaller model; see `TakesOver.take_over`."""
         if not isinstance(before, EconomicMpc):
             raise ModelError("economic_mpc: only the state of an economic_mpc can be taken over")
-        return taken_over(state, before.layout, self.layout, self._biases, known, again)
+        after = taken_over(state, before.layout, self.layout, self._biases, known, again)
+        if self.modifiers is None or state.modifiers is None:
+            return after
+        return replace(after, modifiers=self.modifiers.taken_over(state.modifiers, known, again))
 
     def tracked(self, state: MpcState, inputs: FloatArray) -> MpcState:
         """Go on from what really acts; see `TracksInputs.tracked`."""
@@ -169,6 +182,8 @@ class EconomicMpc:
     def decide(self, state: MpcState, sample: Sample | None, estimate: Estimate | None) -> tuple[MpcState, Decision]:
         """Inputs of the next interval: the planned ones until there is an estimate, then the optimiser's."""
         state, came = self._listen(replace(state, row=state.row + 1), estimate)
+        if self.modifiers is not None and state.modifiers is not None:
+            state = replace(state, modifiers=self.modifiers.heard(state.modifiers, sample, estimate))
         if sample is None or estimate is None:
             row = min(state.row, len(self.setup.schedule)) - 1
             inputs = self.setup.schedule[row].copy()

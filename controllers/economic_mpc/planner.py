@@ -11,9 +11,10 @@ from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status, f
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from controllers.economic_mpc.chance_constraint import ChanceConstraint, quantile_of
+from controllers.economic_mpc.modifiers.learning import Modifiers
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.layout import Bounds
-from controllers.economic_mpc.problem.stage import Arguments
+from controllers.economic_mpc.problem.stage import Arguments, OutputModifiers
 from controllers.economic_mpc.softening import GivenUp, Softening
 from controllers.economic_mpc.solvers.verification import NlpSolution, Solver, Validity
 from controllers.economic_mpc.state import MpcState
@@ -80,6 +81,8 @@ class Planner:
         Name of the solver.
     budget_s
         Wall-clock time of a solve [s]; there is no further one when it took longer.
+    modifiers
+        Learns slopes of the plant; None for the model's.
     """
 
     def __init__(
@@ -94,7 +97,9 @@ class Planner:
         uncertainty: Uncertainty,
         solver: str,
         budget_s: float,
+        modifiers: Modifiers | None = None,
     ) -> None:
+        self._modifiers = modifiers
         self.setup, self.layout, self.softening, self.budget_s = setup, problem.layout, softening, budget_s
         self.bounds = self.layout.bounds(bounds)
         self.limits, self._prices = limits, prices
@@ -150,6 +155,7 @@ class Planner:
             np.array(state.bias),
             self._prices,
             estimate.time,
+            self._modified(state),
         )
         bounds, back = self.softening.way_back(self.bounds if bounds is None else bounds, held[moved])
         arguments, spent = now.vector(), 0.0
@@ -191,6 +197,12 @@ class Planner:
         plain = copy.copy(self)
         plain.tree = None
         return plain
+
+    def _modified(self, state: MpcState) -> OutputModifiers | None:
+        if self._modifiers is None or state.modifiers is None:
+            return None
+        known = state.modifiers
+        return OutputModifiers(self._modifiers.offsets(known), self._modifiers.slopes(known), known.answered)
 
     def _limits_for(self, estimate: Estimate, held: FloatArray, theta: FloatArray) -> FloatArray:
         """Values of the output limits, moved inwards by what the estimate leaves open."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
+from controllers.economic_mpc.modifiers.learning import ModifierState
 from controllers.economic_mpc.scenarios import Misfit
 from controllers.economic_mpc.solvers.verification import NlpSolution
 
@@ -58,6 +59,8 @@ class MpcState:
         How far plans were off.
     tree
         Solution of the last tree; None without one.
+    modifiers
+        What is known of the plant's slopes; None without modifiers.
     moved_from
         Moved inputs before the last plan (m,), where an early one may follow it; else None.
     probe
@@ -76,3 +79,4 @@ class MpcState:
     probe: ProbeState | None = None
     tree: NlpSolution | None = None
     moved_from: FloatArray | None = None
+    modifiers: ModifierState | None = None

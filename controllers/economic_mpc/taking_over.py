@@ -63,6 +63,7 @@ def with_further_states(solution: FloatArray, before: StageLayout, after: StageL
         return np.concatenate([np.concatenate([p, further]) if i in holding_states else p for i, p in enumerate(parts)])
 
     block = before.block
-    stage = [nx, nu, nu, before.slacks_size, *[nx, nz] * DEGREE]
+    nu_before = nu + before.answered_size
+    stage = [nx, nu_before, nu, before.slacks_size, *[nx, nz] * DEGREE]
     stages = [extended(solution[k * block : (k + 1) * block], stage) for k in range(before.horizon)]
-    return np.concatenate([*stages, extended(solution[before.horizon * block :], [nx, nu])])
+    return np.concatenate([*stages, extended(solution[before.horizon * block :], [nx, nu_before])])

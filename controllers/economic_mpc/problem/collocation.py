@@ -21,7 +21,7 @@ CSE = {"cse": True}
 
 
 class OptimalControlProblem:
-    """The NLP of one model, its economics and limits, horizon and move length; built once.
+    """The NLP of one model, its economics and limits, horizon, move length and modifiers; built once.
 
     Attributes
     ----------
@@ -47,9 +47,18 @@ class OptimalControlProblem:
         CasADi function (x, p) -> g.
     """
 
-    def __init__(self, model: Model, economics: Economics, limits: Limits, horizon: int, move_s: float) -> None:
+    def __init__(
+        self,
+        model: Model,
+        economics: Economics,
+        limits: Limits,
+        horizon: int,
+        move_s: float,
+        *,
+        answer_s: float | None = None,
+    ) -> None:
         self.model = model
-        self.layout = layout = StageLayout(model, limits, horizon, move_s)
+        self.layout = layout = StageLayout(model, limits, horizon, move_s, answer_s=answer_s)
         self.stage = stage = write_stage(layout, economics)
         x, p = ca.MX.sym("x", layout.size), ca.MX.sym("p", stage.arguments.vector.numel())
         variables, after = self.split(x)
@@ -94,9 +103,10 @@ class OptimalControlProblem:
         return ca.vertcat(lines[:gap, 0], initial, lines[gap:, 0], ca.vec(lines[:, 1:]))
 
     def now(self, p: ca.MX) -> ca.MX:
-        """State and inputs before the first stage, scaled."""
+        """State, inputs before the first stage and those that outputs have answered to, scaled."""
         symbols, layout = self.stage.arguments, self.layout
-        now = ca.vertcat(symbols.state / layout.x_scale, symbols.previous / layout.u_scale)
+        answered = ca.SX() if symbols.answered is None else symbols.answered / layout.u_scale
+        now = ca.vertcat(symbols.state / layout.x_scale, symbols.previous / layout.u_scale, answered)
         return ca.Function("now", [symbols.vector], [now])(p)
 
     def _names(self) -> list[str]:

@@ -1,7 +1,8 @@
 """Where everything lies in the vectors of the optimal control problem: variables, constraints, scales, bounds.
 
-The order is the one fatrop needs: x0, u0, x1, u1, ..., where x holds the states and the moved inputs before. u holds
-the moved inputs, the slacks of the limited outputs and of the limited states, and the collocation points of the stage.
+The order is the one fatrop needs: x0, u0, x1, u1, ..., where x holds the states and the moved inputs before. With
+modifiers it also holds the inputs that outputs have answered to. u holds the moved inputs, the slacks of the limited
+outputs and of the limited states, and the collocation points of the stage.
 """
 
 from __future__ import annotations
@@ -64,6 +65,11 @@ class StageLayout:
 
     Attributes
     ----------
+    answer_s
+        Where outputs are corrected by modifiers (`modifiers/learning.py`): the time constant [s] with which they answer
+        to inputs. None: there are no modifiers.
+    answered_size
+        Number of answered inputs in x: m with modifiers, else 0.
     moved
         Indices of the m inputs that the controller moves: those with a range, in the model's order. The others are
         disturbances, held over the horizon.
@@ -85,8 +91,11 @@ class StageLayout:
         A limit of a quantity that the model does not have.
     """
 
-    def __init__(self, model: Model, limits: Limits, horizon: int, move_s: float) -> None:
+    def __init__(
+        self, model: Model, limits: Limits, horizon: int, move_s: float, *, answer_s: float | None = None
+    ) -> None:
         self.model, self.limits, self.horizon, self.move_s = model, limits, horizon, move_s
+        self.answer_s = answer_s
         self.moved = sorted(model.indices("inputs", limits.inputs))
         self.moved_names = tuple(model.inputs[i].name for i in self.moved)
         self.outputs, self.states = tuple(limits.outputs), tuple(limits.states)
@@ -104,7 +113,8 @@ class StageLayout:
             [model.states[i].scale / SLACKS_PER_SCALE for i in model.indices("states", self.states)]
         )
         self.inputs_size, self.slacks_size = len(self.moved), len(self.output_limits) + len(self.states)
-        self.state_size = len(model.states) + self.inputs_size
+        self.answered_size = 0 if answer_s is None else self.inputs_size
+        self.state_size = len(model.states) + self.inputs_size + self.answered_size
         self.chosen = slice(self.state_size, self.state_size + self.inputs_size + self.slacks_size)
         self.points = self.chosen.stop
         self.control_size = self.inputs_size + self.slacks_size + DEGREE * self.point_size
@@ -114,7 +124,7 @@ class StageLayout:
 
     def with_horizon(self, horizon: int) -> StageLayout:
         """The same stages over another horizon."""
-        return StageLayout(self.model, self.limits, horizon, self.move_s)
+        return StageLayout(self.model, self.limits, horizon, self.move_s, answer_s=self.answer_s)
 
     @property
     def point_size(self) -> int:
@@ -183,8 +193,9 @@ class StageLayout:
         """Cold start: everything stays as it is. State (nx,), moved inputs (m,), algebraic variables (nz,)."""
         x, u, z = state / self.x_scale, inputs / self.u_scale, algebraic / self.z_scale
         points = np.concatenate([np.concatenate([x, z])] * DEGREE)
-        stage = np.concatenate([x, u, u, np.zeros(self.slacks_size), points])
-        return np.concatenate([*[stage] * self.horizon, x, u])
+        now = np.concatenate([x, u, u[: self.answered_size]])
+        stage = np.concatenate([now, u, np.zeros(self.slacks_size), points])
+        return np.concatenate([*[stage] * self.horizon, now])
 
     def limit_values(self, backoff: float | None) -> FloatArray:
         """Values of the output limits, moved inwards by a backoff in the output's unit; default see above."""

@@ -8,7 +8,7 @@ everything is built for one and evaluated for all.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
@@ -23,6 +23,29 @@ from controllers.economic_mpc.problem.layout import DEGREE, StageLayout
 def control_prices(layout: StageLayout) -> int:
     """Number of prices of the controller itself, behind those of the economics: of moves, and of each slack."""
     return 1 + layout.slacks_size
+
+
+@dataclass(frozen=True)
+class OutputModifiers:
+    """Corrections of outputs: ``offsets + slopes (a - answered)``; a is the input that outputs have answered to.
+
+    Attributes
+    ----------
+    offsets
+        Of each output, for the economics (ny,). Limited outputs have the biases of `Arguments` instead.
+    slopes
+        Each in the unit of its output over that of its input (ny, m).
+    answered
+        Moved inputs that the offsets hold for (m,).
+    """
+
+    offsets: FloatArray
+    slopes: FloatArray
+    answered: FloatArray
+
+    def parts(self) -> list[FloatArray]:
+        """All of it, in the order of the NLP's parameters; slopes by output."""
+        return [self.offsets, self.slopes.ravel(), self.answered]
 
 
 @dataclass(frozen=True)
@@ -49,6 +72,8 @@ class Arguments:
         output limit, and that on a second of the squared slack of each limited state.
     time
         Time now [s], for a model that depends on it.
+    modifiers
+        Of a modified layout: corrections of all outputs.
     """
 
     state: FloatArray
@@ -59,16 +84,18 @@ class Arguments:
     biases: FloatArray
     prices: FloatArray
     time: float = 0.0
+    modifiers: OutputModifiers | None = None
 
     def vector(self) -> FloatArray:
         """All of it, in the order of the NLP's parameters."""
         situation = [self.state, self.previous, self.parameters, self.disturbances, [self.time]]
-        return np.concatenate([*situation, self.limits, self.biases, self.prices])
+        own = [] if self.modifiers is None else self.modifiers.parts()
+        return np.concatenate([*situation, self.limits, self.biases, self.prices, *own])
 
 
 @dataclass(frozen=True)
 class ArgumentSymbols:
-    """The arguments as symbols: `vector` is all of them, in the order of `Arguments.vector`."""
+    """The arguments as symbols: `vector` is all of them, in the order of `Arguments.vector`; slopes (ny * m,)."""
 
     vector: ca.SX
     state: ca.SX
@@ -79,6 +106,9 @@ class ArgumentSymbols:
     limits: ca.SX
     biases: ca.SX
     prices: ca.SX
+    offsets: ca.SX | None = None
+    slopes: ca.SX | None = None
+    answered: ca.SX | None = None
 
     @classmethod
     def of(cls, layout: StageLayout, prices: int) -> ArgumentSymbols:
@@ -86,6 +116,9 @@ class ArgumentSymbols:
         model, m = layout.model, layout.inputs_size
         sizes = [len(model.states), m, len(model.parameters), len(model.inputs) - m, 1]
         sizes += [len(layout.output_limits), len(layout.outputs), prices]
+        if layout.answer_s is not None:
+            ny = len(model.outputs)
+            sizes += [ny, ny * m, m]
         p = ca.SX.sym("p", sum(sizes))
         return cls(p, *ca.vertsplit(p, list(np.cumsum([0, *sizes]))))
 
@@ -146,12 +179,14 @@ def write_stage(layout: StageLayout, economics: Economics) -> Stage:
     w = _Written(dict.fromkeys(economics.terms, ca.SX(0.0)))
     nx, nz, nu = len(model.states), len(model.algebraic), layout.inputs_size
     variables, after = ca.SX.sym("w", layout.block), ca.SX.sym("after", layout.state_size)
-    sizes = [nx, nu, nu, len(layout.output_limits), len(layout.states), *[nx, nz] * DEGREE]
-    x, before, u, beyond_limits, off_ranges, *rest = ca.vertsplit(variables, list(np.cumsum([0, *sizes])))
+    sizes = [nx, nu, layout.answered_size, nu, len(layout.output_limits), len(layout.states), *[nx, nz] * DEGREE]
+    x, before, answered, u, beyond_limits, off_ranges, *rest = ca.vertsplit(variables, list(np.cumsum([0, *sizes])))
     points = [(rest[2 * j], rest[2 * j + 1]) for j in range(DEGREE)]
-    continuing = (*model.names("states"), *layout.moved_names)
-    w.constrain(after - ca.vertcat(points[-1][0], u), [f"{name} continues" for name in continuing])
-    outputs = _dae(w, _Process(layout, p, begin), economics, x, u, points)
+    correction = _Correction(layout, p, answered, u)
+    continuing = [*model.names("states"), *layout.moved_names]
+    continuing += [f"answer to {name}" for name in layout.moved_names[: layout.answered_size]]
+    w.constrain(after - ca.vertcat(points[-1][0], u, correction.answered(1.0)), [f"{n} continues" for n in continuing])
+    outputs = _dae(w, _Process(layout, p, begin), economics, x, u, points, correction)
     w.constrain(u - before, [f"move of {name}" for name in layout.moved_names])
     for j, expected in enumerate(outputs):  # a move may act at once and later: both points count
         for i, end in enumerate(layout.output_limits):
@@ -174,7 +209,13 @@ def write_stage(layout: StageLayout, economics: Economics) -> Stage:
 
 
 def _dae(
-    w: _Written, process: _Process, economics: Economics, x: ca.SX, u: ca.SX, points: Sequence[tuple[ca.SX, ca.SX]]
+    w: _Written,
+    process: _Process,
+    economics: Economics,
+    x: ca.SX,
+    u: ca.SX,
+    points: Sequence[tuple[ca.SX, ca.SX]],
+    correction: _Correction,
 ) -> list[ca.SX]:
     """Write the DAE at each collocation point and what is earned there; return the limited outputs, bias included."""
     model, layout, p = process.model, process.layout, process.arguments
@@ -191,15 +232,46 @@ def _dae(
         slope = slopes[0, j] * x + sum(slopes[r + 1, j] * points[r][0] for r in range(DEGREE))
         w.constrain(slope - layout.move_s * rates / layout.x_scale, [f"d{n}/dt" for n in model.names("states")])
         w.constrain(residual / layout.z_scale, list(model.names("algebraic")))
-        earned = economics.rates(point, p.prices)
+        earned = economics.rates(correction.for_economics(point, taus[j]), p.prices)
         if set(earned) != set(economics.terms):
             raise ModelError(
                 f"the rates of the economics are {list(earned)}, its terms {list(economics.terms)}; give both alike"
             )
         for name, rate in earned.items():
             w.earned[name] += weights[j] * layout.move_s * rate
-        outputs.append(point.outputs[limited] + p.biases)
+        outputs.append(correction.for_limits(point.outputs, limited, taus[j]))
     return outputs
+
+
+class _Correction:
+    """What is added to the outputs of a model during a move; inputs `answered` (m,) at its begin, u (m,), scaled."""
+
+    def __init__(self, layout: StageLayout, arguments: ArgumentSymbols, answered: ca.SX, u: ca.SX) -> None:
+        self._layout, self._p, self._begin, self._u = layout, arguments, answered, u
+
+    def answered(self, tau: float) -> ca.SX:
+        """Inputs that outputs have answered to in the move's part tau (m,), scaled; empty without modifiers."""
+        if self._layout.answer_s is None:
+            return self._begin
+        left = float(np.exp(-tau * self._layout.move_s / self._layout.answer_s))
+        return self._u + left * (self._begin - self._u)
+
+    def for_limits(self, outputs: ca.SX, limited: Sequence[int], tau: float) -> ca.SX:
+        """The limited outputs, bias included."""
+        return (outputs + self._by_slopes(tau))[limited] + self._p.biases
+
+    def for_economics(self, point: OperatingPoint, tau: float) -> OperatingPoint:
+        """What is earned by a model without modifiers is earned by the model alone."""
+        if self._p.offsets is None:
+            return point
+        return replace(point, outputs=point.outputs + self._p.offsets + self._by_slopes(tau))
+
+    def _by_slopes(self, tau: float) -> ca.SX | float:
+        slopes, since = self._p.slopes, self._p.answered
+        if slopes is None or since is None:
+            return 0.0
+        by_output = ca.reshape(slopes, self._layout.inputs_size, len(self._layout.model.outputs)).T
+        return by_output @ (self.answered(tau) * self._layout.u_scale - since)
 
 
 class _Process:

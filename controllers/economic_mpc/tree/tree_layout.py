@@ -62,8 +62,9 @@ class TreeLayout:
         self.first = self.move == 0
         self.last = np.roll(self.first, -1)
         self.last[-1] = False  # nothing follows: its end is the end of the chain
-        nx, end = n - m, layout.point(DEGREE - 1)
-        self.ends = np.concatenate([np.arange(end, end + nx), np.arange(n, n + m)])
+        before, end = n - layout.answered_size, layout.point(DEGREE - 1)
+        nx = before - m
+        self.ends = np.concatenate([np.arange(end, end + nx), np.arange(n, n + m), np.arange(before, n)])
         carried = np.full(self.length, m)
         carried[0] = 0
         begin = np.concatenate([[0], np.cumsum(layout.block + carried)])
