@@ -25,6 +25,8 @@ from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 DIFFERS = 0.5
 """What changes no output by more than so many standard deviations of the noise changes nothing."""
+LITTLE = 0.1
+"""Share of the largest change below which a row says little of an event."""
 BY_CHANCE = 0.95
 """Share of records in which noise stays below what counts as its largest by chance."""
 LEAST_ROWS = 16
@@ -59,9 +61,12 @@ def pulse_rows(
     return sure if sure.sum() >= LEAST_ROWS else there
 
 
-def touched_rows(problem: Problem, fits: Sequence[Fit]) -> BoolArray:
-    """Rows (N,) on which a pulse of some fits changes a measured output; all, where none has one."""
-    masks = [_touched(problem, fit, pulse) for fit, pulse in _pulses(fits)]
+def touched_rows(problem: Problem, fits: Sequence[Fit], split: str | None = None) -> BoolArray:
+    """Rows (N,) on which a pulse of some fits changes a measured output; all, where none has one.
+
+    With a split: rows on which it does so by LITTLE of the most there. Where an effect dies away, rows say less of it.
+    """
+    masks = [_touched(problem, fit, pulse, split) for fit, pulse in _pulses(fits)]
     return np.any(masks, axis=0) if masks else np.ones(len(problem.record), dtype=bool)
 
 
@@ -85,8 +90,8 @@ def _beside_an_edge(problem: Problem, pulses: Sequence[Effect], fitted: Sequence
     return beside
 
 
-def _touched(problem: Problem, fit: Fit, pulse: Effect) -> BoolArray:
-    """Rows (N,) on which a pulse changes a measured output by more than DIFFERS."""
+def _touched(problem: Problem, fit: Fit, pulse: Effect, split: str | None) -> BoolArray:
+    """Rows (N,) on which a pulse changes a measured output; see `touched_rows`."""
     record, columns = problem.record, list(problem.columns)
     simulator = RecordSimulator(fit.model, record.dt)
     without = dict.fromkeys(map(pulse.parameter, pulse.names(CoefficientRole.LEVEL)), 0.0)
@@ -95,7 +100,9 @@ def _touched(problem: Problem, fit: Fit, pulse: Effect) -> BoolArray:
         for model in (fit.model, fit.model.with_parameters(without))
     ]
     size = problem.weights * fit.noise.stationary_std()
-    touched: BoolArray = np.any(np.abs(runs[0] - runs[1]) > DIFFERS * size, axis=1)
+    change = np.max(np.abs(runs[0] - runs[1]) / size, axis=1)
+    most = 0.0 if split is None else float(np.max(change[problem.rows(split)], initial=0.0))
+    touched: BoolArray = change > max(DIFFERS, LITTLE * most)
     return touched
 
 

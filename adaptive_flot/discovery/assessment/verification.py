@@ -8,10 +8,11 @@ from statsmodels.stats.diagnostic import acorr_ljungbox
 from adaptive_flot.discovery.assessment.beside_background import drop_beside_background, unknown_of_background
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE, rows_per_effective_sample
 from adaptive_flot.discovery.assessment.reduction import reduction, squared_errors
-from adaptive_flot.discovery.assessment.telling_rows import largest_by_chance, on_telling_rows
+from adaptive_flot.discovery.assessment.telling_rows import largest_by_chance, on_telling_rows, touched_rows
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import OutputChange, Verification
+from adaptive_flot.greybox.model import FloatArray
 
 BLOCK_ROWS = 20
 """Least rows of a block of the paired block bootstrap: longer than the noise remembers."""
@@ -40,7 +41,8 @@ def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None
 
     Of a pulse, only the rows that it touches are compared (see `telling_rows`). They are few, and noise with a memory
     errs in them alike. So an output is worse there where its error grew by more than MUCH_WORSE, and is larger than
-    such noise makes it by chance.
+    such noise makes it by chance. Rows beside an edge do not count against a pulse, since they can not know when it
+    came. They do count for it: not knowing makes the error larger.
 
     `own` is the problem of the fit after, where its background is another.
     """
@@ -67,8 +69,18 @@ def verify(problem: Problem, before: Fit, after: Fit, own: Problem | None = None
         within = within or (problem is not whole and left < by_chance[j] ** 2)
         if ratio > 1 + larger and not within and reduction(old[:, j], new[:, j], block, outputs)[1][1] < 0:
             worse.append(after.model.outputs[c].name)
+    if problem is not whole and not interval[0] > 0:
+        touched = _where_touched(whole, before, after, size)
+        smaller, interval = touched if touched[1][0] > 0 else (smaller, interval)
     confirmed = not worse and bool(interval[0] > 0 or likelier)
     return Verification(smaller, interval, tuple(worse), confirmed, likelihood=drop if likelier else 0.0)
+
+
+def _where_touched(problem: Problem, before: Fit, after: Fit, size: FloatArray) -> tuple[float, tuple[float, float]]:
+    """Reduction on all rows of the confirm split that a pulse touches, those beside an edge as well."""
+    rows = problem.rows("confirm") & touched_rows(problem, (before, after), "confirm")
+    old, new = (np.nansum(squared_errors(problem, fit, size, rows), axis=1) for fit in (before, after))
+    return reduction(old, new, block_rows(problem, before, after))
 
 
 def changes(
