@@ -37,6 +37,9 @@ from adaptive_flot.greybox.rescaled import factors_of, rescaled
 
 MOST_SITES = 6
 """Sites at which a second course is fitted: those that explain most to first order."""
+LEAST_SMALLER, LEAST_LIKELIER = 0.1, 30.0
+"""Share by which the error on the confirm split must be smaller, or drop of minus two log-likelihood there for each
+effective sample. On development records it was 14 for a course that is not there, and above 400 for three that are."""
 
 
 def with_courses(
@@ -46,7 +49,9 @@ def with_courses(
 
     A second course must be better than the feed alone, with numbers that were sought in the same way, and better than
     the feed with a constant at its site, which a slow course draws. By LEAST_EVIDENCE for each effective sample, and by
-    what the choice of a site is worth: 2 log(number of sites). And rows that chose neither must confirm it.
+    what the choice of a site is worth: 2 log(number of sites). And rows that chose neither must confirm it: by their
+    likelihood (LEAST_LIKELIER), or by LEAST_SMALLER of the error. A feed that is no Gaussian process with one
+    correlation time leaves some per cent to any second course on the same output.
 
     Parameters
     ----------
@@ -87,7 +92,8 @@ def with_courses(
     rows_each = rows_per_effective_sample(problem, base, best.fit)
     checked = verify(base_problem, base, best.fit, best.problem)
     reference = min(base.bic, _bic_with_constant(base_problem, base, best.names[0][0]))
-    if best.fit.bic > reference - least * rows_each or not checked.confirmed:
+    little = checked.reduction < LEAST_SMALLER and checked.likelihood < LEAST_LIKELIER * rows_each
+    if best.fit.bic > reference - least * rows_each or not checked.confirmed or little:
         return problem, result
     differences = loglik_difference_sds(problem, best.fit, [a.fit for a in found])
     alternatives = tuple(replace(a, loglik_difference_sd=d) for a, d in zip(found, differences, strict=True))

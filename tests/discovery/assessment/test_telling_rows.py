@@ -9,7 +9,14 @@ import pytest
 from scipy.signal import lfilter
 
 from adaptive_flot.discovery.assessment.likelihood import difference_with_confirm_rows, loglik_difference_sds
-from adaptive_flot.discovery.assessment.telling_rows import edges, largest_by_chance, on_telling_rows, telling_rows
+from adaptive_flot.discovery.assessment.reduction import reduction, squared_errors
+from adaptive_flot.discovery.assessment.telling_rows import (
+    edges,
+    largest_by_chance,
+    on_telling_rows,
+    telling_rows,
+    touched_rows,
+)
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.pulses import PULSE
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -18,11 +25,14 @@ from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.results import SURE
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.candidates.test_pulses import FIRST, KNOWN, LAST, with_a_pulse
-from tests.discovery.heated import DT, heated_tank, tank_record
+from tests.discovery.heated import DT, NOISE, changed, heated_tank, tank_record
 
 ADAPTED = ("efficiency", "loss")
 WIDTH = 15.0
+DYING = 200
+"""Rows after a pulse of the loss at which its effect has nearly gone."""
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +136,33 @@ def test_rows_that_fitted_neither_tell_a_pulse_from_one_elsewhere(fits: tuple[Pr
     assert more > 0
     assert elsewhere.loss - fit.loss + more > SURE * deviation
     assert difference_with_confirm_rows(problem, fit, fit) == (0.0, 0.0)
+
+
+def test_rows_beside_an_edge_speak_for_a_pulse_but_not_against_it() -> None:
+    """Its begin lies between fitted rows, in a block of the confirm split. Its other confirm rows see it die away.
+
+    Those hold it alike with and without: they alone confirm nothing. The block of the begin does.
+    """
+    plain, rng = tank_record(KNOWN), np.random.default_rng(0)
+    pulse = Effect("heat_loss", "time", PULSE, settings={"count": 1.0, "width": WIDTH})
+    truth = {"amplitude": 0.3, "on_1": DT * (FIRST + 1), "for_1": DT * (LAST - FIRST)}
+    values = {"loss": 60.0} | {pulse.parameter(n): v for n, v in truth.items()}
+    model = heated_tank().with_effects([pulse]).with_parameters(values)
+    outputs = RecordSimulator(model, DT).outputs(plain, plain.outputs[0], model.parameter_values)[:, 0]
+    record = changed(plain, outputs + rng.normal(0, NOISE, len(plain)))
+    splits = np.full(len(plain), "estimate", dtype="<U8")
+    splits[FIRST - 10 : FIRST + 60] = splits[LAST + DYING : LAST + DYING + 20] = "confirm"
+    problem = replace(make_problem(record, heated_tank(), ADAPTED, burn_in=30, guard=5), splits=splits)
+    base, fit = fitted(problem, truth["on_1"], truth["for_1"], "heat_loss")
+    telling = telling_rows(problem, (base, fit), "confirm", ("estimate",))
+    assert telling.sum() >= 16 and not telling[: LAST + DYING].any()
+    beside = touched_rows(problem, (base, fit), "confirm") & problem.rows("confirm")
+    assert beside[FIRST + 20 : FIRST + 60].all()
+    size = problem.weights * fit.noise.stationary_std()
+    old, new = (np.nansum(squared_errors(problem, f, size, telling), axis=1) for f in (base, fit))
+    assert not reduction(old, new, 20)[1][0] > 0, "these rows confirm it by themselves: nothing is tested"
+    checked = verify(problem, base, fit)
+    assert checked.confirmed and checked.reduction > 0.5 and checked.reduction95[0] > 0
 
 
 @pytest.mark.parametrize("seed", range(3))
