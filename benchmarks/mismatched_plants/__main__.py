@@ -17,7 +17,7 @@ from rich.table import Table
 from adaptive_flot.greybox.data.tables import read_table, write_table
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks.mismatched_plants.plants import CHANCE, COUNT, EARLY, FASTEST, LESS_CAREFUL, TREE, plant
+from benchmarks.mismatched_plants.plants import CHANCE, COUNT, EARLY, FASTEST, LESS_CAREFUL, MODIFIERS, TREE, plant
 
 MPC, ORACLE, PI = "economic_mpc", "oracle", "pi"
 LOOPS = {
@@ -27,6 +27,7 @@ LOOPS = {
     "adaptive_imm, scenarios 9": (TREE, "adaptive_imm"),
     "adaptive_imm, scenarios 9, early plans": (EARLY, "adaptive_imm"),
     "adaptive_imm, scenarios 9, early plans, 0.8": (LESS_CAREFUL, "adaptive_imm"),
+    "adaptive_imm, modifiers": (MODIFIERS, "adaptive_imm"),
     ORACLE: (MPC, ORACLE),
     PI: (PI, "fixed"),
     FASTEST: (FASTEST, "fixed"),

@@ -28,6 +28,8 @@ EARLY = "economic_mpc_early"
 """The same, with plans before their time where a limit is missed."""
 LESS_CAREFUL = "economic_mpc_early_80"
 """The same, with scenarios that limits keep with probability 0.8 instead of 0.95."""
+MODIFIERS = "economic_mpc_modifiers"
+"""The controller that learns how outputs answer to its moves."""
 FASTEST = "fastest"
 """No controller, but the soonest that the limit can be kept; see `fastest.py`."""
 BASE, COUNT, FIRST_SEED = "closed_loop_drift", 30, 7300
@@ -103,6 +105,7 @@ def _written(number: int, generator: np.random.Generator, folder: Path) -> Path:
     early = {"solver": "fatrop", "scenarios": 9, "early_plans": True}
     content["controllers"][EARLY] = {"use": "economic_mpc", "options": early}
     content["controllers"][LESS_CAREFUL] = {"use": "economic_mpc", "options": early | {"limit_probability": 0.8}}
+    content["controllers"][MODIFIERS] = {"use": "economic_mpc", "options": {"solver": "fatrop", "modifiers": True}}
     content["controllers"][FASTEST] = {"use": "benchmarks.mismatched_plants.fastest:Fastest"}
     content["disturbances"] = {
         "feed_flow_m3_s": {"noise_std": 8.0e-7},

@@ -39,7 +39,7 @@ MOST_SITES = 6
 """Sites at which a second course is fitted: those that explain most to first order."""
 LEAST_SMALLER, LEAST_LIKELIER = 0.1, 30.0
 """Share by which the error on the confirm split must be smaller, or drop of minus two log-likelihood there for each
-effective sample. On development records it was 14 for a course that is not there, and above 400 for three that are."""
+effective sample. On development records it was 14 for a course that is not there, 424 and 648 for two that are."""
 
 
 def with_courses(
