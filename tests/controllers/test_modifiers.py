@@ -189,6 +189,9 @@ def test_a_plan_is_taken_over_with_what_was_answered(model: Model) -> None:
         ({"memory_s": 0.0}, "memory_s = 0"),
         ({"prior": 0.0}, "prior = 0"),
         ({"outputs": ["levle"]}, "'levle' is no output of the model; did you mean 'level'"),
+        ({"outputs": "level"}, "outputs = 'level'; give a list of names"),
+        ({"memory_s": "long"}, "memory_s = 'long'; give a positive number"),
+        ({"memory": 3.0}, "'memory' is no option; did you mean 'memory_s'"),
         ("yes", "modifiers = 'yes'; give true, false or options"),
     ],
 )

@@ -31,10 +31,10 @@ from controllers.economic_mpc.modifiers.slopes import SlopeSums
 from controllers.economic_mpc.output_bias import OutputBias
 from controllers.economic_mpc.problem.layout import StageLayout
 
+NUMBERS = ("settling_s", "memory_s", "prior")
+"""Options that are positive numbers."""
 ANSWERED = 3
 """A settling time is three time constants: 95 % of an answer."""
-
-
 BIASES_KNOWN = 5
 """Time constants of the filters of biases before the first run: what they still have to learn is no slope."""
 TRIED = 1e-3
@@ -114,16 +114,20 @@ def modifier_options(asked: bool | Mapping[str, Any], horizon_s: float) -> dict[
     Raises
     ------
     ModelError
-        It is neither a truth value nor a mapping, or the settling time is no positive number.
+        It is neither a truth value nor a mapping, an option is not known, or has no value that it may have.
     """
     if asked is False:
         return None
     if asked is not True and not isinstance(asked, Mapping):
         raise ModelError(f"economic_mpc: modifiers = {asked!r}; give true, false or options")
     options = {"settling_s": horizon_s} | ({} if asked is True else dict(asked))
-    settling = options["settling_s"]
-    if not (isinstance(settling, int | float) and np.isfinite(settling) and settling > 0):
-        raise ModelError(f"modifiers: settling_s = {settling!r}; give a positive time")
+    for name, value in options.items():
+        if name not in (*NUMBERS, "outputs"):
+            raise ModelError(f"modifiers: {name!r} is no option; {near_match(str(name), (*NUMBERS, 'outputs'))}")
+        if name in NUMBERS and not (isinstance(value, int | float) and np.isfinite(value) and value > 0):
+            raise ModelError(f"modifiers: {name} = {value!r}; give a positive number")
+        if name == "outputs" and (isinstance(value, str) or not isinstance(value, Sequence)):
+            raise ModelError(f"modifiers: outputs = {value!r}; give a list of names")
     return options
 
 
@@ -137,7 +141,7 @@ class Modifiers:
     bias_time_s
         Time constant of the filters of biases [s].
     settling_s
-        Time after which an input has had its effect [s].
+        Time after which an input has had its effect [s], at least the length of a move.
     memory_s
         Time constant of forgetting [s].
     prior
@@ -163,13 +167,8 @@ class Modifiers:
         prior: float = 0.5,
         outputs: Sequence[str] | None = None,
     ) -> None:
-        if not (np.isfinite([settling_s, memory_s, prior]).all() and settling_s >= layout.move_s and memory_s > 0):
-            raise ModelError(
-                f"modifiers: settling_s = {settling_s:g}, memory_s = {memory_s:g}; give at least move_s = "
-                f"{layout.move_s:g} s, and a positive time"
-            )
-        if not prior > 0:
-            raise ModelError(f"modifiers: prior = {prior:g}; give a positive number")
+        if settling_s < layout.move_s:
+            raise ModelError(f"modifiers: settling_s = {settling_s:g}; give at least move_s = {layout.move_s:g} s")
         model = setup.model
         names = model.names("outputs")
         for name in outputs or ():
