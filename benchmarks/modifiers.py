@@ -1,5 +1,6 @@
-"""What modifiers of the MPC win where the slopes of its model are wrong: `python -m benchmarks.modifiers`,
-seven minutes a seed.
+"""What modifiers of the MPC win where the slopes of its model are wrong: `python -m benchmarks.modifiers`.
+
+It takes seven minutes a seed.
 
 The scenario is `interior_optimum` with parameters that stay: the best point lies off the limit of the grade, so slopes
 say where it is. The plant has a power law of the air flow that the model lacks. Recovery is measured, or not. The bound
