@@ -8,6 +8,7 @@ not run again, so that a run that was stopped goes on; remove the folder after a
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +25,14 @@ AT_ONCE = 5
 """Seeds of a truth that are run in turn: what they have in common is built once."""
 
 
-def shown(rows: pd.DataFrame) -> str:
+GRADE = "concentrate_grade"
+PLANTS, BEST = ("n", "C", GRADE), ("n_best", "C_best", GRADE)
+"""Fits that are shown: n and C against the plant's own, or against the best-fitting ones."""
+
+
+def shown(rows: pd.DataFrame, keys: Sequence[str]) -> str:
     """Median fits of n / C / grade, and the mean share of the time that is held."""
-    fits = " / ".join(f"{rows[key].median():.1f}" for key in ("n", "C", "concentrate_grade"))
+    fits = " / ".join(f"{rows[key].median():.{2 if key == GRADE else 1}f}" for key in keys)
     share = float(np.mean(rows["held"]))
     return fits if np.isnan(share) else f"{fits}, {share:.0%}"
 
@@ -65,8 +71,11 @@ def main() -> None:
     for key in dict.fromkeys(rows["truth"]):
         of = rows[rows["truth"] == key]
         told = float(of[of["estimator"] == estimators[-1]]["model_error"].mean())
-        cells = [shown(of[of["estimator"] == name]) for name in estimators]
-        table.add_row(TRUTHS[key].words, *cells, f"{told:.0%}")
+        truth = TRUTHS[key]
+        for keys, words in ((PLANTS, truth.words), (BEST, "... against the best-fitting n and C")):
+            if keys is PLANTS or not truth.has_true_parameters:
+                cells = [shown(of[of["estimator"] == name], keys) for name in estimators]
+                table.add_row(words, *cells, f"{told:.0%}")
     Console(width=None if Console().is_terminal else 220).print(table)
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from scipy.stats import chi2
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.metrics import normalised_error_squared
+from adaptive_flot.metrics import fit, normalised_error_squared
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_result import Run
 from adaptive_flot.runner.scenario.realisation import Realisation
@@ -44,16 +44,27 @@ def held(scenario: Scenario, run: Run, wanted: FloatArray) -> float:
     return float(np.mean(normalised_error_squared(error, correlation) <= chi2.ppf(0.95, 2)))
 
 
+def best_fits(scenario: Scenario, run: Run, wanted: FloatArray) -> dict[str, float]:
+    """Fits of n and C to `wanted` (N, 2) in percent, over the time of the fits, as `n_best` and `C_best`."""
+    rows = (run.table["time_s"] > scenario.fits_after + 1e-9).to_numpy()
+    found = run.table.loc[rows, [f"{x}_estimate" for x in LABELS]].to_numpy()
+    return {f"{x}_best": fit(wanted[rows, i], found[:, i]) for i, x in enumerate(LABELS)}
+
+
 def figures(
     truth: Truth, key: str, seeds: Sequence[int], estimators: Sequence[str], folder: Path, *, compiled: bool
 ) -> pd.DataFrame:
-    """A row for each seed and estimator: fits in percent, and the share of the time that is held."""
+    """A row for each seed and estimator: fits in percent, and the share of the time that is held.
+
+    `n` and `C` are compared with the plant's own, `n_best` and `C_best` with those that the region should hold.
+    """
     scenario = truth.scenario(folder, key)
     scenario = scenario.compiled() if compiled else scenario
     wanted = {seed: to_hold(truth, Realisation(scenario, seed)) for seed in seeds}
     return pd.DataFrame(
         [
             {"truth": key, "seed": run.seed, "estimator": run.estimator, **run.fit}
+            | best_fits(scenario, run, wanted[run.seed])
             | {"held": held(scenario, run, wanted[run.seed])}
             | {"model_error": run.status_counts.get("model_error", 0) / len(run.table)}
             for run in run_scenario(scenario, estimators, seeds=seeds)

@@ -1,4 +1,4 @@
-"""What the plant does: eleven truths, each a shipped scenario with some of its entries replaced."""
+"""What the plant does: twelve truths, each a shipped scenario with some of its entries replaced."""
 
 from __future__ import annotations
 
@@ -79,7 +79,11 @@ TRUTHS: Mapping[str, Truth] = {
     "paper": Truth("the paper's"),
     "both_ramp": Truth("both ramp", {"parameters": {"C": ramp(0.2, 600, 1800), "n": ramp(0.2, 600, 1800)}}),
     "opposite_ramps": Truth("opposite ramps", {"parameters": {"C": ramp(0.2, 600, 1800), "n": ramp(-0.2, 600, 1800)}}),
-    "sines": Truth("sines", {"parameters": {"C": sine(0.1, 900), "n": sine(0.1, 600)}}),
+    "sines": Truth("sines, held for 10 s", {"parameters": {"C": sine(0.1, 900), "n": sine(0.1, 600)}}),
+    "smooth_sines": Truth(
+        "sines, a new value each second",
+        {"parameters": {"C": sine(0.1, 900, every=1.0), "n": sine(0.1, 600, every=1.0)}},
+    ),
     "ramps_down": Truth("ramps down", {"parameters": {"C": ramp(-0.2, 600, 1200), "n": ramp(-0.2, 1200, 1800)}}),
     "outliers": Truth(
         "outliers: 5 % are off by 20 standard deviations",
