@@ -132,7 +132,7 @@ class Evidence:
         if not best.constants:
             return best
         wide: tuple[int, ...] = ()
-        for _ in range(MOST_STAND_OUT):
+        for _ in range(min(MOST_STAND_OUT, self.count)):
             tried = []
             for k in set(range(self.count)) - set(wide):
                 for size in (c for c in CONSTANTS if min(LEAST_KNOWN, best.constants) <= c <= best.constants):
