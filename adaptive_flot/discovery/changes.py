@@ -21,7 +21,8 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, is_short
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
+from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 

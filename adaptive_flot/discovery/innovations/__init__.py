@@ -11,6 +11,7 @@ switching.py        When something was switched on and off.
 screening.py        Which further effects are worth a refit.
 noise_fit.py        How large process and measurement noise are.
 refit.py            A model with effects, fitted.
+thinning.py         A long record with fewer rows.
 search.py           A few effects together.
 judge.py            What is certain, and what predicts rows that did not fit it.
 in_words.py         What is told, in words.

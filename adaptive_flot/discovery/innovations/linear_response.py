@@ -62,6 +62,7 @@ class ResponseFunctions:
         self.filter = RecordFilter(self.extended, dt, columns, (), degrees_of_freedom)
         self.wrt = (*(e.parameter(e.terms[0].name) for e in effects), *constants)
         self._step = Stepper(self.extended, dt).one_step_jacobians(list(self.wrt))
+        self.degrees_of_freedom = degrees_of_freedom
         self._rows: dict[int, Any] = {}
 
     def at(
@@ -134,9 +135,14 @@ class LinearResponse:
         columns, (F, b, H, h) = list(functions.columns), jacobians
         there = np.isfinite(record.outputs[1:][:, columns])
         K, S = _gains(filtered, H, noise.std(functions.extended)[columns], there)
+        e, nu = (
+            np.where(there, record.outputs[1:][:, columns] - filtered.predicted[1:], 0.0),
+            functions.degrees_of_freedom,
+        )
+        if np.isfinite(nu):  # the weights of the filter, see `greybox.filtering.step`
+            K = K * ((nu + 1) / (nu + e**2 / S))[:, None, :]
         self._H, self._h, self._A, self._B = H, h, F - F @ K @ H, b - F @ K @ h
         self._weight = np.where(there, 1 / np.sqrt(S), 0.0)
-        e = np.where(there, record.outputs[1:][:, columns] - filtered.predicted[1:], 0.0)
         self.innovations: FloatArray = np.clip(e * self._weight, -CLIP, CLIP).ravel()
         first = len(functions.sites)
         self.by_constants = self._constants(range(first, first + len(functions.constants)))

@@ -7,7 +7,7 @@ The steps are those of the prediction error method with the derivatives of the f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,10 @@ LOOSE = 30.0
 UNSURE = 3.0
 """Standard deviation of the state before the first row, in scales of the states."""
 HOPELESS = 1e12
+DIFFERENCE = 0.05
+"""Width of a difference of the cost, in standard deviations of a parameter."""
+
+Slopes = Callable[[FloatArray, tuple[float, float], FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -163,15 +167,38 @@ class Refitter:
     def _moved(
         self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float
     ) -> tuple[FloatArray, float]:
-        """Parameters after one step, and their cost; where none is better, those from before."""
-        step = self._step(p, size, first)
-        for share in SHARES:
-            q = p.copy()
-            q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
-            value = self._cost(q, size, first)
-            if value < best:
-                return q, value
+        """Parameters after one step, and their cost; where none is better, those from before.
+
+        The gain moves with the parameters, so that a step at the present gain may lead up: a late sensor beside process
+        noise is such a case. Then the slopes of the cost itself show the way.
+        """
+        for slopes in (None, self._slopes):
+            step = self._step(p, size, first, slopes)
+            for share in SHARES:
+                q = p.copy()
+                q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
+                value = self._cost(q, size, first)
+                if value < best:
+                    return q, value
         return p, best
+
+    def _slopes(self, p: FloatArray, size: tuple[float, float], first: FloatArray, root: FloatArray) -> FloatArray:
+        """Slopes of the cost along the free parameters, in their scales (q,), by central differences.
+
+        A difference is a share (DIFFERENCE) of what the normal equations, with diagonal root^2, take for one standard
+        deviation.
+        """
+        found = np.zeros(len(self._where))
+        for i, (k, scale) in enumerate(zip(self._where, self._scale, strict=True)):
+            ends = np.clip(p[k] + np.array([-1.0, 1.0]) * DIFFERENCE / root[i] * scale, self._lower[i], self._upper[i])
+            costs = []
+            for end in ends:
+                q = p.copy()
+                q[k] = end
+                costs.append(self._cost(q, size, first))
+            if max(costs) < HOPELESS and ends[1] > ends[0]:
+                found[i] = (costs[1] - costs[0]) / (ends[1] - ends[0]) * scale
+        return found
 
     def covariance(self, fit: Refit) -> FloatArray:
         """Covariance of the free parameters at a fit (q, q): the inverse of the normal equations."""
@@ -195,13 +222,20 @@ class Refitter:
             D = np.vstack([D, told])
         return (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
 
-    def _step(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> FloatArray:
-        """One step of Gauss and Newton; an unknown that would leave its range is held."""
+    def _step(
+        self, p: FloatArray, size: tuple[float, float], first: FloatArray, slopes: Slopes | None = None
+    ) -> FloatArray:
+        """One step of Gauss and Newton; an unknown that would leave its range is held.
+
+        By the slopes of the innovations at the present gain, or by given ones of the cost.
+        """
         A, b = self._normal_equations(p, size, first)
         x = p[self._where]
         held = np.zeros(len(x), dtype=bool)
         if not (np.isfinite(A).all() and np.isfinite(b).all()):
             return held.astype(float)
+        if slopes is not None:
+            b = -slopes(p, size, first, np.sqrt(np.diag(A)))
         while True:
             move = np.zeros(len(x))
             free = ~held

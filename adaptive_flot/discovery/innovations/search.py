@@ -27,15 +27,8 @@ BEAM = 3
 MOST_EFFECTS = 2
 LEAST_GAIN = 12.0
 """Gain of the criterion that another effect must bring."""
-MOST_WORK = 4_000
-"""Rows times states up to which a record is tried: a longer one takes minutes."""
 FURTHEST = 4.0
 """Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
-
-
-def is_short(record: Dataset, model: Model) -> bool:
-    """Whether a record is short enough for the innovations form."""
-    return len(record) * len(model.states) <= MOST_WORK
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,12 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import MUCH_WORSE
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Search, is_short
+from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
@@ -40,12 +42,12 @@ def second_opinion(state: State) -> State:
     problem, (before, _) = state.known_problem, state.refitted
     silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
     asked = silent or _follows_time(state) or _leaves_too_much(state)
-    if not asked or not is_short(problem.record, before.model):
+    record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
+    if record is None:
         return state
     state.progress("ask the innovations form")
-    record = replace(problem.record, initial_state=before.initial_state)
     search = Search(
-        before.model, record, problem.columns, noise_floor([record], problem.columns), problem.adapted, None,
+        before.model, record, problem.columns, noise_floor([problem.record], problem.columns), problem.adapted, None,
         state.processes,
     )  # fmt: skip
     with np.errstate(all="ignore"):
@@ -66,14 +68,40 @@ def _kept(state: State, told: Told) -> State:
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
         )
-    if judgement.word == "none" and judgement.best is None and told.word != "none":
+    if judgement.word == "none" and told.word != "none" and not _surely_better(state):
+        why = told.why or f"held-out rows do not confirm what fits best with process noise ({_words(told)})"
         return replace(
             state,
             judgement=replace(judgement, word="abstain"),
             sentence="Something is missing, but the record does not say what: the error is far above the noise from "
-            f"row to row, and {told.why}.",
+            f"row to row, and {why}.",
         )
     return state
+
+
+def _surely_better(state: State) -> bool:
+    """Whether a change in time of what is fitted, on which a `none` may rest, surely helps on the report rows."""
+    return state.judged.best is not None and any(c.reduction95[0] > 0 for c in state.error)
+
+
+def names_one_of(judgement: Judgement, told: Told) -> bool:
+    """Whether what the innovations form names is at a site of what the free run tells, or that tells nothing."""
+    if judgement.word not in TELLS or judgement.best is None:
+        return True
+    said = judgement.members if judgement.word == "class" else judgement.best.names
+    return bool({site for site, _ in said} & {h.site for h in _names(told)})
+
+
+def _names(told: Told) -> tuple[Hypothesis, ...]:
+    return (*told.certain, *(h for _, h in told.open))
+
+
+def _other_name(told: Told) -> str:
+    return f"with process noise another cause explains more: {_words(told)}"
+
+
+def _words(told: Told) -> str:
+    return " or ".join(h.label for h in _names(told))
 
 
 def _leaves_too_much(state: State) -> bool:
@@ -116,8 +144,10 @@ def _told(state: State, search: Search, told: Told) -> State:
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
     against = contradiction(judgement, error, noise)
-    if against or (_competes(state) and not _smaller(error, state.error, _allowed(state, names))):
+    if against:
         return _kept(state, told)
+    if _competes(state) and not _smaller(error, state.error, _allowed(state, names)):
+        return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
     _, result = state.searched
     return replace(
         state,

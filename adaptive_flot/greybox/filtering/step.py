@@ -10,6 +10,8 @@ Applications to Tracking and Navigation* (2001), sections 5.2 and 10.3.
 
 An innovation e of variance S counts with the weight (nu + 1) / (nu + e^2 / S) of Student's t distribution with nu
 degrees of freedom, and adds its log-density to the likelihood. Roth, Ozkan & Gustafsson, *IEEE ICASSP* (2013) 5770.
+The covariance is that of the gain with this weight: what was hardly believed has hardly made the state known. With the
+full gain's covariance, a state that is hidden behind a lag and starts far off would never be corrected.
 """
 
 from __future__ import annotations
@@ -98,8 +100,8 @@ def correct(P: ca.SX, H: ca.SX, residual: ca.SX, r: ca.SX, there: ca.SX, nu: flo
         error = residual[j] - row @ moved
         square = error**2 / variance
         weight = 1.0 if math.isinf(nu) else (nu + 1) / (nu + square)
-        gain = there[j] * spread / variance
-        moved = moved + gain * weight * error
+        gain = there[j] * weight * spread / variance
+        moved = moved + gain * error
         left = P - gain @ spread.T
         P = left - (left @ row.T) @ gain.T + r[j] ** 2 * gain @ gain.T
         likelihood += there[j] * _log_density(square, variance, nu)

@@ -1,12 +1,13 @@
 """When the innovations form is asked, and what its name must beat: judgements that are given, not searched."""
 
+from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from adaptive_flot.discovery.innovations import second_opinion as asking
-from adaptive_flot.discovery.results import OutputChange
+from adaptive_flot.discovery.results import Judgement, OutputChange, State
 from adaptive_flot.greybox.effects import Effect
 
 CURVE = Effect("gains", "time", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
@@ -65,3 +66,29 @@ def test_one_effect_may_leave_a_little_more_than_a_larger_set_that_is_not_told()
     assert asking._allowed(given("abstain"), one) > 1.0
     assert asking._allowed(given("abstain"), two) == 1.0
     assert asking._allowed(given("named"), one) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("word", "members", "agrees"),
+    [
+        ("class", (("loss", "time"), ("heater", "own_value")), True),
+        ("class", (("loss", "time"), ("other_heat", "power")), False),
+        ("abstain", (), True),
+    ],
+)
+def test_a_class_without_what_the_innovations_form_names_is_not_told(word: str, members: Any, agrees: bool) -> None:
+    limit = SimpleNamespace(site="heater", label="heater range")
+    told: Any = SimpleNamespace(certain=(limit,), open=())
+    judged: Any = SimpleNamespace(word=word, best=SimpleNamespace(names=members[:1]), members=members)
+    assert asking.names_one_of(judged, told) == agrees
+
+
+@pytest.mark.parametrize(("low", "word"), [(0.2, "none"), (-0.1, "abstain")])
+def test_a_drift_explains_the_record_only_where_held_out_rows_get_better(low: float, word: str) -> None:
+    error = (OutputChange("level", "m", 0.05, 0.04, 0.01, (low, 0.5)),)
+    best: Any = SimpleNamespace(effects=(CURVE,), names=(("gains", "time"),))
+    judged = Judgement("none", best, (), (), 0.0)
+    nothing: dict[str, Any] = {f.name: None for f in fields(State)}
+    given = State(**nothing | {"judgement": judged, "error": error})
+    told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
+    assert asking._kept(given, told).judged.word == word

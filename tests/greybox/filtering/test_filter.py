@@ -172,3 +172,22 @@ def test_wrong_shape_is_told() -> None:
     data, _ = record(rows=30)
     with pytest.raises(ModelError, match="z0"):
         RecordFilter(first_order(), DT, [0]).run(data, NOISE, np.zeros(3), np.eye(3), np.array([DECAY]))
+
+
+def test_a_hidden_state_that_starts_far_off_is_found_beside_outliers_that_are_not_believed() -> None:
+    """Behind a lag of ten rows, with Student's t: the error stays within what the covariance says."""
+    late = Effect("gauge", "lag", "lag", {"amplitude": 1.0, "time_constant": 10 * DT}, {"scale": 1.0})
+    model = first_order().with_effects([late])
+    data, x = record(missing=False)
+    shown, follow = np.zeros(len(x)), 1 - math.exp(-1 / 10)
+    for k in range(1, len(x)):
+        shown[k] = shown[k - 1] + follow * (x[k] - shown[k - 1])
+    y = shown + 0.01 * np.random.default_rng(1).normal(size=len(x))
+    y[100] += 5.0
+    data = Dataset("late", data.time, DT, data.inputs, y[:, None])
+    noise = NoiseModel({"x": Q}, {"y": 0.01})
+    filtered = RecordFilter(model, DT, [0]).run(
+        data, noise, np.array([20.0, 0.0]), np.diag([100.0, 1.0]), model.parameter_values
+    )
+    distance = np.abs(filtered.z[:, 0] - x) / np.sqrt(filtered.P[:, 0, 0])
+    assert np.mean(distance[20:] < 3.0) > 0.95

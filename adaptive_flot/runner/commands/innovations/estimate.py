@@ -17,7 +17,7 @@ from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit, ParameterEstimate
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.refit import Refitter
-from adaptive_flot.discovery.innovations.search import is_short
+from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import NoiseModel
 from adaptive_flot.greybox.model import Model

@@ -1,0 +1,47 @@
+"""A long record with fewer rows, for the innovations form: its time grows with rows times states.
+
+Inputs are means over the longer interval, so that what they bring in is kept. Outputs are those of the rows kept: their
+noise is that of the sensor. What happens within an interval is lost. The name that is found is judged on all rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+
+MOST_WORK = 4_000
+"""Rows times states up to which a record is taken as it is."""
+FEWEST_ROWS = 500
+"""Fewest rows that may be left of a longer record, which is thinned to as much work: fewer show no event."""
+
+
+def is_short(record: Dataset, model: Model) -> bool:
+    """Whether a record is short enough for the innovations form as it is."""
+    return len(record) * len(model.states) <= MOST_WORK
+
+
+def searchable(record: Dataset, model: Model) -> Dataset | None:
+    """The record, thinned where it is long; None where too few rows would be left for so many states."""
+    if is_short(record, model):
+        return record
+    thin = thinned(record, -(-len(record) * len(model.states) // MOST_WORK))
+    return thin if len(thin) >= FEWEST_ROWS else None
+
+
+def thinned(record: Dataset, apart: int) -> Dataset:
+    """Every k-th row of a record, the first one too, with the mean of the inputs since the row before."""
+    kept = np.arange(0, len(record), apart)
+    total = np.cumsum(record.inputs, axis=0)[kept]
+    means = np.vstack([record.inputs[:1], np.diff(total, axis=0) / apart])
+    return replace(
+        record,
+        time=record.time[kept],
+        dt=apart * record.dt,
+        inputs=means,
+        outputs=record.outputs[kept],
+        parameters={name: values[kept] for name, values in record.parameters.items()},
+    )

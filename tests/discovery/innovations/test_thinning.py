@@ -1,0 +1,55 @@
+"""A long record is thinned so that what its inputs bring in, and what its outputs show, is kept."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.innovations.thinning import FEWEST_ROWS, MOST_WORK, is_short, searchable, thinned
+from adaptive_flot.greybox import Dataset
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+from tests.discovery.innovations.box import DT, model, record
+
+
+def long(rows: int) -> Dataset:
+    return Dataset("long", np.arange(rows, dtype=float), 1.0, np.ones((rows, 1)), np.zeros((rows, 1)))
+
+
+def of_states(count: int) -> Any:
+    return SimpleNamespace(states=range(count))
+
+
+def test_a_short_record_is_taken_as_it_is() -> None:
+    data = record(rows=80)
+    assert searchable(data, model()) is data
+
+
+@pytest.mark.parametrize("rows", [2001, 3600, 9600])
+def test_a_long_record_is_thinned_to_what_takes_a_minute(rows: int) -> None:
+    thin = searchable(long(rows), of_states(2))
+    assert thin is not None and FEWEST_ROWS <= len(thin) <= MOST_WORK / 2 + 1
+    assert is_short(thin, of_states(2))
+
+
+def test_a_flotation_cell_has_too_many_states_to_be_asked() -> None:
+    assert searchable(long(3000), of_states(9)) is None
+
+
+@pytest.mark.parametrize("apart", [1, 2, 3])
+def test_the_rows_kept_are_those_that_the_thinned_inputs_lead_to(apart: int) -> None:
+    """The sum of the inputs up to every row kept is the same, and the free run of a slow model comes to the same."""
+    data = record(rows=181)
+    thin = thinned(data, apart)
+    np.testing.assert_array_equal(thin.time, data.time[::apart])
+    np.testing.assert_array_equal(thin.outputs, data.outputs[::apart])
+    np.testing.assert_allclose(
+        np.cumsum(thin.inputs[1:], axis=0) * apart,
+        np.cumsum(data.inputs[1:], axis=0)[apart - 1 :: apart][: len(thin) - 1],
+    )
+    start, p = np.array([22.0, 22.0]), model().parameter_values
+    full = RecordSimulator(model(), DT).outputs(data, start, p)[::apart]
+    fast = RecordSimulator(model(), apart * DT).outputs(thin, start, p)
+    np.testing.assert_allclose(fast, full, atol=0.02 * np.ptp(full))
