@@ -174,16 +174,19 @@ def _competes(state: State) -> bool:
 
 
 def _allowed(state: State, names: tuple[tuple[str, str], ...]) -> float:
-    """Ratio of errors up to which what is told is as good: above 1 beside what has more coefficients, and says less.
+    """Ratio of errors up to which what is told is as good.
 
-    That is a curve without a name at the place of a fault, or a set of more effects that the free run does not tell.
+    Above 1 beside what has more coefficients, and says less: a curve without a name at the place of a fault, or a set of
+    more effects that the free run does not tell. And beside the same effects, which the free run does not tell: fitted
+    twice, they leave the same but for the search.
     """
     best, word = state.judged.best, state.judged.word
     if best is None:
         return 1.0
     curve = word == "unnamed" and {site for site, _ in best.names} == {site for site, _ in names}
     larger = word == "abstain" and len(best.names) > len(names)
-    return 1 + MUCH_WORSE if curve or larger else 1.0
+    same = word == "abstain" and set(best.names) == set(names)
+    return 1 + MUCH_WORSE if curve or larger or same else 1.0
 
 
 def _smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], allowed: float) -> bool:
