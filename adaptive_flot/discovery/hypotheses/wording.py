@@ -23,7 +23,7 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     values = dict(zip(h.free, (value(name) for name in h.parameters), strict=True))
     site = next(s for s in model.sites if s.name == h.site)
     name, unit = site.name.replace("_", " "), f" {site.unit}" if site.unit and site.unit != "-" else ""
-    first = _at_its_end(next(iter(values.values())), h)
+    first, mode = _at_its_end(next(iter(values.values())), h), h.effect.mode or site.mode
     if h.kind == "stuck" and site.role == "sensor":
         return f"{name} shows {first:.3g}{unit} all the time"
     if h.kind == "stuck":
@@ -33,9 +33,9 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.kind == "range":
         return f"{name} does not go above {first:.3g}{unit}"
     if h.kind == "switch":
-        return f"{name} {_switched(h.effect, site.mode, first, unit, site.role == 'sensor')}"
+        return f"{name} {_switched(h.effect, mode, first, unit, site.role == 'sensor')}"
     if h.kind == "periodic":
-        return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], site.mode, unit)}"
+        return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], mode, unit)}"
     if h.kind == "hysteresis":
         return f"{name} sticks: it stays until it is asked to move by more than {first:.3g}{unit}"
     if h.kind == "dead zone":

@@ -10,13 +10,15 @@ from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
 from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
 EDGE = 0.05
 """Width of the edges of a switch, in sampling intervals."""
 NOTHING = 1e-9
+BALANCE = ("process", "flow", "feed")
+"""Roles of sites whose value enters a balance."""
 SHARP = 6.0
 """Gain of log-likelihood by which edges within a row must be better than slow ones."""
 
@@ -64,9 +66,19 @@ class Screening:
         return sorted(found, key=lambda x: -x.gain)
 
     def switch(self, site: Site) -> Screened | None:
-        """The best switch at a site; None where none is worth its times."""
+        """The best switch at a site; None where none is worth its times.
+
+        What enters or leaves a balance may also change by an amount, whatever else it depends on: people who are not
+        counted, while nobody is.
+        """
+        found = [self._switch(site, site.mode)]
+        if site.mode == "factor" and site.role in BALANCE:
+            found.append(self._switch(site, "offset"))
+        return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
+
+    def _switch(self, site: Site, mode: Mode) -> Screened | None:
         record, count = self._response.record, len(self._response.record) - 1
-        by = self._values[site.name] if site.mode == "factor" else np.ones(count)
+        by = self._values[site.name] if mode == "factor" else np.ones(count)
         if not np.isfinite(by).all() or not np.abs(by).max() > 0:
             return None
         apart = max(1, -(-count // MOST_EDGES))
@@ -78,7 +90,7 @@ class Screening:
         if switch is None or not self._is_sharp(site.name, by, switch):
             return None
         numbers = sum(1 + (b < count) for _, b in switch.pulses)
-        effect = _switch_effect(site, switch, record.time, record.dt)
+        effect = _switch_effect(site, mode, switch, record.time, record.dt)
         hypothesis = Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))
         suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
@@ -139,7 +151,7 @@ def _span(X: FloatArray) -> FloatArray:
     return found
 
 
-def _switch_effect(site: Site, switch: Switch, time: FloatArray, dt: float) -> Effect:
+def _switch_effect(site: Site, mode: Mode, switch: Switch, time: FloatArray, dt: float) -> Effect:
     """A sensor's switch lies between two rows; what acts on a state begins with an interval."""
     late = dt / 2 if site.role == "sensor" else 0.0
     coefficients: dict[str, float] = {"amplitude": 0.0}
@@ -147,4 +159,4 @@ def _switch_effect(site: Site, switch: Switch, time: FloatArray, dt: float) -> E
         coefficients[f"on_{k}"] = float(time[a] + late)
         coefficients[f"for_{k}"] = float(time[b] - time[a]) if b < len(time) - 1 else FOREVER
     settings = {"count": float(len(switch.pulses)), "width": EDGE * dt}
-    return Effect(site.name, "time", "switch", coefficients, settings, mode=site.mode)
+    return Effect(site.name, "time", "switch", coefficients, settings, mode=mode)

@@ -64,7 +64,7 @@ def _kept(state: State, told: Told) -> State:
     named = {site for site, _ in judgement.best.names} if judgement.best and judgement.word == "named" else set()
     if named and not named <= told.sites:
         return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other sites explain more'}")
-    if judgement.word == "named" and _follows_time(state):
+    if judgement.word in ("named", "class") and _follows_time(state):
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
         )
@@ -176,9 +176,9 @@ def _competes(state: State) -> bool:
 def _allowed(state: State, names: tuple[tuple[str, str], ...]) -> float:
     """Ratio of errors up to which what is told is as good.
 
-    Above 1 beside what has more coefficients, and says less: a curve without a name at the place of a fault, or a set of
-    more effects that the free run does not tell. And beside the same effects, which the free run does not tell: fitted
-    twice, they leave the same but for the search.
+    Above 1 beside what has more coefficients, and says less: a curve without a name at the place of a fault, or a set
+    of more effects that the free run does not tell. And beside the same effects, which the free run does not tell:
+    fitted twice, they leave the same but for the search.
     """
     best, word = state.judged.best, state.judged.word
     if best is None:

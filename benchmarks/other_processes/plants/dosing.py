@@ -109,6 +109,7 @@ PROCESS = Process(
         ("decay", "temperature"): "the decay grows a little with the temperature",
         ("probe", "lag"): "there is a corner that mixes slowly",
         ("probe", "delay"): "there is a corner that mixes slowly",
+        ("wash_out", "residual"): "the corner is a second store",
     },
     True,
 )

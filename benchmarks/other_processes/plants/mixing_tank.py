@@ -114,6 +114,7 @@ PROCESS = Process(
         ("analyser", "lag"): "a corner of the tank mixes slowly",
         ("analyser", "delay"): "a corner of the tank mixes slowly",
         ("dosing_pump", "delay"): "a corner of the tank mixes slowly",
+        ("feed_flow", "strength"): "the corner is a second store",
     },
     True,
 )

@@ -93,3 +93,12 @@ def test_a_drift_explains_the_record_only_where_held_out_rows_get_better(low: fl
     given = State(**nothing | {"judgement": judged, "error": error})
     told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
     assert asking._kept(given, told).judged.word == word
+
+
+@pytest.mark.parametrize(("effect", "word"), [(CURVE, "abstain"), (LAW, "class")])
+def test_a_class_of_free_curves_in_time_needs_the_innovations_form(effect: Effect, word: str) -> None:
+    best: Any = SimpleNamespace(effects=(effect,), names=((effect.site, effect.driver),))
+    judged = Judgement("class", best, (("gains", effect.driver), ("loss", effect.driver)), (), 0.0)
+    nothing: dict[str, Any] = {f.name: None for f in fields(State)}
+    told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
+    assert asking._kept(State(**nothing | {"judgement": judged}), told).judged.word == word
