@@ -39,6 +39,11 @@ DIFFERENCE = 0.05
 Slopes = Callable[[FloatArray, tuple[float, float], FloatArray, FloatArray], FloatArray]
 
 
+def weight_of(square: FloatArray, nu: float) -> FloatArray:
+    """Weight of innovations by squared distance, of Student's t with nu degrees of freedom; 1 for the Gaussian."""
+    return np.ones_like(square) if np.isinf(nu) else (nu + 1) / (nu + square)
+
+
 @dataclass(frozen=True)
 class Refit:
     """A model in innovations form, fitted. It holds no equations, so that it goes from one process to another.
@@ -86,6 +91,8 @@ class Refitter:
         What is known of some of them before.
     counted
         Rows that fit (N,); default all. The filter runs over all of them.
+    degrees_of_freedom
+        Of the innovations; infinity is the Gaussian filter.
     """
 
     def __init__(
@@ -97,11 +104,13 @@ class Refitter:
         free: Sequence[str],
         known: Constants | None = None,
         counted: BoolArray | None = None,
+        degrees_of_freedom: float = NU,
     ) -> None:
         self.model, self.record, self.columns, self.floor = model, record, tuple(columns), floor
+        self.degrees_of_freedom = degrees_of_freedom
         self.free, self.known = tuple(free), known
         self.counted = np.ones(len(record), dtype=bool) if counted is None else counted
-        self._functions = ResponseFunctions(model, record.dt, columns, (), free, NU)
+        self._functions = ResponseFunctions(model, record.dt, columns, (), free, degrees_of_freedom)
         self._filter = self._functions.filter
         self._where = list(model.indices("parameters", free))
         chosen = [model.parameters[i] for i in self._where]
@@ -117,7 +126,7 @@ class Refitter:
 
     def noise(self, size: tuple[float, float]) -> NoiseModel:
         """Noise of a size."""
-        return noise_of(self.model, self.floor, self.columns, self.record.dt, *size, NU)
+        return noise_of(self.model, self.floor, self.columns, self.record.dt, *size, self.degrees_of_freedom)
 
     def fit(self, p: FloatArray, size: tuple[float, float] | None = None, *, hold_noise: bool = False) -> Refit:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
@@ -141,6 +150,13 @@ class Refitter:
                     break
         noise = self.noise(size)
         return Refit(p, noise, size, self._run(p, noise), -best)
+
+    def at(self, p: FloatArray) -> Refit:
+        """The noise fitted at parameters (np,) that stay."""
+        first = p[self._where].copy()
+        size = search_noise(lambda t, r: self._cost(p, (t, r), first))
+        noise = self.noise(size)
+        return Refit(p.copy(), noise, size, self._run(p, noise), -self._cost(p, size, first))
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
         """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside."""
@@ -212,7 +228,7 @@ class Refitter:
         noise = self.noise(size)
         L = self._functions.at(self.record, noise, p, self.start(noise, p))
         counts = np.repeat(self.counted[1:], len(self.columns))
-        w = counts * (NU + 1) / (NU + L.innovations**2)
+        w = counts * weight_of(L.innovations**2, self.degrees_of_freedom)
         J, x = L.by_constants * self._scale, p[self._where]
         prior = self._prior(x, first)
         D = np.eye(len(x)) / LOOSE

@@ -16,12 +16,11 @@ import pandas as pd
 from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit, ParameterEstimate
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import NoiseModel
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.runner.commands.innovations.form import HORIZONS, HorizonError, InnovationsForm
+from adaptive_flot.runner.commands.innovations.form import HORIZONS, HorizonError, best_form
 from adaptive_flot.runner.commands.record_blocks import Blocks
 
 ASKED = 3.0
@@ -77,11 +76,8 @@ def estimate_in_innovations_form(setup: Setup, blocks: Blocks, batch: BatchFit) 
     model, columns = setup.model, tuple(setup.model.indices("outputs", setup.outputs))
     fit = replace(blocks.fit, initial_state=batch.initial_state)
     floor = noise_floor([fit], columns)
-    refitter = Refitter(model, fit, columns, floor, setup.parameters)
     with np.errstate(all="ignore"):
-        found = refitter.fit(batch.parameters)
-        covariance = refitter.covariance(found)
-        form = InnovationsForm(model, setup.dt, columns, setup.parameters, found, covariance)
+        form, refitter = best_form(model, fit, columns, floor, setup.parameters, batch.parameters)
         noise = form.best_noise(fit, refitter)
         if blocks.continues:  # the test block starts at the last row of the fit block
             parts = [(_joined(fit, blocks.test), len(fit) - 1)]

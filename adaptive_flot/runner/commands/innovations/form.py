@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from adaptive_flot.contracts.batch import ParameterEstimate
-from adaptive_flot.discovery.innovations.noise_fit import search_noise
-from adaptive_flot.discovery.innovations.refit import HOPELESS, Refit, Refitter
+from adaptive_flot.discovery.innovations.refit import NU, Refit, Refitter
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter, prediction_errors, smooth
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -22,7 +22,8 @@ NEAR = HORIZONS[:2]
 WALKS = (1e-3, 3e-3, 1e-2, 2e-2, 4e-2, 8e-2, 0.16)
 """Sizes of a walk that are tried, in scales of a parameter per square root of a row."""
 NO_WORSE = 1.05
-"""Mean error of predictions, with parameters that walk, over that without, up to which likelier ones walk."""
+"""Ratio of mean errors of predictions up to which one is no worse: of parameters that walk over those that stay, and of
+parameters fitted in innovations form over those of the free run."""
 SHARES = (1.0, 0.1, 0.01)
 """Shares of the process noise that are tried with each."""
 
@@ -36,6 +37,30 @@ class HorizonError:
     rows: int
     seconds: float
     error: float
+
+
+def best_form(
+    model: Model, record: Dataset, columns: Sequence[int], floor: FloatArray, names: Sequence[str], p: FloatArray
+) -> tuple[InnovationsForm, Refitter]:
+    """Fit from parameters (np,) with heavy tails and with none; the fit whose predictions are best.
+
+    Heavy tails take an outlier for what it is. A model that is wrong for a while loses its track by them. What predicts
+    best one row ahead may be far off a hundred rows ahead, where the model is wrong. Then the parameters stay where
+    they were.
+    """
+    kinds = [Refitter(model, record, columns, floor, names, degrees_of_freedom=nu) for nu in (NU, float("inf"))]
+
+    def best(fits: Sequence[Refit]) -> tuple[InnovationsForm, Refitter]:
+        covariances = [refitter.covariance(found) for refitter, found in zip(kinds, fits, strict=True)]
+        forms = [
+            InnovationsForm(model, record.dt, tuple(columns), tuple(names), found, covariance)
+            for found, covariance in zip(fits, covariances, strict=True)
+        ]
+        return min(zip(forms, kinds, strict=True), key=lambda each: each[0].mean_error(record))
+
+    fitted, stays = best([k.fit(p) for k in kinds]), best([k.at(p) for k in kinds])
+    errors = [form.mean_error(record, horizons=HORIZONS) for form, _ in (fitted, stays)]
+    return fitted if errors[0] <= NO_WORSE * errors[1] else stays
 
 
 @dataclass(frozen=True)
@@ -68,23 +93,9 @@ class InnovationsForm:
         return run.run(record, noise, *self.start(record, noise), self.found.p)
 
     def best_noise(self, fit: Dataset, refitter: Refitter) -> NoiseModel:
-        """Noise with heavy tails, with none, or with parameters that walk: the one whose predictions are best.
-
-        Heavy tails take an outlier for what it is. A model that is wrong for a while loses its track by them.
-        """
-
-        def gaussian(theta: float, rho: float) -> NoiseModel:
-            return replace(refitter.noise((theta, rho)), degrees_of_freedom=float("inf"))
-
-        def cost(theta: float, rho: float) -> float:
-            value = -self._log_likelihood(fit, gaussian(theta, rho))
-            return value if np.isfinite(value) else HOPELESS
-
-        size = search_noise(cost, self.found.size)
-        still = [(self.found.size, self.found.noise), (size, gaussian(*size))]
-        size, noise = min(still, key=lambda each: self._mean_error(fit, each[1]))
-        walking = self._walking(fit, refitter, size, noise)
-        return walking if self._mean_error(fit, walking) <= NO_WORSE * self._mean_error(fit, noise) else noise
+        """The noise of the fit, or with parameters that walk, where that is likelier and predicts no worse."""
+        walking = self._walking(fit, refitter, self.found.size, self.found.noise)
+        return walking if self.mean_error(fit, walking) <= NO_WORSE * self.mean_error(fit) else self.found.noise
 
     def _walking(
         self, fit: Dataset, refitter: Refitter, size: tuple[float, float], still: NoiseModel
@@ -108,11 +119,17 @@ class InnovationsForm:
     def _log_likelihood(self, record: Dataset, noise: NoiseModel) -> float:
         return float(self.run(record, noise).log_likelihood.sum())
 
-    def _mean_error(self, record: Dataset, noise: NoiseModel) -> float:
-        """Mean absolute error over near horizons and outputs, in mean changes of an output from row to row."""
+    def mean_error(
+        self, record: Dataset, noise: NoiseModel | None = None, horizons: Sequence[int] = NEAR
+    ) -> float:  # fmt: skip
+        """Mean absolute error over horizons and outputs, in mean changes of an output from row to row.
+
+        With the noise of the fit, or another one.
+        """
+        noise = self.found.noise if noise is None else noise
         measured, filtered = record.outputs[:, list(self.columns)], self.run(record, noise)
         unit = np.maximum(np.nanmean(np.abs(np.diff(measured, axis=0)), axis=0), 1e-300)
-        left = [np.abs(self._left(record, filtered, noise, rows))[1:] for rows in NEAR]
+        left = [np.abs(self._left(record, filtered, noise, rows))[1:] for rows in horizons]
         mean = float(np.mean([np.nanmean(e / unit) for e in left]))
         return mean if np.isfinite(mean) else float("inf")
 
