@@ -23,6 +23,8 @@ ADEQUATE = 1.5
 """Standard deviation of an innovation, in those of the measurement noise, up to which nothing else is wrong."""
 SMALL = 0.15
 """An effect beside another one, that brings less than this share of the gain, is not told."""
+SAME_LAG = 0.8
+"""Share of the gain from which a lag at another place is not told apart."""
 FOLDS = 5
 BLOCK = 12
 """Rows of a block of the bootstrap: innovations hardly remember."""
@@ -120,7 +122,9 @@ def _told(
             return Told("class", best, certain, members, alike, "")
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
-        return _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
+        return _late_anywhere(
+            search, base, _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
+        )
     # "one of these" is true where each explanation has one effect beside what is certain, and not where it has two
     one_open = all(len(e.hypotheses) == len(certain) + 1 for e in alike)
     if 2 <= len(members) <= LARGEST_CLASS and one_open:
@@ -140,6 +144,28 @@ def _without_small_ones(base: Explanation, told: Told, without: Mapping[str, Exp
     if len(told.certain) == 1 or told.best.criterion - rest.criterion >= SMALL * total:
         return told
     return replace(told, best=rest, certain=tuple(h for h in told.certain if h is not small))
+
+
+def _late_anywhere(search: Search, base: Explanation, told: Told) -> Told:
+    """A lag that is named, as a class with each other place where it explains about as much.
+
+    Lags in a row commute: what an input does through them is the same in any order. Only what wanders within the
+    process tells the order, and how it wanders is an assumption of the filter.
+    """
+    late = [h for h in told.certain if h.kind == "lag"]
+    if len(late) != 1:
+        return told
+    least = SAME_LAG * (told.best.criterion - base.criterion)
+    others = [e for e in search.late_elsewhere(told.best, late[0]) if e.criterion - base.criterion >= least]
+    if not others:
+        return told
+    found = sorted([told.best, *others], key=lambda e: -e.criterion)
+    members = tuple((e, next(h for h in e.hypotheses if h.kind == "lag")) for e in found)
+    if len(members) > LARGEST_CLASS:
+        why = f"a lag explains about as much at any of {len(members)} places"
+        return Told("abstain", found[0], (), (), tuple(found), why)
+    certain = tuple(h for h in told.certain if h is not late[0])
+    return Told("class", found[0], certain, members, tuple(found), "")
 
 
 def _alike(search: Search, base: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:

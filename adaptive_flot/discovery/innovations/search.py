@@ -18,6 +18,7 @@ from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 
 REFITTED, SAME_SITE = 6, 2
@@ -167,6 +168,28 @@ class Search:
         p = np.array([now.parameters[now.index("parameters", q.name)].value for q in model.parameters])
         fit = self.fitter(model, tuple(n for h in others for n in h.parameters)).fit(p, explanation.fit.size)
         return Explanation(others, fit, explanation.numbers - numbers_of(left_out))
+
+    def late_elsewhere(self, explanation: Explanation, late: Hypothesis) -> list[Explanation]:
+        """The explanation with one of its lags at another actuator or sensor instead, for each; not those that fail."""
+        rest = self.without(explanation, late)
+        sites = [s.name for s in self.model.sites if s.role in ("actuator", "sensor") and s.name != late.site]
+        taken = {e.label for e in self.model_of(rest).effects}
+        values, _ = self.fitter(self.model_of(rest), ()).response(rest.fit, sites).seen() if sites else ({}, {})
+        (coefficient,) = late.free
+        fitted = self.model_of(explanation)
+        tau = float(fitted.parameters[fitted.index("parameters", late.effect.parameter(coefficient))].value)
+        found = []
+        for site in sites:
+            size = float(np.median(np.abs(values[site])))
+            told = {"amplitude": 1.0, coefficient: tau}
+            effect = Effect(site, "lag", late.effect.form, told, {"scale": size or 1.0})
+            if effect.label in taken or not np.isfinite(size):
+                continue
+            moved = Hypothesis(site, "lag", late.kind, effect, late.free, ({},))
+            p = model_with(self.model_of(rest), moved).parameter_values
+            again = self.added(rest, moved, p)
+            found += [again] if np.isfinite(again.fit.log_likelihood) else []
+        return found
 
     def added(self, start: Explanation, h: Hypothesis, p: FloatArray) -> Explanation:
         """The explanation with an effect more, fitted from parameters of the model with it (np,)."""
