@@ -69,10 +69,11 @@ class Screening:
         """The best switch at a site; None where none is worth its times.
 
         What enters or leaves a balance may also change by an amount, whatever else it depends on: people who are not
-        counted, while nobody is.
+        counted, while nobody is. A model with a site for such amounts has that already.
         """
         found = [self._switch(site, site.mode)]
-        if site.mode == "factor" and site.role in BALANCE:
+        amounts = any(s.mode == "offset" for s in self.model.sites if s.role in BALANCE)
+        if site.role in BALANCE and not amounts:
             found.append(self._switch(site, "offset"))
         return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
 
