@@ -2,7 +2,7 @@
 
 Map
 ---
-truths.py    The eleven truths, as edits of two shipped scenarios.
+truths.py    The twelve truths, as edits of two shipped scenarios.
 best_fit.py  The best-fitting parameters where the model has no true ones.
 figures.py   Fits, and the share of the time in which the 95 % region holds the truth.
 cost.py      What an update costs.
