@@ -119,7 +119,7 @@ def _told(
     if {id(e) for e, _ in events} == {id(e) for e in alike}:  # whatever else there is, something is switched
         members = _one_a_site(events)
         if 2 <= len(members) <= LARGEST_CLASS:
-            return Told("class", best, certain, members, alike, "")
+            return _certain_alone(search, base, Told("class", best, certain, members, alike, ""), without)
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
         return _late_anywhere(
@@ -128,7 +128,7 @@ def _told(
     # "one of these" is true where each explanation has one effect beside what is certain, and not where it has two
     one_open = all(len(e.hypotheses) == len(certain) + 1 for e in alike)
     if 2 <= len(members) <= LARGEST_CLASS and one_open:
-        return Told("class", best, certain, members, alike, "")
+        return _certain_alone(search, base, Told("class", best, certain, members, alike, ""), without)
     if not certain:
         why = f"{len(alike)} explanations are about as good, and have no effect in common"
         return Told("abstain", best, (), (), alike, why)
@@ -144,6 +144,18 @@ def _without_small_ones(base: Explanation, told: Told, without: Mapping[str, Exp
     if len(told.certain) == 1 or told.best.criterion - rest.criterion >= SMALL * total:
         return told
     return replace(told, best=rest, certain=tuple(h for h in told.certain if h is not small))
+
+
+def _certain_alone(search: Search, base: Explanation, told: Told, without: Mapping[str, Explanation]) -> Told:
+    """What is certain by name, where what is open beside it does little: it takes up what else is wrong."""
+    best = told.best
+    open_ones = [h for h in best.hypotheses if not any(h is c for c in told.certain)]
+    if not told.certain or len(open_ones) != 1:
+        return told
+    rest = without[open_ones[0].label]
+    if best.criterion - rest.criterion >= SMALL * (best.criterion - base.criterion):
+        return told
+    return _late_anywhere(search, base, replace(told, word="named", best=rest, open=()))
 
 
 def _late_anywhere(search: Search, base: Explanation, told: Told) -> Told:

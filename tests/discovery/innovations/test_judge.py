@@ -44,6 +44,10 @@ class Stand:
     def without(self, explanation: Given, left_out: Hypothesis) -> Given:
         return self.known[tuple(h.site for h in explanation.hypotheses if h is not left_out)]
 
+    def late_elsewhere(self, explanation: Given, late: Hypothesis) -> list[Given]:
+        """A lag explains half as much at another place."""
+        return [Given((lag("elsewhere"),), explanation.criterion / 2, 0.1)]
+
 
 def lag(site: str) -> Hypothesis:
     """A lag at a site."""
@@ -124,3 +128,22 @@ def test_pairs_that_share_no_effect_are_no_class_of_single_ones(monkeypatch: pyt
     search: Any = Stand(Given((), 0.0, 0.0), *pairs, *singles)
     ranked: Any = [*pairs, Given((), 0.0, 0.0)]
     assert judging.judge(search, ranked[-1], ranked).word == "abstain"
+
+
+@pytest.mark.parametrize(("alone", "word", "open_ones"), [(480.0, "named", []), (300.0, "class", ["valve", "duct"])])
+def test_a_small_effect_that_is_one_of_two_is_not_told_either(
+    alone: float, word: str, open_ones: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is certain by itself brings 480 or 300 of 500."""
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: len(other.hypotheses) < 2)
+    late, one, two = lag("sensor"), lag("valve"), lag("duct")
+    said = told(
+        Given((late, one), 500.0, 0.9),
+        Given((late, two), 499.0, 0.9),
+        Given((late,), alone, 0.5),
+        Given((one,), 30.0, 0.1),
+        Given((two,), 30.0, 0.1),
+    )
+    assert said.word == word
+    assert [h.site for h in said.certain] == ["sensor"]
+    assert [h.site for _, h in said.open] == open_ones
