@@ -139,7 +139,7 @@ def _told(state: State, search: Search, told: Told) -> State:
         return _kept(state, told)
     names = tuple((h.site, h.driver) for h in told.best.hypotheses)
     best = Alternative(names, (True,) * len(names), after, before.loss - after.loss, after.bic - before.bic)
-    members = tuple((h.site, h.driver) for _, h in told.open)
+    members = tuple((h.site, h.driver) for h in _names(told)) if told.open else ()  # what is certain is in all of them
     judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
