@@ -135,12 +135,8 @@ class LinearResponse:
         columns, (F, b, H, h) = list(functions.columns), jacobians
         there = np.isfinite(record.outputs[1:][:, columns])
         K, S = _gains(filtered, H, noise.std(functions.extended)[columns], there)
-        e, nu = (
-            np.where(there, record.outputs[1:][:, columns] - filtered.predicted[1:], 0.0),
-            functions.degrees_of_freedom,
-        )
-        if np.isfinite(nu):  # the weights of the filter, see `greybox.filtering.step`
-            K = K * ((nu + 1) / (nu + e**2 / S))[:, None, :]
+        e = np.where(there, record.outputs[1:][:, columns] - filtered.predicted[1:], 0.0)
+        K = K * weight_of(e**2 / S, functions.degrees_of_freedom)[:, None, :]
         self._H, self._h, self._A, self._B = H, h, F - F @ K @ H, b - F @ K @ h
         self._weight = np.where(there, 1 / np.sqrt(S), 0.0)
         self.innovations: FloatArray = np.clip(e * self._weight, -CLIP, CLIP).ravel()
@@ -195,6 +191,11 @@ class LinearResponse:
         if model.signals:
             drivers |= dict(zip((s.name for s in model.signals), np.array(found[2]), strict=True))
         return {s.name: at[i] for i, s in enumerate(model.sites)}, drivers
+
+
+def weight_of(square: FloatArray, nu: float) -> FloatArray:
+    """Weight of innovations by squared distance, as in the filter (`greybox.filtering.step`); 1 for the Gaussian."""
+    return np.ones_like(square) if np.isinf(nu) else (nu + 1) / (nu + square)
 
 
 def _probe(model: Model, site: str) -> Effect:

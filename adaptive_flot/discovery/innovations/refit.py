@@ -14,7 +14,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, stores_at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
-from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions
+from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions, weight_of
 from adaptive_flot.discovery.innovations.noise_fit import noise_of, search_noise
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel
@@ -37,11 +37,6 @@ DIFFERENCE = 0.05
 """Width of a difference of the cost, in standard deviations of a parameter."""
 
 Slopes = Callable[[FloatArray, tuple[float, float], FloatArray, FloatArray], FloatArray]
-
-
-def weight_of(square: FloatArray, nu: float) -> FloatArray:
-    """Weight of innovations by squared distance, of Student's t with nu degrees of freedom; 1 for the Gaussian."""
-    return np.ones_like(square) if np.isinf(nu) else (nu + 1) / (nu + square)
 
 
 @dataclass(frozen=True)
