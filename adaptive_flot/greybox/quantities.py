@@ -93,6 +93,9 @@ class Parameter:
         "estimated" where a calibration fits it unless told otherwise, else "fixed".
     disturbance
         Whether it varies by itself and may be measured, as a feed grade does.
+    drifts
+        Whether it changes slowly in normal operation, as froth parameters do with the ore. Then a drift of it is no
+        fault, and no missing effect.
     """
 
     name: str
@@ -106,6 +109,7 @@ class Parameter:
     prior_std: float | None = None
     role: ParameterRole = "fixed"
     disturbance: bool = False
+    drifts: bool = False
 
     def with_value(self, value: float) -> Parameter:
         """The same parameter with another value, in its unit; one a rounding error beyond its range is at the end.

@@ -144,26 +144,27 @@ class Refitter:
                 if gain < ENOUGH and improved < ENOUGH:
                     break
         noise = self.noise(size)
-        return Refit(p, noise, size, self._run(p, noise), -best)
+        return Refit(p, noise, size, self.run(p, noise), -best)
 
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
         first = p[self._where].copy()
         size = search_noise(lambda t, r: self._cost(p, (t, r), first))
         noise = self.noise(size)
-        return Refit(p.copy(), noise, size, self._run(p, noise), -self._cost(p, size, first))
+        return Refit(p.copy(), noise, size, self.run(p, noise), -self._cost(p, size, first))
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
         """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside."""
         functions = ResponseFunctions(self.model, self.record.dt, self.columns, sites, self.free)
         return functions.at(self.record, fit.noise, fit.p, self.start(fit.noise, fit.p))
 
-    def _run(self, p: FloatArray, noise: NoiseModel) -> Filtered:
+    def run(self, p: FloatArray, noise: NoiseModel) -> Filtered:
+        """The filter over the record."""
         with np.errstate(all="ignore"):
             return self._filter.run(self.record, noise, *self.start(noise, p), p)
 
     def _cost(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> float:
-        rows = self._run(p, self.noise(size)).log_likelihood[self.counted]
+        rows = self.run(p, self.noise(size)).log_likelihood[self.counted]
         total = -float(rows.sum()) + float(np.sum(self._prior(p[self._where], first) ** 2)) / 2
         return total if np.isfinite(total) else HOPELESS
 

@@ -11,20 +11,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import MUCH_WORSE
+from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.stretches import errors_over_stretches
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
 
 FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
@@ -35,13 +37,14 @@ TELLS = ("named", "class", "unnamed")
 def second_opinion(state: State) -> State:
     """Ask the innovations form where the free run leaves too much, and keep only what both allow.
 
-    It is asked where nothing has a name, where a free curve in time has one, and where too much is left. What it names,
+    It is asked where nothing has a name, where a free curve in time has one, where what is fitted drifts, and where too
+    much is left. What it names,
     takes the place of the free run's verdict, where the report rows do not contradict it. A name of the free run that
     it does not know is taken back.
     """
     problem, (before, _) = state.known_problem, state.refitted
     silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
-    asked = silent or _follows_time(state) or _leaves_too_much(state)
+    asked = silent or _follows_time(state) or _unexpected_drift(state) or _leaves_too_much(state)
     record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
     if record is None:
         return state
@@ -54,7 +57,7 @@ def second_opinion(state: State) -> State:
         base = search.base(before.model.parameter_values)
         told = judge(search, base, search.run(base, state.progress))
     if told.word in ("named", "class"):
-        return _told(state, search, told)
+        return _told(state, search, base, told)
     return _kept(state, told)
 
 
@@ -122,6 +125,14 @@ def _follows_time(state: State) -> bool:
     return best is not None and any(_free_course(e) for e in best.effects)
 
 
+def _unexpected_drift(state: State) -> bool:
+    """Whether a `none` rests on a drift of what is fitted, and the model does not say that it drifts."""
+    before, _ = state.refitted
+    fitted = {p.name: p for p in before.model.parameters}
+    drifts = all(fitted[name].drifts for name in state.known_problem.adapted)
+    return state.judged.word == "none" and state.judged.best is not None and not drifts
+
+
 def _taken_back(state: State, why: str) -> State:
     judgement = replace(state.judged, word="abstain", members=())
     return replace(state, judgement=judgement, contradiction=why)
@@ -131,7 +142,7 @@ def _free_course(effect: Effect) -> bool:
     return effect.driver == "time" and effect.family.is_curve
 
 
-def _told(state: State, search: Search, told: Told) -> State:
+def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     """The verdict of the innovations form, with a free run of the extended model beside that of the plain one."""
     problem, (before, _) = state.known_problem, state.refitted
     after = _free_run(state, search, told, before)
@@ -143,10 +154,16 @@ def _told(state: State, search: Search, told: Told) -> State:
     judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
-    against = contradiction(judgement, error, noise)
-    if against:
+    against, follows = contradiction(judgement, error, noise), _competes(state) and _follows_time(state)
+    over = (
+        _over_stretches(state, search, base, told.best)
+        if (against or follows) and not _surely_worse(error, noise)
+        else ()
+    )
+    stands = bool(over) and not contradiction(judgement, over, noise)
+    if against and not stands:
         return _kept(state, told)
-    if _competes(state) and not _smaller(error, state.error, _allowed(state, names)):
+    if _competes(state) and not (stands and follows) and not _smaller(error, state.error, _allowed(state, names)):
         return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
     _, result = state.searched
     return replace(
@@ -157,8 +174,29 @@ def _told(state: State, search: Search, told: Told) -> State:
         error=error,
         contradiction="",
         certain="",
-        sentence=told_in_words(search, told),
+        sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
+
+
+def _over_stretches(state: State, search: Search, base: Explanation, best: Explanation) -> tuple[OutputChange, ...]:
+    """Errors over the stretches of the report split, or of a record of its own that reports."""
+    problem = state.known_problem
+    held_out = np.isin(search.record.time, problem.record.time[problem.rows("report")])
+    report = state.report_record
+    report = searchable(report, search.model) if report is not None else None
+    if report is None and not held_out.any():
+        return ()
+    return errors_over_stretches(search, base, best, held_out, report)
+
+
+def _over_words(changes: tuple[OutputChange, ...]) -> str:
+    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
+    return f" Error on held-out stretches, each predicted from the filter's state before it: {said}."
+
+
+def _surely_worse(changes: tuple[OutputChange, ...], noise: FloatArray) -> bool:
+    """Whether the error of a free run surely grows, beyond the noise."""
+    return any(c.after > AT_NOISE * s and c.reduction95[1] < 0 for c, s in zip(changes, noise, strict=True))
 
 
 def _competes(state: State) -> bool:

@@ -187,6 +187,7 @@ def _parameters(file: Path, section: str, key: str, spec: Spec, entry: _Entry, l
                 prior_std=prior,
                 role=entry.role,
                 disturbance=spec.disturbance,
+                drifts=spec.drifts,
             )
         )
     return entries

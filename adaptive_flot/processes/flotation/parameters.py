@@ -13,7 +13,7 @@ from adaptive_flot.greybox.model import Parameter
 
 @dataclass(frozen=True)
 class Spec:
-    """What a cell file must hold under one key: name, unit, physical range, symbol, whether it varies by itself."""
+    """What a cell file must hold under one key: name, unit, range, symbol, whether it varies or drifts by itself."""
 
     name: str
     unit: str
@@ -22,6 +22,7 @@ class Spec:
     symbol: str | None = None
     group: Literal["mineral", "bubble"] | None = None
     disturbance: bool = False
+    drifts: bool = False
 
 
 _TINY = 1e-12
@@ -43,8 +44,8 @@ PARAMETERS: dict[str, dict[str, Spec]] = {
         "number": Spec("bubble_number", "-", 0.0, group="bubble"),
     },
     "froth": {
-        "growth_exponent": Spec("growth_exponent", "-", 0.3, 5.0, symbol="n"),
-        "coalescence_rate": Spec("coalescence_rate", "m^n/s", 1e-6, 0.1, symbol="C"),
+        "growth_exponent": Spec("growth_exponent", "-", 0.3, 5.0, symbol="n", drifts=True),
+        "coalescence_rate": Spec("coalescence_rate", "m^n/s", 1e-6, 0.1, symbol="C", drifts=True),
         "burst_a": Spec("burst_a", "m/s", -0.1, 0.1, symbol="a"),
         "burst_b": Spec("burst_b", "-", 0.0, 1.0, symbol="b"),
         "burst_c": Spec("burst_c", "s/m", -100.0, 100.0, symbol="c"),

@@ -1,0 +1,83 @@
+"""Errors on held-out stretches, each predicted from the state that the filter had before it.
+
+The error of a free run over a whole record is mostly what has wandered in the process since its first row. So it hardly
+tells whether an effect is there. A stretch of a tenth of the record holds less of that, and no row of it has fitted a
+constant or a coefficient.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.reduction import reduction
+from adaptive_flot.discovery.assessment.verification import BLOCK_ROWS
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
+from adaptive_flot.discovery.innovations.refit import Refitter
+from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.results import OutputChange
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+OF_A_RECORD = 10
+"""Stretches of a record of its own that reports."""
+
+
+def errors_over_stretches(
+    search: Search, before: Explanation, after: Explanation, held_out: BoolArray, report: Dataset | None = None
+) -> tuple[OutputChange, ...]:
+    """Root mean square error of each output over held-out stretches, by two explanations.
+
+    Constants and coefficients are fitted anew to all other rows, with the noise as it is. The filter then goes over all
+    rows. From its state on the row before, each stretch is simulated to its end.
+
+    Parameters
+    ----------
+    search
+        The record, its model and what is fitted.
+    before, after
+        Explanations to compare.
+    held_out
+        Rows of the search's record that are held out (N,): runs of them are the stretches.
+    report
+        A record of its own that is predicted instead, in ten stretches; then no row of the other is held out.
+    """
+    record = search.record if report is None else report
+    if report is not None:
+        held_out = np.zeros(len(search.record), dtype=bool)
+        edges = np.linspace(1, len(report), OF_A_RECORD + 1).astype(int)
+        stretches = list(pairwise(edges.tolist()))
+    else:
+        inside = np.concatenate([[False], held_out, [False]]).astype(int)
+        starts, ends = (np.flatnonzero(np.diff(inside) == sign) for sign in (1, -1))
+        stretches = [(int(a), int(b)) for a, b in zip(np.maximum(starts, 1), ends, strict=True) if b > max(a, 1)]
+    old, new = (_squares(search, e, ~held_out, record, stretches) for e in (before, after))
+    found = []
+    for j, c in enumerate(search.columns):
+        a, b = old[:, j], new[:, j]
+        if np.isfinite(a).any():
+            q, noise = search.model.outputs[c], float(after.fit.noise.std(search.model)[c])
+            error, less = (float(np.sqrt(np.nanmean(s))) for s in (a, b))
+            found.append(OutputChange(q.name, q.unit, error, less, noise, reduction(a, b, BLOCK_ROWS)[1]))
+    return tuple(found)
+
+
+def _squares(
+    search: Search, explanation: Explanation, counted: BoolArray, record: Dataset, stretches: list[tuple[int, int]]
+) -> FloatArray:
+    """Squared errors on the rows of the stretches, one below the other (rows, m)."""
+    model, free = search.model_of(explanation), explanation.free
+    names = (*search.free, *free)
+    fitter = Refitter(model, search.record, search.columns, search.floor, names, search.known, counted)
+    fit = fitter.fit(explanation.fit.p, explanation.fit.size, hold_noise=True)
+    filtered = fit.filtered
+    if record is not search.record:
+        filtered = Refitter(model, record, search.columns, search.floor, names).run(fit.p, fit.noise)
+    stepper, columns, found = Stepper(model, record.dt), list(search.columns), []
+    for a, b in stretches:
+        state = filtered.z[a - 1, : len(model.states)]
+        run = stepper.simulate(state, record.inputs[a:b], fit.p, float(record.time[a - 1]))
+        found.append((record.outputs[a:b][:, columns] - run.outputs[:, columns]) ** 2)
+    return np.concatenate(found) if found else np.empty((0, len(columns)))
