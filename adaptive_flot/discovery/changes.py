@@ -1,7 +1,7 @@
 """What has changed since a reference: hypotheses about the whole record first, then events, in innovations form.
 
 The first compares free runs over hours, and finds what is the matter all the time. An event of a few rows is lost in
-it. The innovations form sees that, row by row. Before it may speak, what the model lacks on the reference too is added
+it, and so is a fault beside what wanders. The innovations form sees both, row by row. Before it may speak, what the model lacks on the reference too is added
 to the model: such a thing has not changed.
 """
 
@@ -19,10 +19,13 @@ from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
+from adaptive_flot.discovery.innovations.cause_verdict import with_cause
 from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short
+from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
@@ -52,16 +55,24 @@ def find_changes(
         return compared
     reference = max(references, key=len)
     with np.errstate(all="ignore"):
-        search, told = _events(compared, records[0], reference, processes, progress)
-    if told.word not in ("named", "class") or not _has_event(told):
-        return compared
-    return with_event(compared, search, told, time.perf_counter() - began)
+        search, base, told, before = _with_process_noise(compared, records[0], reference, processes, progress)
+        seconds = time.perf_counter() - began
+        with_it = with_event(compared, search, told, seconds) if _has_event(told) else compared
+        if with_it is compared and _leaves_more(compared.verdict):
+            return with_cause(compared, search, base, told, before, seconds)
+    return with_it
 
 
-def _events(
+def _leaves_more(verdict: Verdict) -> bool:
+    """Whether something has changed that is not told, or what is told leaves an error above that of the reference."""
+    left = any(c.after > ABOVE_USUAL * c.noise for c in verdict.error)
+    return verdict.word == "abstain" or (verdict.word in ("named", "class") and left)
+
+
+def _with_process_noise(
     compared: Comparison, record: Dataset, reference: Dataset, processes: int, progress: Callable[[str], None]
-) -> tuple[Search, Told]:
-    """Events in a record, by a model that has what the reference lacks."""
+) -> tuple[Search, Explanation, Told, tuple[Search, Explanation]]:
+    """What has changed, by a model that has what the reference lacks; both searches with the model as it is."""
     calibration, columns = compared.calibration, compared.rows.columns
     constants, model = calibration.constants, calibration.model
     floor = noise_floor([reference], columns)
@@ -78,7 +89,8 @@ def _events(
     base = search.base(extended.parameter_values)
     told = judge(search, base, search.run(base, progress))
     before = replace(before, model=extended)
-    return search, _changed(told, search, before, before.base(extended.parameter_values))
+    there = before.base(extended.parameter_values)
+    return search, base, _changed(told, search, before, there), (before, there)
 
 
 def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:
@@ -95,10 +107,11 @@ def _changed(told: Told, search: Search, before: Search, start: Explanation) -> 
         ]
         return before.added(start, h, p).criterion > start.criterion + LEAST_GAIN
 
-    return replace(told, certain=tuple(h for h in told.certain if not there(h)))
+    certain = tuple(h for h in told.certain if not there(h))
+    return replace(told, certain=certain, open=tuple((e, h) for e, h in told.open if not there(h)))
 
 
 def _has_event(told: Told) -> bool:
     """Whether what is told is an event, and not a thing of the whole record."""
     said = (*told.certain, *(h for _, h in told.open))
-    return bool(said) and all(h.kind == "switch" for h in said)
+    return told.word in ("named", "class") and bool(said) and all(h.kind == "switch" for h in said)

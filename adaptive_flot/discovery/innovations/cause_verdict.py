@@ -1,0 +1,107 @@
+"""The verdict on a cause that the innovations form has found in a record with a reference.
+
+Where no single hypothesis makes free runs surely better, what wanders in the process may be most of their error. Then
+errors over stretches of a tenth of the record decide, each predicted from the state of the filter before it. They must
+fall to what the reference has over such stretches: else something else is the matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, test_on_stretches
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.judgement import Judged
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
+from adaptive_flot.discovery.innovations.in_words import told_in_words
+from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.stretches import errors_over_folds
+from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.discovery.verdict.report_veto import contradiction
+
+MOST = 0.8
+"""Share of what is unusual that a cause must explain: what is left may be another cause, or the right one."""
+
+
+def with_cause(
+    compared: Comparison,
+    search: Search,
+    base: Explanation,
+    told: Told,
+    reference: tuple[Search, Explanation],
+    seconds: float,
+) -> Comparison:
+    """The comparison with the cause told; unchanged where errors over stretches do not fall to those of the reference.
+
+    Parameters
+    ----------
+    compared
+        The comparison of the whole record.
+    search, base, told
+        The search in innovations form, the model as it is in the new record, and what was judged.
+    reference
+        The search in the reference, and the model as it is there.
+    seconds
+        How long it took.
+    """
+    found = _tested(compared, search, told)
+    if not found:
+        return compared
+    error = errors_over_folds(search, base, told.best)
+    usual = errors_over_folds(*reference, reference[1])
+    error = tuple(replace(c, noise=u.after) for c, u in zip(error, usual, strict=True))
+    word: Literal["named", "class"] = "named" if told.word == "named" else "class"
+    against = contradiction(Judgement(word, None, (), (), 0.0), error, np.array([c.noise for c in error]))
+    if against or any(map(_hardly_explained, error)):
+        return compared
+    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))
+    calibration = replace(compared.calibration, model=search.model)
+    verdict = verdict_of(calibration, compared.rows, compared.blocks, compared.null, judged, True, seconds)
+    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip() for c in error)
+    reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
+    over_all = f"Over the whole record: {compared.verdict.reason}"
+    return replace(
+        compared,
+        verdict=replace(verdict, reason=reason, error=error, notes=(*verdict.notes, over_all)),
+        model=search.model_of(told.best),
+        calibration=calibration,
+        tested=(*found, *compared.tested),
+        judged=judged,
+    )
+
+
+def _hardly_explained(change: OutputChange) -> bool:
+    """Whether an output is above its usual error, and too little of what its squared error is above that is removed.
+
+    With the errors b before, a after, and u on the reference::
+
+        b > ABOVE_USUAL u    and    (a^2 - u^2) > (1 - MOST) (b^2 - u^2)
+    """
+    before, after, usual = change.before**2, change.after**2, change.noise**2
+    return change.before > ABOVE_USUAL * change.noise and after - usual > (1 - MOST) * (before - usual)
+
+
+def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
+    """The effects that are told, one by one in free runs; none where there is more than one beside another."""
+    effects = [(told.best, h) for h in told.certain] if told.word == "named" else list(told.open)
+    alone = not (told.certain and told.open) and max((len(e.hypotheses) for e, _ in effects), default=0) == 1
+    if told.word not in ("named", "class") or not alone:
+        return []
+    constants = search.known or compared.calibration.constants
+    first = fit_all_rows(search.model, compared.rows, None, constants, None)
+    assert first is not None  # the model as it is can be simulated
+    fits = [fit_all_rows(search.model, compared.rows, _started(search, e, h), constants, first.fit) for e, h in effects]
+    tested = [test_on_stretches(search.model, compared.rows, f, hold_constants=True) for f in fits if f is not None]
+    return tested if len(tested) == len(effects) else []
+
+
+def _started(search: Search, explanation: Explanation, h: Hypothesis) -> Hypothesis:
+    """The hypothesis with its fitted coefficients to start from."""
+    model = search.model_of(explanation)
+    values = {c: model.parameters[model.index("parameters", h.effect.parameter(c))].value for c in h.free}
+    return replace(h, starts=(values,))
