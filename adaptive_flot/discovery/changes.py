@@ -1,8 +1,8 @@
 """What has changed since a reference: hypotheses about the whole record first, then events, in innovations form.
 
 The first compares free runs over hours, and finds what is the matter all the time. An event of a few rows is lost in
-it, and so is a fault beside what wanders. The innovations form sees both, row by row. Before it may speak, what the model lacks on the reference too is added
-to the model: such a thing has not changed.
+it, and so is a fault beside what wanders. The innovations form sees both, row by row. Before it may speak, what the
+model lacks on the reference too is added to it: such a thing has not changed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -20,11 +21,11 @@ from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
-from adaptive_flot.discovery.innovations.cause_verdict import with_cause
-from adaptive_flot.discovery.innovations.event_verdict import with_event
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short
+from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
+from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -59,14 +60,34 @@ def find_changes(
         seconds = time.perf_counter() - began
         with_it = with_event(compared, search, told, seconds) if _has_event(told) else compared
         if with_it is compared and _leaves_more(compared.verdict):
-            return with_cause(compared, search, base, told, before, seconds)
-    return with_it
+            with_it = with_cause(compared, search, base, told, before, seconds)
+    return with_it if with_it is not compared else _unless_contradicted(compared, told)
 
 
 def _leaves_more(verdict: Verdict) -> bool:
     """Whether something has changed that is not told, or what is told leaves an error above that of the reference."""
     left = any(c.after > ABOVE_USUAL * c.noise for c in verdict.error)
     return verdict.word == "abstain" or (verdict.word in ("named", "class") and left)
+
+
+def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
+    """The comparison, its name taken back where it leaves more and the innovations form names another part alone."""
+    verdict = compared.verdict
+    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    other = told.word == "named" and told.certain and not sites & {h.site for h in told.certain}
+    if verdict.word not in ("named", "class") or not _leaves_more(verdict) or not other:
+        return compared
+    said = " and ".join(h.label for h in told.certain)
+    why = (
+        f"{verdict.reason} This is not told: it leaves more than the reference, and with process noise {said} explains"
+    )
+    word: Literal["abstain"] = "abstain"
+    return replace(
+        compared,
+        verdict=replace(verdict, word=word, reason=f"{why} more.", effects=(), members=()),
+        judged=replace(compared.judged, word=word),
+        model=compared.calibration.model,
+    )
 
 
 def _with_process_noise(

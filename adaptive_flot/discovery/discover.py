@@ -10,7 +10,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.fitting.parallel import one_thread
-from adaptive_flot.discovery.innovations.second_opinion import second_opinion
+from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.discovery.stages import (

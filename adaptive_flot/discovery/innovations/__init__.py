@@ -15,6 +15,5 @@ thinning.py         A long record with fewer rows.
 search.py           A few effects together.
 judge.py            What is certain, and what predicts rows that did not fit it.
 in_words.py         What is told, in words.
-second_opinion.py   The stage of `discover` that asks, where the free run leaves too much.
-event_verdict.py    The verdict on an event in a record with a reference.
+verdicts            What may be told of it, beside the free run or a comparison with a reference.
 """

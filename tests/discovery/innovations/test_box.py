@@ -43,7 +43,7 @@ def test_an_event_is_not_told_where_no_error_is_larger_than_on_the_reference(mon
         verdict = verdict_of(*given)
         return replace(verdict, error=tuple(replace(c, noise=c.before) for c in verdict.error))
 
-    monkeypatch.setattr("adaptive_flot.discovery.innovations.event_verdict.verdict_of", as_noisy)
+    monkeypatch.setattr("adaptive_flot.discovery.innovations.verdicts.event.verdict_of", as_noisy)
     verdict = find_changes(model(), [record(seed=3)], [record((), seed=2)]).verdict
     assert all(e.effect.form != "switch" for e in verdict.effects)
     assert not any(note.startswith("Over the whole record") for note in verdict.notes)

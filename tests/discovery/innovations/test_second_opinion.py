@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.innovations import second_opinion as asking
+from adaptive_flot.discovery.innovations.verdicts import rivals
+from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
 from adaptive_flot.greybox.effects import Effect
 
@@ -31,7 +32,7 @@ def state(word: str, effect: Effect, contradiction: str = "") -> Any:
     ],
 )
 def test_a_free_curve_in_time_that_is_told_asks_for_a_second_opinion(word: str, effect: Effect, asked: bool) -> None:
-    assert asking._follows_time(state(word, effect)) == asked
+    assert rivals.follows_time(state(word, effect)) == asked
 
 
 @pytest.mark.parametrize(
@@ -44,16 +45,16 @@ def test_a_free_curve_in_time_that_is_told_asks_for_a_second_opinion(word: str, 
     ],
 )
 def test_the_best_of_an_abstention_must_leave_the_larger_error_too(given: Any, competes: bool) -> None:
-    assert asking._competes(given) == competes
+    assert rivals.competes(given) == competes
 
 
 def test_only_a_fault_at_the_place_of_an_unnamed_curve_may_leave_a_little_more() -> None:
     more, less = (OutputChange("y", "K", 9.0, left, 1.0, (0.5, 0.9)) for left in (1.05, 1.0))
     here, elsewhere = (("gains", "own_value"),), (("loss", "own_value"),)
     unnamed = state("unnamed", LAW)
-    assert asking._smaller((more,), (less,), asking._allowed(unnamed, here))
-    assert not asking._smaller((more,), (less,), asking._allowed(unnamed, elsewhere))
-    assert not asking._smaller((more,), (less,), asking._allowed(state("named", LAW), here))
+    assert rivals.smaller((more,), (less,), rivals.allowed_ratio(unnamed, here))
+    assert not rivals.smaller((more,), (less,), rivals.allowed_ratio(unnamed, elsewhere))
+    assert not rivals.smaller((more,), (less,), rivals.allowed_ratio(state("named", LAW), here))
 
 
 def test_one_effect_may_leave_a_little_more_than_a_larger_set_that_is_not_told() -> None:
@@ -63,10 +64,10 @@ def test_one_effect_may_leave_a_little_more_than_a_larger_set_that_is_not_told()
         best = SimpleNamespace(effects=(LAW,), names=two)
         return SimpleNamespace(judged=SimpleNamespace(word=word, best=best), contradiction="")
 
-    assert asking._allowed(given("abstain"), one) > 1.0
-    assert asking._allowed(given("abstain"), two) > 1.0, "what both find is the same but for the search"
-    assert asking._allowed(given("abstain"), (("gains", "sun"), ("loss", "rain"))) == 1.0
-    assert asking._allowed(given("named"), one) == 1.0
+    assert rivals.allowed_ratio(given("abstain"), one) > 1.0
+    assert rivals.allowed_ratio(given("abstain"), two) > 1.0, "what both find is the same but for the search"
+    assert rivals.allowed_ratio(given("abstain"), (("gains", "sun"), ("loss", "rain"))) == 1.0
+    assert rivals.allowed_ratio(given("named"), one) == 1.0
 
 
 @pytest.mark.parametrize(

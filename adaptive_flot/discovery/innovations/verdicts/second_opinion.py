@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
@@ -19,32 +18,38 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.stretches import errors_over_stretches
 from adaptive_flot.discovery.innovations.thinning import searchable
-from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
+from adaptive_flot.discovery.innovations.verdicts.rivals import (
+    TELLS,
+    allowed_ratio,
+    competes,
+    follows_time,
+    leaves_too_much,
+    smaller,
+    surely_better,
+    surely_worse,
+    unexpected_drift,
+)  # fmt: skip
+from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_stretches
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
-from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.model import FloatArray
-
-FAR = 3.0
-"""An error so many times the noise from row to row is not explained by measurement noise."""
-TELLS = ("named", "class", "unnamed")
-"""Words of the free run that tell something."""
 
 
 def second_opinion(state: State) -> State:
     """Ask the innovations form where the free run leaves too much, and keep only what both allow.
 
     It is asked where nothing has a name, where a free curve in time has one, where what is fitted drifts, and where too
-    much is left. What it names,
-    takes the place of the free run's verdict, where the report rows do not contradict it. A name of the free run that
-    it does not know is taken back.
+    much is left. What it names takes the place of the free run's verdict, where the report rows do not contradict it. A
+    name of the free run that it does not know is taken back.
+
+    Two errors on the report rows may contradict it. That of a free run over the record must not surely grow. Where it
+    does not surely fall, or the free run has a free curve in time for a rival, that over stretches must (see
+    `errors_over_stretches`). A curve in time follows what wanders, so that no other cause has a smaller error.
     """
     problem, (before, _) = state.known_problem, state.refitted
     silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
-    asked = silent or _follows_time(state) or _unexpected_drift(state) or _leaves_too_much(state)
+    asked = silent or follows_time(state) or unexpected_drift(state) or leaves_too_much(state)
     record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
     if record is None:
         return state
@@ -67,11 +72,11 @@ def _kept(state: State, told: Told) -> State:
     named = {site for site, _ in judgement.best.names} if judgement.best and judgement.word == "named" else set()
     if named and not named <= told.sites:
         return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other sites explain more'}")
-    if judgement.word in ("named", "class") and _follows_time(state):
+    if judgement.word in ("named", "class") and follows_time(state):
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
         )
-    if judgement.word == "none" and told.word != "none" and not _surely_better(state):
+    if judgement.word == "none" and told.word != "none" and not surely_better(state):
         why = told.why or f"held-out rows do not confirm what fits best with process noise ({_words(told)})"
         return replace(
             state,
@@ -80,11 +85,6 @@ def _kept(state: State, told: Told) -> State:
             f"row to row, and {why}.",
         )
     return state
-
-
-def _surely_better(state: State) -> bool:
-    """Whether a change in time of what is fitted, on which a `none` may rest, surely helps on the report rows."""
-    return state.judged.best is not None and any(c.reduction95[0] > 0 for c in state.error)
 
 
 def names_one_of(judgement: Judgement, told: Told) -> bool:
@@ -107,39 +107,9 @@ def _words(told: Told) -> str:
     return " or ".join(h.label for h in _names(told))
 
 
-def _leaves_too_much(state: State) -> bool:
-    """By all rows of the record, and by the report rows alone, which fitted nothing.
-
-    Each row counts up to three standard deviations: outliers are no model error.
-    """
-    problem, (_, after) = state.known_problem, state.refitted
-    residual, noise = after.residual(problem), noise_by_differences(problem.measured)
-    splits = (problem.rows(), problem.rows("report"))
-    left = [np.where(rows[:, None], residual, np.nan).T for rows in splits if rows.any()]
-    return any(clipped_std(e) > FAR * s for part in left for e, s in zip(part, noise, strict=True) if s > 0)
-
-
-def _follows_time(state: State) -> bool:
-    """Whether what is told holds a free curve in time: it follows anything between rows that it has seen."""
-    best = state.judged.best if state.judged.word in ("named", "class") else None
-    return best is not None and any(_free_course(e) for e in best.effects)
-
-
-def _unexpected_drift(state: State) -> bool:
-    """Whether a `none` rests on a drift of what is fitted, and the model does not say that it drifts."""
-    before, _ = state.refitted
-    fitted = {p.name: p for p in before.model.parameters}
-    drifts = all(fitted[name].drifts for name in state.known_problem.adapted)
-    return state.judged.word == "none" and state.judged.best is not None and not drifts
-
-
 def _taken_back(state: State, why: str) -> State:
     judgement = replace(state.judged, word="abstain", members=())
     return replace(state, judgement=judgement, contradiction=why)
-
-
-def _free_course(effect: Effect) -> bool:
-    return effect.driver == "time" and effect.family.is_curve
 
 
 def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
@@ -154,16 +124,13 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
-    against, follows = contradiction(judgement, error, noise), _competes(state) and _follows_time(state)
-    over = (
-        _over_stretches(state, search, base, told.best)
-        if (against or follows) and not _surely_worse(error, noise)
-        else ()
-    )
+    against, follows = contradiction(judgement, error, noise), competes(state) and follows_time(state)
+    asked = bool(against or follows) and not surely_worse(error, noise)
+    over = _over_stretches(state, search, base, told.best) if asked else ()
     stands = bool(over) and not contradiction(judgement, over, noise)
     if against and not stands:
         return _kept(state, told)
-    if _competes(state) and not (stands and follows) and not _smaller(error, state.error, _allowed(state, names)):
+    if competes(state) and not (stands and follows) and not smaller(error, state.error, allowed_ratio(state, names)):
         return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
     _, result = state.searched
     return replace(
@@ -192,46 +159,6 @@ def _over_stretches(state: State, search: Search, base: Explanation, best: Expla
 def _over_words(changes: tuple[OutputChange, ...]) -> str:
     said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
     return f" Error on held-out stretches, each predicted from the filter's state before it: {said}."
-
-
-def _surely_worse(changes: tuple[OutputChange, ...], noise: FloatArray) -> bool:
-    """Whether the error of a free run surely grows, beyond the noise."""
-    return any(c.after > AT_NOISE * s and c.reduction95[1] < 0 for c, s in zip(changes, noise, strict=True))
-
-
-def _competes(state: State) -> bool:
-    """Whether the free run has something that must leave the larger error: what it tells, or its best alternative.
-
-    A free curve in time that is not told is no rival, and neither is what the report rows have taken back.
-    """
-    judged = state.judged
-    if judged.word in TELLS:
-        return True
-    untold = judged.best is not None and judged.word == "abstain" and not state.contradiction
-    return untold and judged.best is not None and not any(_free_course(e) for e in judged.best.effects)
-
-
-def _allowed(state: State, names: tuple[tuple[str, str], ...]) -> float:
-    """Ratio of errors up to which what is told is as good.
-
-    Above 1 beside what has more coefficients, and says less: a curve without a name at the place of a fault, or a set
-    of more effects that the free run does not tell. And beside the same effects, which the free run does not tell:
-    fitted twice, they leave the same but for the search.
-    """
-    best, word = state.judged.best, state.judged.word
-    if best is None:
-        return 1.0
-    curve = word == "unnamed" and {site for site, _ in best.names} == {site for site, _ in names}
-    larger = word == "abstain" and len(best.names) > len(names)
-    same = word == "abstain" and set(best.names) == set(names)
-    return 1 + MUCH_WORSE if curve or larger or same else 1.0
-
-
-def _smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], allowed: float) -> bool:
-    """Whether errors on the report rows are below `allowed` times others, by the geometric mean over the outputs."""
-    with np.errstate(all="ignore"):
-        ratios = [np.log(a.after / b.after) for a, b in zip(error, than, strict=True) if a.after > 0 and b.after > 0]
-    return not ratios or float(np.mean(ratios)) < float(np.log(allowed))
 
 
 def _free_run(state: State, search: Search, told: Told, before: Fit) -> Fit | None:

@@ -20,7 +20,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.stretches import errors_over_folds
+from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds
 from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.discovery.verdict.report_veto import contradiction
 

@@ -21,8 +21,8 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
-OF_A_RECORD = 10
-"""Stretches of a record of its own that reports."""
+OF_A_RECORD, SETTLING = 10, 20
+"""Stretches of a whole record; share of its rows, the first ones, after which the filter knows the state."""
 
 
 def errors_over_stretches(
@@ -47,8 +47,7 @@ def errors_over_stretches(
     record = search.record if report is None else report
     if report is not None:
         held_out = np.zeros(len(search.record), dtype=bool)
-        edges = np.linspace(1, len(report), OF_A_RECORD + 1).astype(int)
-        stretches = list(pairwise(edges.tolist()))
+        stretches = _tenths(len(report))
     else:
         inside = np.concatenate([[False], held_out, [False]]).astype(int)
         starts, ends = (np.flatnonzero(np.diff(inside) == sign) for sign in (1, -1))
@@ -60,8 +59,7 @@ def errors_over_stretches(
 def errors_over_folds(search: Search, before: Explanation, after: Explanation) -> tuple[OutputChange, ...]:
     """The same over each tenth of the record, in five folds of two tenths: all rows are held out once."""
     n = len(search.record)
-    edges = np.linspace(1, n, OF_A_RECORD + 1).astype(int).tolist()
-    tenths = list(pairwise(edges))
+    tenths = _tenths(n)
 
     def squares(explanation: Explanation) -> FloatArray:
         parts: dict[int, FloatArray] = {}
@@ -74,6 +72,12 @@ def errors_over_folds(search: Search, before: Explanation, after: Explanation) -
         return np.concatenate([parts[i] for i in range(OF_A_RECORD)])
 
     return _changes(search, after, squares(before), squares(after))
+
+
+def _tenths(n: int) -> list[tuple[int, int]]:
+    """Ten stretches of n rows, less the first rows, in which the filter finds the state."""
+    edges = np.linspace(max(n // SETTLING, 1), n, OF_A_RECORD + 1).astype(int).tolist()
+    return list(pairwise(edges))
 
 
 def _changes(search: Search, after: Explanation, old: FloatArray, new: FloatArray) -> tuple[OutputChange, ...]:

@@ -1,0 +1,91 @@
+"""What the free run has, which a name of the innovations form must beat, and where it leaves too much."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
+from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
+from adaptive_flot.discovery.results import OutputChange, State
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import FloatArray
+
+FAR = 3.0
+"""An error so many times the noise from row to row is not explained by measurement noise."""
+TELLS = ("named", "class", "unnamed")
+"""Words of the free run that tell something."""
+
+
+def leaves_too_much(state: State) -> bool:
+    """By all rows of the record, and by the report rows alone, which fitted nothing.
+
+    Each row counts up to three standard deviations: outliers are no model error.
+    """
+    problem, (_, after) = state.known_problem, state.refitted
+    residual, noise = after.residual(problem), noise_by_differences(problem.measured)
+    splits = (problem.rows(), problem.rows("report"))
+    left = [np.where(rows[:, None], residual, np.nan).T for rows in splits if rows.any()]
+    return any(clipped_std(e) > FAR * s for part in left for e, s in zip(part, noise, strict=True) if s > 0)
+
+
+def follows_time(state: State) -> bool:
+    """Whether what is told holds a free curve in time: it follows anything between rows that it has seen."""
+    best = state.judged.best if state.judged.word in ("named", "class") else None
+    return best is not None and any(_free_course(e) for e in best.effects)
+
+
+def unexpected_drift(state: State) -> bool:
+    """Whether a `none` rests on a drift of what is fitted, and the model does not say that it drifts."""
+    before, _ = state.refitted
+    fitted = {p.name: p for p in before.model.parameters}
+    drifts = all(fitted[name].drifts for name in state.known_problem.adapted)
+    return state.judged.word == "none" and state.judged.best is not None and not drifts
+
+
+def surely_better(state: State) -> bool:
+    """Whether a change in time of what is fitted, on which a `none` may rest, surely helps on the report rows."""
+    return state.judged.best is not None and any(c.reduction95[0] > 0 for c in state.error)
+
+
+def competes(state: State) -> bool:
+    """Whether the free run has something that must leave the larger error: what it tells, or its best alternative.
+
+    A free curve in time that is not told is no rival, and neither is what the report rows have taken back.
+    """
+    judged = state.judged
+    if judged.word in TELLS:
+        return True
+    untold = judged.best is not None and judged.word == "abstain" and not state.contradiction
+    return untold and judged.best is not None and not any(_free_course(e) for e in judged.best.effects)
+
+
+def allowed_ratio(state: State, names: tuple[tuple[str, str], ...]) -> float:
+    """Ratio of errors up to which what is told is as good.
+
+    Above 1 beside what has more coefficients, and says less: a curve without a name at the place of a fault, or a set
+    of more effects that the free run does not tell. And beside the same effects, which the free run does not tell:
+    fitted twice, they leave the same but for the search.
+    """
+    best, word = state.judged.best, state.judged.word
+    if best is None:
+        return 1.0
+    curve = word == "unnamed" and {site for site, _ in best.names} == {site for site, _ in names}
+    larger = word == "abstain" and len(best.names) > len(names)
+    same = word == "abstain" and set(best.names) == set(names)
+    return 1 + MUCH_WORSE if curve or larger or same else 1.0
+
+
+def smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], allowed: float) -> bool:
+    """Whether errors on the report rows are below `allowed` times others, by the geometric mean over the outputs."""
+    with np.errstate(all="ignore"):
+        ratios = [np.log(a.after / b.after) for a, b in zip(error, than, strict=True) if a.after > 0 and b.after > 0]
+    return not ratios or float(np.mean(ratios)) < float(np.log(allowed))
+
+
+def surely_worse(changes: tuple[OutputChange, ...], noise: FloatArray) -> bool:
+    """Whether the error of a free run surely grows, beyond the noise."""
+    return any(c.after > AT_NOISE * s and c.reduction95[1] < 0 for c, s in zip(changes, noise, strict=True))
+
+
+def _free_course(effect: Effect) -> bool:
+    return effect.driver == "time" and effect.family.is_curve

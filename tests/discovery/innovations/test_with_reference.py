@@ -1,0 +1,35 @@
+"""With a reference: an event reaches every output that has changed, and a cause explains most of the change."""
+
+import pytest
+
+from adaptive_flot.discovery.innovations.verdicts.cause import _hardly_explained
+from adaptive_flot.discovery.innovations.verdicts.event import _not_touched
+from adaptive_flot.discovery.results import OutputChange
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "untouched"),
+    [
+        (5.0, 4.9, True),  # five times as large as on the reference, and the event does nothing to it
+        (5.0, 1.2, False),  # the event brings it down
+        (5.0, 3.0, False),  # much is left, but the event is at work there
+        (1.5, 1.5, False),  # about as on the reference: nothing has changed there
+    ],
+)
+def test_an_output_far_above_the_reference_that_an_event_leaves_alone(
+    before: float, after: float, untouched: bool
+) -> None:
+    assert _not_touched(OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))) == untouched
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "hardly"),
+    [
+        (5.0, 1.0, False),  # as on the reference
+        (5.0, 2.0, False),  # (4 - 1) / (25 - 1): an eighth of what is unusual is left
+        (5.0, 3.0, True),  # a third of it is left
+        (1.4, 1.4, False),  # about as on the reference: there is nothing to explain
+    ],
+)
+def test_a_cause_must_explain_most_of_what_is_unusual(before: float, after: float, hardly: bool) -> None:
+    assert _hardly_explained(OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))) == hardly
