@@ -13,7 +13,7 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.refit import Refitter
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, worth
 from adaptive_flot.greybox.model import FloatArray
 
 NEAR = 0.05
@@ -194,10 +194,11 @@ def _one_a_site(pairs: Sequence[tuple[Explanation, Hypothesis]]) -> tuple[tuple[
 
 def told_apart(search: Search, base: Explanation, best: Explanation, other: Explanation) -> bool:
     """Whether the record tells an explanation from a better one: by enough, and in more than a few rows."""
-    lead, least = best.criterion - other.criterion, LEAST_GAIN / 2
+    lead, least = worth(best) - worth(other), LEAST_GAIN / 2
     if not _adequate(search, best):
         least = max(least, NEAR * (best.criterion - base.criterion))
-    return lead >= least and low_end(best.fit.rows - other.fit.rows, best.numbers - other.numbers) > 0
+    effects = len(best.hypotheses) - len(other.hypotheses)
+    return lead >= least and low_end(best.fit.rows - other.fit.rows, best.numbers - other.numbers, effects) > 0
 
 
 def _adequate(search: Search, explanation: Explanation) -> bool:
@@ -207,11 +208,14 @@ def _adequate(search: Search, explanation: Explanation) -> bool:
     return float(np.max(np.nanmedian(np.sqrt(fit.filtered.variance), axis=0) / r)) <= ADEQUATE
 
 
-def low_end(gain: FloatArray, numbers: int = 0) -> float:
-    """Lower end of the 95 % interval of a sum over rows (N,) by the block bootstrap, less k / 2 log n for k numbers."""
+def low_end(gain: FloatArray, numbers: int = 0, effects: int = 0) -> float:
+    """Lower end of the 95 % interval of a sum over rows (N,) by the block bootstrap.
+
+    Less k / 2 log n for k numbers, and LEAST_GAIN for each effect.
+    """
     counted = gain[gain != 0]
     blocks = np.array([b.sum() for b in np.array_split(gain, max(len(gain) // BLOCK, 4))])
-    charge = numbers / 2 * float(np.log(max(len(counted), 2))) / len(blocks)
+    charge = (numbers / 2 * float(np.log(max(len(counted), 2))) + LEAST_GAIN * effects) / len(blocks)
     if not blocks.std() > 0:
         return float((blocks - charge).sum())
     found = bootstrap((blocks - charge,), np.sum, n_resamples=DRAWS, method="percentile", rng=0, vectorized=True)

@@ -129,7 +129,7 @@ class Search:
             if not ranked or ranked[0].criterion < best.criterion + LEAST_GAIN:
                 break
             beam, best = ranked[:BEAM], ranked[0]
-        return sorted(found, key=lambda e: -e.criterion)
+        return sorted(found, key=lambda e: -worth(e))
 
     def _further(self, start: Explanation) -> list[Explanation]:
         """The explanation with one more effect, for each that is worth its numbers."""
@@ -208,6 +208,14 @@ class Search:
             p[model.index("parameters", q.name)] = np.clip(first, q.lower, q.upper)
         again = self.added(start, h, p)
         return again if np.isfinite(again.fit.log_likelihood) else None
+
+
+def worth(explanation: Explanation) -> float:
+    """The criterion, less what each effect must gain: two effects stand for one only where they explain so much more.
+
+    The criterion charges numbers. That two things are wrong at a time is less likely than that one is.
+    """
+    return explanation.criterion - LEAST_GAIN * len(explanation.hypotheses)
 
 
 def numbers_of(h: Hypothesis) -> int:

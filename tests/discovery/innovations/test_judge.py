@@ -9,6 +9,7 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations import judge as judging
+from adaptive_flot.discovery.innovations.search import worth
 from adaptive_flot.greybox.effects import Effect
 
 ROWS = 200
@@ -70,7 +71,7 @@ def _given_rows(monkeypatch: pytest.MonkeyPatch) -> None:
 def told(*found: Given) -> judging.Told:
     base = Given((), 0.0, 0.0)
     search: Any = Stand(base, *found)
-    ranked: Any = sorted([base, *found], key=lambda e: -e.criterion)
+    ranked: Any = sorted([base, *found], key=lambda e: -worth(e))
     return judging.judge(search, ranked[-1], ranked)
 
 
