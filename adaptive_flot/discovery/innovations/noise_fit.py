@@ -10,7 +10,6 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from adaptive_flot.greybox.filtering import NoiseModel
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -19,8 +18,12 @@ THETA = (1e-6, 10.0)
 """Range of process noise, in scales of the states per square root of the time that the record samples."""
 RHO = (0.3, 10.0)
 """Range of measurement noise, in that from row to row."""
-COARSE, ROUNDS, PRECISION = 7, 2, 0.05
-"""Grid of the first search, rounds of the two in turn, and width at which a search in the logarithm ends."""
+COARSE, ROUNDS, MOVES = 7, 8, 8
+"""Grid of the first search, most rounds of the two in turn, and most moves of one search."""
+ENOUGH, NARROWEST = 0.5, 0.1
+"""Gain of a round that does not count, and the least distance in the logarithm at which one looks."""
+FIRST_WIDTH = 1.0
+"""Distance in the logarithm at which a search from a known size looks first; a third of it in the next round."""
 
 
 def noise_of(
@@ -40,28 +43,64 @@ def noise_of(
 def search_noise(
     cost: Callable[[float, float], float], start: tuple[float, float] | None = None
 ) -> tuple[float, float]:
-    """Find theta and rho that minimise a cost: on a grid and by golden sections, or, from a start, near it."""
+    """Find theta and rho that minimise a cost: on a grid, then each in turn by parabolas in its logarithm.
+
+    After each round the step of both is tried once more: one noise may stand for the other (Hooke & Jeeves, *J. ACM* 8
+    (1961) 212). Rounds end when one gains nothing that counts.
+    """
     if start is None:
         grid = np.geomspace(*THETA, COARSE)
-        theta = float(min(grid, key=lambda t: cost(float(t), 1.0)))
-        rho, width = 1.0, float(np.log(grid[1] / grid[0]))
+        values = [cost(float(t), 1.0) for t in grid]
+        at, best = (float(grid[int(np.argmin(values))]), 1.0), min(values)
+        width = float(np.log(grid[1] / grid[0])) / 2
     else:
-        (theta, rho), width = start, 1.0
+        at, best, width = start, cost(*start), FIRST_WIDTH
     for _ in range(ROUNDS):
-        theta = _golden(partial(_first, cost, rho), theta, width, THETA)
-        rho = _golden(partial(cost, theta), rho, width / 2, RHO)
-        width /= 3
-    return theta, rho
+        before, first = best, at
+        theta, best = _by_parabolas(partial(_first, cost, at[1]), at[0], best, width, THETA)
+        rho, best = _by_parabolas(partial(cost, theta), at[1], best, min(width, FIRST_WIDTH) / 2, RHO)
+        at = theta, rho
+        if at != first:
+            further = float(np.clip(theta**2 / first[0], *THETA)), float(np.clip(rho**2 / first[1], *RHO))
+            again = cost(*further)
+            at, best = (further, again) if again < best else (at, best)
+        if before - best < ENOUGH and width < FIRST_WIDTH:
+            break
+        width = max(width / 3, NARROWEST)
+    return at
 
 
 def _first(cost: Callable[[float, float], float], rho: float, theta: float) -> float:
     return cost(theta, rho)
 
 
-def _golden(cost: Callable[[float], float], at: float, width: float, ends: tuple[float, float]) -> float:
-    low, high = max(np.log(at) - width, np.log(ends[0])), min(np.log(at) + width, np.log(ends[1]))
-    found = minimize_scalar(
-        lambda x: cost(float(np.exp(x))), bounds=(low, high), method="bounded", options={"xatol": PRECISION}
-    )
-    best: float = float(np.exp(found.x))
-    return best if found.fun <= cost(at) else at
+def _by_parabolas(
+    cost: Callable[[float], float], at: float, value: float, width: float, ends: tuple[float, float]
+) -> tuple[float, float]:
+    """Where a cost is least near a point with a known value, and its value there.
+
+    The lowest of three points a `width` of the logarithm apart is moved on to, until it is the middle one. Then the
+    parabola through the three says where to look once more (Brent, *Algorithms for Minimization without Derivatives*,
+    1973, chapter 5). An end of the range may be the lowest.
+    """
+    low, high = (float(np.log(end)) for end in ends)
+    middle, seen = float(np.log(at)), {}
+
+    def of(x: float) -> float:
+        if x not in seen:
+            seen[x] = cost(float(np.exp(x)))
+        return seen[x]
+
+    seen[middle] = value
+    for _ in range(MOVES):
+        left, right = max(middle - width, low), min(middle + width, high)
+        lowest = min((middle, left, right), key=of)
+        if lowest == middle:
+            break
+        middle = lowest
+    if left < middle < right:
+        a, b = (of(middle) - of(left)) / (middle - left), (of(right) - of(middle)) / (right - middle)
+        if b > a:
+            of(min(max((left + middle) / 2 - a * (right - left) / 2 / (b - a), left), right))
+    best = min(seen, key=of)
+    return float(np.exp(best)), seen[best]

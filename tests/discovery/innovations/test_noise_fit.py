@@ -1,0 +1,45 @@
+"""Two sizes of noise are found where a likelihood with a known minimum has it, in few runs of the filter."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from adaptive_flot.discovery.innovations.noise_fit import RHO, THETA, search_noise
+
+ROWS = 600
+
+
+class Likelihood:
+    """Of a known truth: one half of the rows has the variance rho^2, the other one rho^2 + 9 theta^2."""
+
+    def __init__(self, theta: float, rho: float) -> None:
+        self.truth, self.runs = (rho**2, rho**2 + 9 * theta**2), 0
+
+    def __call__(self, theta: float, rho: float) -> float:
+        self.runs += 1
+        variances = rho**2, rho**2 + 9 * theta**2
+        return float(ROWS / 4 * sum(np.log(v) + true / v for v, true in zip(variances, self.truth, strict=True)))
+
+    @property
+    def least(self) -> float:
+        """The cost at the truth."""
+        return float(ROWS / 4 * sum(np.log(true) + 1 for true in self.truth))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(-6.0, 1.0), st.floats(-0.5, 1.0), st.booleans())
+def test_the_least_cost_is_found_to_less_than_what_counts(log_theta: float, log_rho: float, near: bool) -> None:
+    """An effect must gain 12: a search that ends 1.5 above the least decides nothing."""
+    theta, rho = float(np.exp(log_theta)), float(np.exp(log_rho))
+    cost = Likelihood(theta, rho)
+    found = search_noise(cost, (2 * theta, 0.8 * rho) if near else None)
+    runs = cost.runs
+    assert cost(*found) - cost.least < 1.5
+    assert runs <= (40 if near else 60)
+
+
+@pytest.mark.parametrize("start", [None, (1e-6, 1.0), (10.0, 10.0)])
+def test_sizes_stay_in_their_range(start: tuple[float, float] | None) -> None:
+    theta, rho = search_noise(lambda t, r: 100 * (np.log(t) + np.log(r)), start)
+    assert (theta, rho) == pytest.approx((THETA[0], RHO[0]))
