@@ -1,0 +1,64 @@
+"""Which errors on held-out rows let a name of the innovations form be told: those of a free run, or over stretches."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
+from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.greybox.effects import Effect
+
+CURVE = Effect("supply", "time", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
+NOISE = 0.01
+SURELY_LESS, UNSURE, SURELY_MORE = (0.2, 0.6), (-0.7, 0.5), (-0.9, -0.1)
+
+
+def change(interval: tuple[float, float], after: float) -> OutputChange:
+    return OutputChange("level", "m", 0.2, after, NOISE, interval)
+
+
+def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over: OutputChange) -> Judgement:
+    """What is told beside a free run that has a curve in time for its best, told or not, with an error of 0.02."""
+    fit = SimpleNamespace(loss=0.0, bic=0.0, model=None)
+    h = SimpleNamespace(site="valve", driver="own_value", label="valve leaks")
+    told: Any = SimpleNamespace(
+        word="named", certain=(h,), open=(), best=SimpleNamespace(hypotheses=(h,)), sites=frozenset(["valve"]), why=""
+    )
+    monkeypatch.setattr(asking, "_free_run", lambda *a: fit)
+    monkeypatch.setattr(asking, "report_errors", lambda *a: (free,))
+    monkeypatch.setattr(asking, "noise_from_row_to_row", lambda *a: np.array([NOISE]))
+    monkeypatch.setattr(asking, "_over_stretches", lambda *a: (over,))
+    monkeypatch.setattr(asking, "told_in_words", lambda *a: "Valve does not go below 0.5.")
+    rival: Any = SimpleNamespace(effects=(CURVE,), names=(("supply", "time"),))
+    judged = Judgement(word, rival, (("supply", "time"),) if word == "class" else (), (), 0.0)  # type: ignore[arg-type]
+    monkeypatch.setattr(asking, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
+    state: Any = SimpleNamespace(
+        judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
+        known_problem=None, refitted=(fit, fit), searched=(None, fit),
+    )  # fmt: skip
+    search: Any = None
+    found: Judgement = asking._told(state, search, told.best, told).judgement  # type: ignore[assignment]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("word", "free", "over", "told"),
+    [
+        ("abstain", change(UNSURE, 0.199), change(SURELY_LESS, 0.05), "named"),  # what wanders hides it in a free run
+        ("abstain", change(UNSURE, 0.199), change(UNSURE, 0.199), "abstain"),  # nothing shows it
+        ("abstain", change(SURELY_MORE, 0.3), change(SURELY_LESS, 0.05), "abstain"),  # held-out rows contradict it
+        ("class", change(SURELY_LESS, 0.1), change(SURELY_LESS, 0.05), "named"),  # the curve follows what wanders
+        (
+            "class",
+            change(SURELY_LESS, 0.1),
+            change(UNSURE, 0.199),
+            "abstain",
+        ),  # the curve has less, and stretches no say
+    ],
+)
+def test_stretches_decide_where_a_free_run_does_not(
+    monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over: OutputChange, told: str
+) -> None:
+    assert verdict(monkeypatch, word, free, over).word == told
