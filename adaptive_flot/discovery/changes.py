@@ -46,7 +46,8 @@ def find_changes(
 ) -> Comparison:
     """Find what has changed since a reference, or what a model lacks in several records of one process.
 
-    Arguments and errors are those of `compare`. Events are looked for where there are one record and a reference.
+    Arguments and errors are those of `compare`. Events, and causes beside what wanders, are looked for where there are
+    one record and a reference.
     """
     began = time.perf_counter()
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import verify
@@ -46,7 +47,11 @@ def adjust_for_common_nuisance(
         return result
     taking = [best, *(a for a in near if nuisance not in a.names)]
     fits = parallel_map(lambda k: fit_variant(fitter, taking[k].fit, score, MOST_STEPS), range(len(taking)), processes)
-    adjusted = {a.names: fit for a, fit in zip(taking, fits, strict=True) if fit}
+    adjusted = {
+        a.names: fit.with_model(partial(variant_model, a.fit, score))
+        for a, fit in zip(taking, fits, strict=True)
+        if fit
+    }
     if len(adjusted) < len(taking):
         return result
     # a rival that is the nuisance itself is compared with the best that has it: if that is better, it alone is not all
@@ -62,7 +67,7 @@ def adjust_for_common_nuisance(
         for a in result.alternatives
     ]
     changed.sort(key=lambda a: (a.adjusted_bic is None, a.fit.bic if a.adjusted_bic is None else a.adjusted_bic))
-    scorer, _ = scorer_of(problem, adjusted[winner.names].with_model(lambda: variant_model(winner.fit, score)))
+    scorer, _ = scorer_of(problem, adjusted[winner.names])
     left, threshold = what_is_left(scorer, threshold_of(scorer))
     return replace(
         result,

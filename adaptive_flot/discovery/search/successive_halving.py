@@ -43,7 +43,7 @@ from adaptive_flot.discovery.search.fit_jobs import (
     step,
     unbent,
 )
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.rescaled import as_it_came, factors_of, rescaled
 
 FIRST_STEPS = 6
@@ -54,6 +54,8 @@ NEAR_FINALIST = 0.5
 """A finalist beyond the third must have gained at least this share of what the first gained ..."""
 TIED, MOST_FINALISTS = 0.95, 7
 """... or have this share of the best first-order gain, in which several may tie."""
+FAR_APART = 3.0
+"""Factor between a constant of a finalist and that of the best one from which it is fitted from there as well."""
 LEADERS = 4
 """Alternatives that are run at every row in the end."""
 CLOSE_GAIN = 0.7
@@ -84,6 +86,7 @@ def refit(
     if not went_on:
         return [fitted.alternative for fitted in best_of_each(first)], not fitter.problem.time_is_up
     last = halving.last(went_on)
+    last += halving.from_constants_of_the_best(last, first)
     compared = not fitter.problem.time_is_up
     followers = halving.followers(last)
     bent = halving.bent(followers, last)
@@ -177,6 +180,26 @@ class _SuccessiveHalving:
         coarse = [drawn.get((f.linearisation, f.score.candidate.name), f) for f in finalists]
         jobs = [job for f in coarse for job in forms(self.linearisations[f.linearisation], f)]
         return self._run([*jobs, *self._switches({f.score.candidate.name for f in finalists})])
+
+    def from_constants_of_the_best(self, last: list[FittedJob], first: list[FittedJob]) -> list[FittedJob]:
+        """Whoever ended with constants far from those of the best one: once more, from there.
+
+        Where much is missing, constants of the model as it is may be absurd, and a fit that starts there may stay.
+        """
+        if not last:
+            return []
+        best = min(last, key=lambda fitted: fitted.alternative.fit.bic).alternative.fit
+
+        def constants(fit: Fit) -> FloatArray:
+            return np.abs([dict(zip(fit.names, fit.values, strict=True))[n] for n in self.fitter.problem.adapted])
+
+        def far(fit: Fit) -> bool:
+            own, there = constants(fit), constants(best)
+            return bool(np.any(np.maximum(own, there) > FAR_APART * np.minimum(own, there)))
+
+        return self._run(
+            [Job(f.linearisation, f.score, best) for f in best_of_each([*last, *first]) if far(f.alternative.fit)]
+        )
 
     def _switches(self, names: set[tuple[str, str]]) -> list[Job]:
         """Switches by a signal of these names, from each linearisation that proposes one.
