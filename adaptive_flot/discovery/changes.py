@@ -25,7 +25,7 @@ from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
-from adaptive_flot.discovery.innovations.verdicts.event import with_event
+from adaptive_flot.discovery.innovations.verdicts.event import FAR_ABOVE, with_event
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -72,20 +72,28 @@ def _leaves_more(verdict: Verdict) -> bool:
 
 
 def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
-    """The comparison, its name taken back where it leaves more and the innovations form names another part alone."""
-    verdict = compared.verdict
+    """The comparison, its name taken back where the innovations form does not know it.
+
+    That is where it leaves more than the reference and another part is named there, or where the errors are not far
+    above those of the reference: so little may be what wanders.
+    """
+    verdict, found = compared.verdict, (*told.certain, *(h for _, h in told.open))
     sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
-    other = told.word == "named" and told.certain and not sites & {h.site for h in told.certain}
-    if verdict.word not in ("named", "class") or not _leaves_more(verdict) or not other:
+    if verdict.word not in ("named", "class") or sites & {h.site for h in found}:
         return compared
-    said = " and ".join(h.label for h in told.certain)
-    why = (
-        f"{verdict.reason} This is not told: it leaves more than the reference, and with process noise {said} explains"
-    )
+    if told.word == "named" and found and _leaves_more(verdict):
+        said = " and ".join(h.label for h in found)
+        why = f"it leaves more than the reference, and with process noise {said} explains more"
+    elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
+        why = "errors are not far above those of the reference, and with process noise it is not confirmed"
+    else:
+        return compared
     word: Literal["abstain"] = "abstain"
     return replace(
         compared,
-        verdict=replace(verdict, word=word, reason=f"{why} more.", effects=(), members=()),
+        verdict=replace(
+            verdict, word=word, reason=f"{verdict.reason} This is not told: {why}.", effects=(), members=()
+        ),
         judged=replace(compared.judged, word=word),
         model=compared.calibration.model,
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
+from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
+from adaptive_flot.discovery.innovations.verdicts.event import FAR_ABOVE
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
 from adaptive_flot.greybox.effects import Effect
@@ -80,6 +82,23 @@ def smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], all
     with np.errstate(all="ignore"):
         ratios = [np.log(a.after / b.after) for a, b in zip(error, than, strict=True) if a.after > 0 and b.after > 0]
     return not ratios or float(np.mean(ratios)) < float(np.log(allowed))
+
+
+def hardly_explained(changes: tuple[OutputChange, ...]) -> bool:
+    """Whether an output is far above its noise, and less than half of what its squared error is above that is removed.
+
+    With the errors b before and a after, and the noise s::
+
+        b > FAR_ABOVE s    and    (a^2 - s^2) > (1 - EXPLAINED) (b^2 - s^2)
+
+    Then something else is the matter, which any name may stand in for.
+    """
+
+    def hardly(c: OutputChange) -> bool:
+        before, after, noise = c.before**2, c.after**2, c.noise**2
+        return c.before > FAR_ABOVE * c.noise and after - noise > (1 - EXPLAINED) * (before - noise)
+
+    return any(map(hardly, changes))
 
 
 def surely_worse(changes: tuple[OutputChange, ...], noise: FloatArray) -> bool:

@@ -24,6 +24,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     allowed_ratio,
     competes,
     follows_time,
+    hardly_explained,
     leaves_too_much,
     smaller,
     surely_better,
@@ -128,7 +129,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     asked = bool(against or follows) and not surely_worse(error, noise)
     over = _over_stretches(state, search, base, told.best) if asked else ()
     stands = bool(over) and not contradiction(judgement, over, noise)
-    if against and not stands:
+    if (against and not stands) or hardly_explained(over if stands else error) or _another_drift(state, told):
         return _kept(state, told)
     if competes(state) and not (stands and follows) and not smaller(error, state.error, allowed_ratio(state, names)):
         return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
@@ -143,6 +144,14 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         certain="",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
+
+
+def _another_drift(state: State, told: Told) -> bool:
+    """Whether a drift of what is fitted surely helps on the report rows, and what is told is elsewhere."""
+    best = state.judged.best
+    if best is None or not (unexpected_drift(state) and surely_better(state)):
+        return False
+    return not {site for site, _ in best.names} <= {h.site for h in _names(told)}
 
 
 def _over_stretches(state: State, search: Search, base: Explanation, best: Explanation) -> tuple[OutputChange, ...]:
