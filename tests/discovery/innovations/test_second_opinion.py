@@ -103,3 +103,25 @@ def test_a_class_of_free_curves_in_time_needs_the_innovations_form(effect: Effec
     nothing: dict[str, Any] = {f.name: None for f in fields(State)}
     told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
     assert asking._kept(State(**nothing | {"judgement": judged}), told).judged.word == word
+
+
+@pytest.mark.parametrize(
+    ("drifts", "low", "site", "another"),
+    [
+        (False, 0.8, "valve", True),  # the drift explains it, and a valve is told
+        (False, 0.8, "gains", False),  # what is told is where the drift is
+        (False, -0.1, "valve", False),  # held-out rows do not confirm the drift
+        (True, 0.8, "valve", False),  # the model says that it drifts: nothing was asked
+    ],
+)
+def test_a_drift_that_helps_is_not_replaced_by_something_elsewhere(
+    drifts: bool, low: float, site: str, another: bool
+) -> None:
+    best = SimpleNamespace(effects=(CURVE,), names=(("gains", "time"),))
+    fit = SimpleNamespace(model=SimpleNamespace(parameters=(SimpleNamespace(name="gain", drifts=drifts),)))
+    given: Any = SimpleNamespace(
+        judged=SimpleNamespace(word="none", best=best), refitted=(fit, fit),
+        known_problem=SimpleNamespace(adapted=("gain",)), error=(OutputChange("y", "K", 4.0, 1.0, 1.0, (low, 0.9)),),
+    )  # fmt: skip
+    told: Any = SimpleNamespace(certain=(SimpleNamespace(site=site, label=site),), open=())
+    assert asking._another_drift(given, told) == another

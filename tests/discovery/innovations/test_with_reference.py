@@ -1,10 +1,15 @@
 """With a reference: an event reaches every output that has changed, and a cause explains most of the change."""
 
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
+from adaptive_flot.discovery.changes import _unless_contradicted
 from adaptive_flot.discovery.innovations.verdicts.cause import _hardly_explained
 from adaptive_flot.discovery.innovations.verdicts.event import _not_touched
-from adaptive_flot.discovery.results import OutputChange
+from adaptive_flot.discovery.results import OutputChange, Verdict
 
 
 @pytest.mark.parametrize(
@@ -33,3 +38,44 @@ def test_an_output_far_above_the_reference_that_an_event_leaves_alone(
 )
 def test_a_cause_must_explain_most_of_what_is_unusual(before: float, after: float, hardly: bool) -> None:
     assert _hardly_explained(OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))) == hardly
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A judgement, its word alone."""
+
+    word: str = "named"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What is asked of a comparison."""
+
+    verdict: Verdict
+    judged: Judged = Judged()
+    calibration: Any = field(default_factory=lambda: SimpleNamespace(model=None))
+    model: Any = None
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sites", "word"),
+    [
+        (1.2, 0.9, (), "abstain"),  # hardly above the reference, and not confirmed
+        (1.2, 0.9, ("gauge",), "named"),  # confirmed
+        (5.0, 1.1, (), "named"),  # far above the reference, and brought down to it
+        (5.0, 3.0, ("pump",), "abstain"),  # much is left, and another part explains more
+        (5.0, 1.1, ("pump",), "named"),  # another part is named, but nothing is left
+    ],
+)
+def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_not_know_it(
+    before: float, after: float, sites: tuple[str, ...], word: str
+) -> None:
+    effect: Any = SimpleNamespace(effect=SimpleNamespace(site="gauge"))
+    error = (OutputChange("level", "m", before, after, 1.0, (0.1, 0.3)),)
+    compared: Any = Compared(
+        Verdict(word="named", reason="Gauge shows more.", effects=(effect,), members=(), error=error, split="fresh")
+    )
+    told: Any = SimpleNamespace(
+        word="named" if sites else "none", certain=tuple(SimpleNamespace(site=s, label=s) for s in sites), open=()
+    )
+    assert _unless_contradicted(compared, told).verdict.word == word

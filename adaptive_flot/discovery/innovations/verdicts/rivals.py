@@ -38,10 +38,11 @@ def follows_time(state: State) -> bool:
 
 def unexpected_drift(state: State) -> bool:
     """Whether a `none` rests on a drift of what is fitted, and the model does not say that it drifts."""
+    if state.judged.word != "none" or state.judged.best is None:
+        return False
     before, _ = state.refitted
     fitted = {p.name: p for p in before.model.parameters}
-    drifts = all(fitted[name].drifts for name in state.known_problem.adapted)
-    return state.judged.word == "none" and state.judged.best is not None and not drifts
+    return not all(fitted[name].drifts for name in state.known_problem.adapted)
 
 
 def surely_better(state: State) -> bool:
