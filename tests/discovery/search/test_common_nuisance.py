@@ -64,3 +64,12 @@ def test_there_is_no_comparison_with_no_one_or_with_too_many(wandering: tuple[Pr
     problem, found = wandering
     assert adjust_for_common_nuisance(problem, found, ()) is found
     assert adjust_for_common_nuisance(problem, found, found.alternatives[:1] * (MOST_RIVALS + 1)) is found
+
+
+def test_fits_of_other_processes_are_compared_like_ones_own(wandering: tuple[Problem, SearchResult]) -> None:
+    """A fit comes back from another process without its model: the comparison ended with an error there."""
+    problem, found = wandering
+    first = _first_round(found)
+    alone, beside = (adjust_for_common_nuisance(problem, first, first.alternatives[1:], n) for n in (1, 2))
+    assert beside.common_nuisance == alone.common_nuisance is not None
+    assert [a.adjusted_bic for a in beside.alternatives] == pytest.approx([a.adjusted_bic for a in alone.alternatives])
