@@ -59,8 +59,10 @@ def find_changes(
     with np.errstate(all="ignore"):
         search, base, told, before = _with_process_noise(compared, records[0], reference, processes, progress)
         seconds = time.perf_counter() - began
-        with_it = with_event(compared, search, told, seconds) if _has_event(told) else compared
-        if with_it is compared and _leaves_more(compared.verdict):
+        with_it = compared
+        if _has_event(told):  # an event that free runs refuse is not told as a cause either
+            with_it = with_event(compared, search, told, seconds)
+        elif _leaves_more(compared.verdict):
             with_it = with_cause(compared, search, base, told, before, seconds)
     return with_it if with_it is not compared else _unless_contradicted(compared, told)
 

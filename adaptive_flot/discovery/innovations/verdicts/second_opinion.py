@@ -7,6 +7,7 @@ the innovations form has been asked.
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +53,7 @@ def second_opinion(state: State) -> State:
     silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
     asked = silent or follows_time(state) or unexpected_drift(state) or leaves_too_much(state)
     record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
-    if record is None:
+    if record is None or time.monotonic() > state.ends:  # a budget that is spent has no time for it
         return state
     state.progress("ask the innovations form")
     search = Search(
