@@ -79,7 +79,7 @@ def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     That is where it leaves more than the reference and another part is named there, or where the errors are not far
     above those of the reference: so little may be what wanders.
     """
-    verdict, found = compared.verdict, (*told.certain, *(h for _, h in told.open))
+    verdict, found = compared.verdict, told.effects
     sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
     if verdict.word not in ("named", "class") or sites & {h.site for h in found}:
         return compared
@@ -145,5 +145,4 @@ def _changed(told: Told, search: Search, before: Search, start: Explanation) -> 
 
 def _has_event(told: Told) -> bool:
     """Whether what is told is an event, and not a thing of the whole record."""
-    said = (*told.certain, *(h for _, h in told.open))
-    return told.word in ("named", "class") and bool(said) and all(h.kind == "switch" for h in said)
+    return told.word in ("named", "class") and bool(told.effects) and all(h.kind == "switch" for h in told.effects)

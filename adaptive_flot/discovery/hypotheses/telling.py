@@ -143,7 +143,7 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
         return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near or 'nothing'}."
     said = [_part_in_words(model, judged, t) for t in judged.parts]
     first = f"{said[0][0].upper()}{said[0][1:]}." if judged.word == "named" else _one_of(said)
-    helped = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}" for c in error)
+    helped = ", ".join(c.words for c in error)
     return f"{first} Error on stretches that did not fit it: {helped}."
 
 

@@ -63,6 +63,11 @@ class Told:
     why: str
 
     @property
+    def effects(self) -> tuple[Hypothesis, ...]:
+        """What is certain, then what is one of a few."""
+        return (*self.certain, *(h for _, h in self.open))
+
+    @property
     def sites(self) -> frozenset[str]:
         """Sites of every effect of the explanations that are not told apart."""
         return frozenset(h.site for e in self.alike for h in e.hypotheses)

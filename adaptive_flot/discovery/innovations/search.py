@@ -7,7 +7,7 @@ decides which of two names is right.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,6 +107,12 @@ class Search:
             model = model_with(model, h)
         p = explanation.fit.p
         return model.with_parameters({q.name: float(v) for q, v in zip(model.parameters, p, strict=True)})
+
+    def started(self, explanation: Explanation, h: Hypothesis) -> Hypothesis:
+        """One of its effects with the fitted coefficients to start from, for a fit of another kind."""
+        model = self.model_of(explanation)
+        values = {c: model.parameters[model.index("parameters", h.effect.parameter(c))].value for c in h.free}
+        return replace(h, starts=(values,))
 
     def base(self, p: FloatArray) -> Explanation:
         """The model as it is, fitted from parameters (np,)."""

@@ -124,6 +124,11 @@ class OutputChange:
             f"(noise {self.noise:.3g}; reduction {low:.0f} to {high:.0f} %)"
         )
 
+    @property
+    def words(self) -> str:
+        """Output and errors before and after, without a unit where there is none."""
+        return f"{self.output} {self.before:.3g} -> {self.after:.3g} {self.unit}".rstrip(" -")
+
 
 @dataclass(frozen=True)
 class Verification:

@@ -193,8 +193,10 @@ class _SuccessiveHalving:
         def constants(fit: Fit) -> FloatArray:
             return np.abs([dict(zip(fit.names, fit.values, strict=True))[n] for n in self.fitter.problem.adapted])
 
+        there = constants(best)
+
         def far(fit: Fit) -> bool:
-            own, there = constants(fit), constants(best)
+            own = constants(fit)
             return bool(np.any(np.maximum(own, there) > FAR_APART * np.minimum(own, there)))
 
         return self._run(

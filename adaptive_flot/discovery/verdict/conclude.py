@@ -81,7 +81,7 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
         likelier = beside_words(state.likelihood, much_better(state.error))
         return " ".join(filter(None, (said, likelier, state.certain, state.background)))
-    errors = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in state.error)
+    errors = ", ".join(c.words for c in state.error)
     return f"{state.sentence} Error of the free run on held-out rows: {errors}."
 
 

@@ -47,6 +47,6 @@ def certain_words(judgement: Judgement, changes: Sequence[OutputChange], noise: 
     if repaired:
         said.append(f"{name} brings {', '.join(repaired)} down to the noise.")
     if repaired and wrong:
-        still = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in wrong)
+        still = ", ".join(c.words for c in wrong)
         said.append(f"Still wrong: {still}; look for a further cause there.")
     return " ".join(said)

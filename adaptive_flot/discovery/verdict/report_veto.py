@@ -73,7 +73,7 @@ def contradiction(
     if said := made_worse(changes, noise, unknown, likelier, few):
         return said
     if not surely_better(changes) and not (likelier and (alike or much_better(changes))):
-        said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
+        said = ", ".join(c.words for c in changes)
         return f"on held-out rows no output surely gets better ({said})"
     return ""
 
@@ -95,7 +95,7 @@ def made_worse(
     ]
     if not worse:
         return ""
-    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
+    said = ", ".join(c.words for c in worse)
     return f"on held-out rows it makes the error larger ({said})"
 
 
@@ -178,7 +178,7 @@ def contradiction_at_the_end(
     ]
     if not worse:
         return ""
-    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in worse)
+    said = ", ".join(c.words for c in worse)
     return f"beyond the rows that it was fitted to it makes the error larger ({said})"
 
 

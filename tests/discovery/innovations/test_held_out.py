@@ -24,7 +24,7 @@ def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over
     fit = SimpleNamespace(loss=0.0, bic=0.0, model=None)
     h = SimpleNamespace(site="valve", driver="own_value", label="valve leaks")
     told: Any = SimpleNamespace(
-        word="named", certain=(h,), open=(), best=SimpleNamespace(hypotheses=(h,)), sites=frozenset(["valve"]), why=""
+        word="named", effects=(h,), open=(), best=SimpleNamespace(hypotheses=(h,)), sites=frozenset(["valve"]), why=""
     )
     monkeypatch.setattr(asking, "_free_run", lambda *a: fit)
     monkeypatch.setattr(asking, "report_errors", lambda *a: (free,))

@@ -80,7 +80,7 @@ def test_one_effect_may_leave_a_little_more_than_a_larger_set_that_is_not_told()
 )
 def test_a_class_without_what_the_innovations_form_names_is_not_told(word: str, members: Any, agrees: bool) -> None:
     limit = SimpleNamespace(site="heater", label="heater range")
-    told: Any = SimpleNamespace(certain=(limit,), open=())
+    told: Any = SimpleNamespace(effects=(limit,))
     judged: Any = SimpleNamespace(word=word, best=SimpleNamespace(names=members[:1]), members=members)
     assert asking.names_one_of(judged, told) == agrees
 
@@ -123,5 +123,5 @@ def test_a_drift_that_helps_is_not_replaced_by_something_elsewhere(
         judged=SimpleNamespace(word="none", best=best), refitted=(fit, fit),
         known_problem=SimpleNamespace(adapted=("gain",)), error=(OutputChange("y", "K", 4.0, 1.0, 1.0, (low, 0.9)),),
     )  # fmt: skip
-    told: Any = SimpleNamespace(certain=(SimpleNamespace(site=site, label=site),), open=())
+    told: Any = SimpleNamespace(effects=(SimpleNamespace(site=site, label=site),))
     assert asking._another_drift(given, told) == another

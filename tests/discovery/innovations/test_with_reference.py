@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 
 from adaptive_flot.discovery.changes import _unless_contradicted
-from adaptive_flot.discovery.innovations.verdicts.cause import _hardly_explained
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
+from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.event import _not_touched
+from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import OutputChange, Verdict
 
 
@@ -37,7 +39,8 @@ def test_an_output_far_above_the_reference_that_an_event_leaves_alone(
     ],
 )
 def test_a_cause_must_explain_most_of_what_is_unusual(before: float, after: float, hardly: bool) -> None:
-    assert _hardly_explained(OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))) == hardly
+    change = OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))
+    assert hardly_explained((change,), ABOVE_USUAL, MOST) == hardly
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,6 @@ def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_
         Verdict(word="named", reason="Gauge shows more.", effects=(effect,), members=(), error=error, split="fresh")
     )
     told: Any = SimpleNamespace(
-        word="named" if sites else "none", certain=tuple(SimpleNamespace(site=s, label=s) for s in sites), open=()
+        word="named" if sites else "none", effects=tuple(SimpleNamespace(site=s, label=s) for s in sites)
     )
     assert _unless_contradicted(compared, told).verdict.word == word

@@ -13,15 +13,15 @@ from typing import Literal
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, test_on_stretches
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds
-from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
+from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, usual_over_folds
+from adaptive_flot.discovery.results import Judgement
 from adaptive_flot.discovery.verdict.report_veto import contradiction
 
 MOST = 0.8
@@ -53,16 +53,16 @@ def with_cause(
     if not found:
         return compared
     error = errors_over_folds(search, base, told.best)
-    usual = errors_over_folds(*reference, reference[1])
-    error = tuple(replace(c, noise=u.after) for c, u in zip(error, usual, strict=True))
+    usual = usual_over_folds(*reference)
+    error = tuple(replace(c, noise=usual[c.output]) for c in error)
     word: Literal["named", "class"] = "named" if told.word == "named" else "class"
     against = contradiction(Judgement(word, None, (), (), 0.0), error, np.array([c.noise for c in error]))
-    if against or any(map(_hardly_explained, error)):
+    if against or hardly_explained(error, ABOVE_USUAL, MOST):
         return compared
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))
     calibration = replace(compared.calibration, model=search.model)
     verdict = verdict_of(calibration, compared.rows, compared.blocks, compared.null, judged, True, seconds)
-    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip() for c in error)
+    said = ", ".join(c.words for c in error)
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
     over_all = f"Over the whole record: {compared.verdict.reason}"
     return replace(
@@ -75,17 +75,6 @@ def with_cause(
     )
 
 
-def _hardly_explained(change: OutputChange) -> bool:
-    """Whether an output is above its usual error, and too little of what its squared error is above that is removed.
-
-    With the errors b before, a after, and u on the reference::
-
-        b > ABOVE_USUAL u    and    (a^2 - u^2) > (1 - MOST) (b^2 - u^2)
-    """
-    before, after, usual = change.before**2, change.after**2, change.noise**2
-    return change.before > ABOVE_USUAL * change.noise and after - usual > (1 - MOST) * (before - usual)
-
-
 def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
     """The effects that are told, one by one in free runs; none where there is more than one beside another."""
     effects = [(told.best, h) for h in told.certain] if told.word == "named" else list(told.open)
@@ -95,13 +84,6 @@ def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
     constants = search.known or compared.calibration.constants
     first = fit_all_rows(search.model, compared.rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
-    fits = [fit_all_rows(search.model, compared.rows, _started(search, e, h), constants, first.fit) for e, h in effects]
+    fits = [fit_all_rows(search.model, compared.rows, search.started(e, h), constants, first.fit) for e, h in effects]
     tested = [test_on_stretches(search.model, compared.rows, f, hold_constants=True) for f in fits if f is not None]
     return tested if len(tested) == len(effects) else []
-
-
-def _started(search: Search, explanation: Explanation, h: Hypothesis) -> Hypothesis:
-    """The hypothesis with its fitted coefficients to start from."""
-    model = search.model_of(explanation)
-    values = {c: model.parameters[model.index("parameters", h.effect.parameter(c))].value for c in h.free}
-    return replace(h, starts=(values,))

@@ -17,7 +17,7 @@ from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search import Search
 from adaptive_flot.discovery.results import OutputChange
 
 FAR_ABOVE, HARDLY_LESS = 2.0, 0.9
@@ -51,7 +51,7 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
     null_fit = first.fit
     null = test_on_stretches(model, rows, first, hold_constants=True)
     events = [(told.best, h) for h in told.certain] or list(told.open)
-    found = [t for e, h in events if (t := tested(_started(search, e, h))) is not None]
+    found = [t for e, h in events if (t := tested(search.started(e, h))) is not None]
     if not found or not np.nanmean(rms(rows, found[0].fresh) / rms(rows, null.fresh)) < 1:
         return compared
     word = "class" if told.word == "class" and len(found) > 1 else "named"
@@ -79,10 +79,3 @@ def _not_touched(change: OutputChange) -> bool:
     What has changed shows there as well. So the event is not the cause, or stands in for one that explains both.
     """
     return change.after > FAR_ABOVE * change.noise and change.after > HARDLY_LESS * change.before
-
-
-def _started(search: Search, explanation: Explanation, h: Hypothesis) -> Hypothesis:
-    """The hypothesis with its fitted coefficients to start from."""
-    model = search.model_of(explanation)
-    values = {c: model.parameters[model.index("parameters", h.effect.parameter(c))].value for c in h.free}
-    return replace(h, starts=(values,))

@@ -85,19 +85,19 @@ def smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], all
     return not ratios or float(np.mean(ratios)) < float(np.log(allowed))
 
 
-def hardly_explained(changes: tuple[OutputChange, ...]) -> bool:
-    """Whether an output is far above its noise, and less than half of what its squared error is above that is removed.
+def hardly_explained(changes: tuple[OutputChange, ...], above: float = FAR_ABOVE, share: float = EXPLAINED) -> bool:
+    """Whether an output is far above its noise, and too little of what its squared error is above that is removed.
 
-    With the errors b before and a after, and the noise s::
+    With the errors b before and a after, and its noise or usual error s::
 
-        b > FAR_ABOVE s    and    (a^2 - s^2) > (1 - EXPLAINED) (b^2 - s^2)
+        b > above s    and    (a^2 - s^2) > (1 - share) (b^2 - s^2)
 
     Then something else is the matter, which any name may stand in for.
     """
 
     def hardly(c: OutputChange) -> bool:
-        before, after, noise = c.before**2, c.after**2, c.noise**2
-        return c.before > FAR_ABOVE * c.noise and after - noise > (1 - EXPLAINED) * (before - noise)
+        before, after, usual = c.before**2, c.after**2, c.noise**2
+        return c.before > above * c.noise and after - usual > (1 - share) * (before - usual)
 
     return any(map(hardly, changes))
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
@@ -31,7 +30,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     surely_better,
     surely_worse,
     unexpected_drift,
-)  # fmt: skip
+)
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_stretches
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
@@ -94,11 +93,7 @@ def names_one_of(judgement: Judgement, told: Told) -> bool:
     if judgement.word not in TELLS or judgement.best is None:
         return True
     said = judgement.members if judgement.word == "class" else judgement.best.names
-    return bool({site for site, _ in said} & {h.site for h in _names(told)})
-
-
-def _names(told: Told) -> tuple[Hypothesis, ...]:
-    return (*told.certain, *(h for _, h in told.open))
+    return bool({site for site, _ in said} & {h.site for h in told.effects})
 
 
 def _other_name(told: Told) -> str:
@@ -106,7 +101,7 @@ def _other_name(told: Told) -> str:
 
 
 def _words(told: Told) -> str:
-    return " or ".join(h.label for h in _names(told))
+    return " or ".join(h.label for h in told.effects)
 
 
 def _taken_back(state: State, why: str) -> State:
@@ -122,7 +117,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         return _kept(state, told)
     names = tuple((h.site, h.driver) for h in told.best.hypotheses)
     best = Alternative(names, (True,) * len(names), after, before.loss - after.loss, after.bic - before.bic)
-    members = tuple((h.site, h.driver) for h in _names(told)) if told.open else ()  # what is certain is in all of them
+    members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
     judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
@@ -152,7 +147,7 @@ def _another_drift(state: State, told: Told) -> bool:
     best = state.judged.best
     if best is None or not (unexpected_drift(state) and surely_better(state)):
         return False
-    return not {site for site, _ in best.names} <= {h.site for h in _names(told)}
+    return not {site for site, _ in best.names} <= {h.site for h in told.effects}
 
 
 def _over_stretches(state: State, search: Search, base: Explanation, best: Explanation) -> tuple[OutputChange, ...]:
@@ -167,7 +162,7 @@ def _over_stretches(state: State, search: Search, base: Explanation, best: Expla
 
 
 def _over_words(changes: tuple[OutputChange, ...]) -> str:
-    said = ", ".join(f"{c.output} {c.before:.3g} -> {c.after:.3g} {c.unit}".rstrip(" -") for c in changes)
+    said = ", ".join(c.words for c in changes)
     return f" Error on held-out stretches, each predicted from the filter's state before it: {said}."
 
 

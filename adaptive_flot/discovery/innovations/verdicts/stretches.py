@@ -58,20 +58,30 @@ def errors_over_stretches(
 
 def errors_over_folds(search: Search, before: Explanation, after: Explanation) -> tuple[OutputChange, ...]:
     """The same over each tenth of the record, in five folds of two tenths: all rows are held out once."""
-    n = len(search.record)
-    tenths = _tenths(n)
+    return _changes(search, after, _over_folds(search, before), _over_folds(search, after))
 
-    def squares(explanation: Explanation) -> FloatArray:
-        parts: dict[int, FloatArray] = {}
-        for k in range(OF_A_RECORD // 2):
-            two = [k, k + OF_A_RECORD // 2]
-            counted = np.ones(n, dtype=bool)
-            for i in two:
-                counted[slice(*tenths[i])] = False
-            parts |= {i: _squares(search, explanation, counted, search.record, [tenths[i]]) for i in two}
-        return np.concatenate([parts[i] for i in range(OF_A_RECORD)])
 
-    return _changes(search, after, squares(before), squares(after))
+def usual_over_folds(search: Search, explanation: Explanation) -> dict[str, float]:
+    """Root mean square error of each output over each tenth of the record, by one explanation, as above."""
+    with np.errstate(all="ignore"):
+        found = np.sqrt(np.nanmean(_over_folds(search, explanation), axis=0))
+    return {search.model.outputs[c].name: float(e) for c, e in zip(search.columns, found, strict=True)}
+
+
+def _over_folds(search: Search, explanation: Explanation) -> FloatArray:
+    """Squared errors on all tenths, one below the other (rows, m)."""
+    tenths, half = _tenths(len(search.record)), OF_A_RECORD // 2
+    first, second = [], []
+    for k in range(half):
+        two = [tenths[k], tenths[k + half]]
+        counted = np.ones(len(search.record), dtype=bool)
+        for a, b in two:
+            counted[a:b] = False
+        squares = _squares(search, explanation, counted, search.record, two)
+        length = two[0][1] - two[0][0]
+        first.append(squares[:length])
+        second.append(squares[length:])
+    return np.concatenate([*first, *second])
 
 
 def _tenths(n: int) -> list[tuple[int, int]]:
