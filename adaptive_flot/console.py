@@ -78,8 +78,8 @@ def print_verdict(verdict: Verdict) -> None:
     for note in verdict.notes:
         console.print(f"- {note}", highlight=False)
     if verdict.error:
-        where = verdict.split if " " in verdict.split else f"{verdict.split} split of the record"
-        title = f"Free-run root mean square error, {where}"
+        where = verdict.split if " " in verdict.split else f"free run, {verdict.split} split of the record"
+        title = f"Root mean square error, {where}"
         rows = []
         for c in verdict.error:
             low, high = (number(100 * r, ".0f") for r in c.reduction95)

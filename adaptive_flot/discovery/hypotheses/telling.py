@@ -22,7 +22,7 @@ FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
 MOVED = 1.0
 """A constant is said to have moved from so many of its standard deviations on."""
-JUDGED_ON = "fresh stretches"
+JUDGED_ON = "free run, fresh stretches"
 
 
 def verdict_of(

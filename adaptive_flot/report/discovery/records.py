@@ -130,7 +130,7 @@ def _errors(comparison: Comparison) -> Table:
         cells.append((c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}"))
     usual = "on the reference" if comparison.referred else "of the plain fit"
     header = ("output", "unit", "before", "after", f"usual {usual}", "reduction [%], 95 % interval")
-    caption = "Root mean square error of free runs, every stretch by a fit that did not see it"
+    caption = f"Root mean square error, {comparison.verdict.split}; every stretch by a fit that did not see it"
     return Table(caption, header, tuple(cells), 2)
 
 

@@ -24,6 +24,7 @@ from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_f
 from adaptive_flot.discovery.results import Judgement
 from adaptive_flot.discovery.verdict.report_veto import contradiction
 
+JUDGED_ON = "held-out stretches, each from the state of the filter before it"
 MOST = 0.8
 """Share of what is unusual that a cause must explain: what is left may be another cause, or the right one."""
 
@@ -64,10 +65,10 @@ def with_cause(
     verdict = verdict_of(calibration, compared.rows, compared.blocks, compared.null, judged, True, seconds)
     said = ", ".join(c.words for c in error)
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
-    over_all = f"Over the whole record: {compared.verdict.reason}"
+    alone = f"By free runs alone, which what wanders spoils: {compared.verdict.reason}"
     return replace(
         compared,
-        verdict=replace(verdict, reason=reason, error=error, notes=(*verdict.notes, over_all)),
+        verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*verdict.notes, alone)),
         model=search.model_of(told.best),
         calibration=calibration,
         tested=(*found, *compared.tested),
