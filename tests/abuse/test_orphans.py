@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -90,6 +91,21 @@ def test_workers_end_when_one_call_fails() -> None:
     with pytest.raises(DataError, match="no"):
         parallel_map(fails, [0, 1], 2)
     assert {p.pid for p in psutil.Process().children(recursive=True)} <= here
+
+
+def test_calls_that_still_wait_end_in_silence_when_one_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread of the pool has many calls left when it loses its workers; a trace of it is no line for a user."""
+    said: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", said.append)
+
+    def fails(item: int) -> None:
+        if item == 0:
+            raise DataError("no")
+        time.sleep(3600)
+
+    with pytest.raises(DataError, match="no"):
+        parallel_map(fails, list(range(40)), 2)
+    assert said == []
 
 
 def test_a_worker_killed_from_outside_is_one_line() -> None:

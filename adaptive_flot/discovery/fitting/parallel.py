@@ -80,10 +80,11 @@ def _forked_map(
         with ProcessPoolExecutor(processes, context, initializer=end_with_parent, initargs=(os.getpid(),)) as pool:
             try:
                 with forking():
-                    coming = pool.map(_call, items)
+                    # Not `pool.map`, which cancels what is left: a pool that loses its workers then fails on these.
+                    coming = [pool.submit(_call, item) for item in items]
                 results = []
-                for result in coming:
-                    results.append(result)
+                for one in coming:
+                    results.append(one.result())
                     done()
                 return results
             except BaseException:
