@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
-from adaptive_flot.discovery.background.evidence import Spread, drops
+from adaptive_flot.discovery.background.evidence import STDS, Spread, drops, gains_beside
 from adaptive_flot.discovery.background.fitting import background_of, fit_with_background
 from adaptive_flot.discovery.background.renewed import renewed
 from adaptive_flot.discovery.background.spread import spread_of
@@ -87,10 +87,29 @@ def test_the_drop_is_that_of_a_gaussian_with_the_covariance_of_the_course() -> N
     rng = np.random.default_rng(0)
     X, e = rng.standard_normal((40, 5)), 2 * rng.standard_normal(40)
     root = root_of_covariance(np.linspace(0, 4000, 5), 900.0)
-    for std, drop in drops(X.T @ X, X.T @ e, root):
+    for std, drop in zip(STDS, drops(X.T @ X, X.T @ e, root), strict=True):
         covariance = np.eye(40) + std**2 * X @ root @ root.T @ X.T
         expected = 2 * multivariate_normal(cov=covariance).logpdf(e) - 2 * multivariate_normal(cov=np.eye(40)).logpdf(e)
         assert drop == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_drop_beside_constants_is_that_of_a_gaussian_with_both(seed: int) -> None:
+    """Against the densities from SciPy, for constants whose responses are much like those of the course."""
+    rng = np.random.default_rng(seed)
+    X, e = 30 * rng.standard_normal((40, 6)), 2 * rng.standard_normal(40)
+    C = X @ rng.standard_normal((6, 3)) + 0.1 * rng.standard_normal((40, 3))
+    root = root_of_covariance(np.linspace(0, 4000, 6), 900.0)
+    V = np.eye(40) + C @ C.T
+    left, strength, _ = np.linalg.svd(C, full_matrices=False)
+    taken = strength / np.sqrt(1 + strength**2)  # V^-1 = I - left taken^2 left'
+    D, turned = np.linalg.eigh(root.T @ X.T @ X @ root)
+    beside = taken[:, None] * (left.T @ X @ root @ turned)
+    along = turned.T @ root.T @ X.T @ np.linalg.solve(V, e)
+    for std, drop in zip(STDS, gains_beside(D, along, beside), strict=True):
+        covariance = V + std**2 * X @ root @ root.T @ X.T
+        expected = 2 * multivariate_normal(cov=covariance).logpdf(e) - 2 * multivariate_normal(cov=V).logpdf(e)
+        assert drop == pytest.approx(expected, rel=1e-6, abs=1e-5)
 
 
 def test_lines_between_knots_are_what_numpy_interpolates() -> None:

@@ -15,7 +15,7 @@ correlation time, on which L depends.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +36,7 @@ TIMES, SIZES = 6, 16
 """Correlation times and standard deviations that are tried."""
 SMALLEST, LARGEST = 0.002, 0.3
 """Standard deviations of a course that are tried, as a share of the value at the site."""
+STDS: FloatArray = np.geomspace(SMALLEST, LARGEST, SIZES)
 CONSTANTS = (0.0, 0.01, 0.02, 0.04, 0.07, 0.12, 0.2)
 """Standard deviations of the logarithm of the constants that are tried."""
 STANDS_OUT = 1.0
@@ -94,6 +95,19 @@ class _Feed:
     information: FloatArray
     along: FloatArray
     shared: FloatArray
+    _known: dict[float, tuple[FloatArray, FloatArray, FloatArray]] = field(default_factory=dict)
+
+    def axes(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Strengths along the axes of a course with this correlation time, and L'X'e and C'XL in these axes.
+
+        They are worked out once for all constants that are tried beside it: this is what takes the time.
+        """
+        if time not in self._known:
+            root = root_of_covariance(self.knots, time)
+            strength, turned = _axes(self.information, root)
+            turned = root @ turned
+            self._known[time] = strength, turned.T @ self.along, self.shared @ turned
+        return self._known[time]
 
 
 class Evidence:
@@ -156,23 +170,60 @@ class Evidence:
         for feed in self._feeds:
             if course is not None and course.site != feed.site:
                 continue
-            shared = axes.T @ feed.shared
-            information = feed.information - shared.T @ (less[:, None] * shared)
-            along = feed.along - shared.T @ (less * own)
             for time in self._times(feed.knots) if course is None else [course.time]:
-                for std, gained in drops(information, along, root_of_covariance(feed.knots, time)):
-                    found = Course(feed.site, std * feed.usual, time, feed.offset)
-                    yield Spread(found, size, drop + gained - 2 * self._price, std)
+                strength, along, shared = feed.axes(time)
+                beside = np.sqrt(less)[:, None] * (axes.T @ shared)
+                gains = gains_beside(strength, along - beside.T @ (np.sqrt(less) * own), beside)
+                for std, gained in zip(STDS, gains, strict=True):
+                    found = Course(feed.site, float(std) * feed.usual, time, feed.offset)
+                    yield Spread(found, size, drop + float(gained) - 2 * self._price, float(std))
 
     def _times(self, knots: FloatArray) -> list[float]:
         shortest, longest = 2 * (knots[1] - knots[0]), LONGEST * (self._time[-1] - self._time[0])
         return [float(t) for t in np.geomspace(shortest, max(longest, shortest), TIMES)]
 
 
-def drops(information: FloatArray, along: FloatArray, root: FloatArray) -> Iterator[tuple[float, float]]:
-    """Each standard deviation that is tried, and the drop that a course brings; X'V^-1 X, X'V^-1 e, and L."""
+def drops(information: FloatArray, along: FloatArray, root: FloatArray, stds: FloatArray = STDS) -> FloatArray:
+    """The drop that a course brings with each of some standard deviations (s,); from X'V^-1 X, X'V^-1 e, and L."""
+    strength, turned = _axes(information, root)
+    return gains_beside(strength, turned.T @ (root.T @ along), np.zeros((0, len(strength))), stds)
+
+
+def gains_beside(strength: FloatArray, along: FloatArray, beside: FloatArray, stds: FloatArray = STDS) -> FloatArray:
+    """The drop that a course brings beside constants, in the axes in which it alone has no cross terms.
+
+    With the strengths D of the course along its axes, M = I + s^2 D, and what the constants take of it, W'W::
+
+        drop = s^2 a'(M - s^2 W'W)^-1 a - log det(M - s^2 W'W)
+
+    by the matrix inversion lemma, so that only a matrix of the size of the constants is solved for each s.
+
+    Parameters
+    ----------
+    strength, along
+        Strengths (k,), and the course's share a (k,) in V^-1 e, along each axis.
+    beside
+        W (c, k).
+    stds
+        Standard deviations s that are tried (n,).
+
+    Returns
+    -------
+    FloatArray
+        A drop for each (n,).
+    """
+    squared = stds[:, None] ** 2
+    grown = 1 + squared * strength
+    gains: FloatArray = np.sum(squared * along**2 / grown, axis=1) - np.sum(np.log(grown), axis=1)
+    if not len(beside):
+        return gains
+    scaled = beside * (squared / grown)[:, None, :]
+    left = np.eye(len(beside)) - scaled @ beside.T
+    taken = scaled @ along
+    gains += np.sum(taken * np.linalg.solve(left, taken[..., None])[..., 0], axis=1) - np.linalg.slogdet(left)[1]
+    return gains
+
+
+def _axes(information: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
     strength, turned = np.linalg.eigh(root.T @ information @ root)
-    strength, explained = np.maximum(strength, 0.0), (turned.T @ (root.T @ along)) ** 2
-    for std in np.geomspace(SMALLEST, LARGEST, SIZES):
-        grown = 1 + std**2 * strength
-        yield float(std), float(np.sum(std**2 * explained / grown) - np.sum(np.log(grown)))
+    return np.maximum(strength, 0.0), turned

@@ -16,10 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
-from scipy.linalg import block_diag, solve_triangular
+from scipy.linalg import solve_triangular
 
 from adaptive_flot.discovery.background.evidence import CONSTANTS, Spread, drops, price
 from adaptive_flot.discovery.background.linear import lines_of_course, uncertain_constants, uncertain_profiles
@@ -69,7 +68,7 @@ class TwoCourses:
         for site in sites:
             X = self._lines(beside, site)
             information, along = X.T @ X, X.T @ beside.residual
-            best = max(drop for root in self._roots.values() for _, drop in drops(information, along, root))
+            best = max(float(np.max(drops(information, along, root))) for root in self._roots.values())
             if best > 0:
                 found.append((best, site))
         return [site for _, site in sorted(found, reverse=True)[:most]]
@@ -81,38 +80,51 @@ class TwoCourses:
         """
         assert first.course is not None  # asked where a feed wanders
         sites = [first.course.site] if site is None else [site, first.course.site]
-        B = np.hstack([*(self._lines(self._scorer, s) for s in sites), self._constants])
-        information, along = B.T @ B, B.T @ self._residual
-
-        def drop(numbers: _Numbers) -> float:
-            root = block_diag(
-                *(std * self._roots[t] for std, t in numbers[0]), numbers[1] * np.eye(self._constants.shape[1])
-            )
-            paid = price(self._problem) * (2 * len(sites) + (numbers[1] > 0))
-            return _drop(root.T @ information @ root, root.T @ along) - paid
-
-        start: _Numbers = (((float(STDS[4]), self._times[3]),) * len(sites), first.constants)
-        best = drop(start), start
+        responses = [*(self._lines(self._scorer, s) for s in sites), self._constants]
+        information, along = _products(responses), [B.T @ self._residual for B in responses]
+        numbers: _Numbers = (((float(STDS[4]), self._times[3]),) * len(sites), first.constants)
+        best, before = -np.inf, -np.inf
         for _ in range(TURNS):
-            before = best[0]
             for i in range(len(sites) + 1):
-                tried = ((drop(numbers), numbers) for numbers in self._others(best[1], i))
-                best = max([best, *tried], key=lambda found: found[0])
-            if best[0] < before + SETTLED:
+                tried = self._along(information, along, numbers, i)
+                best, numbers = max([(best, numbers), *tried], key=lambda found: found[0])
+            if best < before + SETTLED:
                 break
-        evidence, (numbers, constants) = best
-        courses = [self._course(s, *n) for s, n in zip(sites, numbers, strict=True)]
-        spread = Spread(courses[-1], constants, evidence, numbers[-1][0])
+            before = best
+        courses = [self._course(s, *n) for s, n in zip(sites, numbers[0], strict=True)]
+        spread = Spread(courses[-1], numbers[1], best, numbers[0][-1][0])
         return spread if site is None else replace(spread, told=courses[0])
 
-    def _others(self, numbers: _Numbers, i: int) -> Iterator[_Numbers]:
-        """The numbers with the i-th course in every way that is tried, or with constants of each size."""
+    def _along(
+        self, information: list[list[FloatArray]], along: list[FloatArray], numbers: _Numbers, i: int
+    ) -> Iterator[tuple[float, _Numbers]]:
+        """Drops, less prices, with the i-th course in every way that is tried, or with constants of each size.
+
+        What is held is worked out once, and what is tried is seen beside it, as in `evidence`.
+        """
         courses, constants = numbers
+        roots = [*(std * self._roots[t] for std, t in courses), constants * np.eye(len(along[-1]))]
+        held = [k for k in range(len(roots)) if k != i]
+        inner = np.block([[roots[j].T @ information[j][k] @ roots[k] for k in held] for j in held])
+        shared = np.vstack([roots[j].T @ information[j][i] for j in held])
+        own = np.concatenate([roots[j].T @ along[j] for j in held])
+        factor = np.linalg.cholesky(np.eye(len(own)) + inner)
+        shared, own = (solve_triangular(factor, right, lower=True) for right in (shared, own))
+        held_drop = float(own @ own - 2 * np.sum(np.log(np.diag(factor))))
+        information_i, along_i = information[i][i] - shared.T @ shared, along[i] - shared.T @ own
+        paid = 2 * len(courses) * price(self._problem)
         if i == len(courses):
-            yield from ((courses, size) for size in CONSTANTS)
+            sizes = np.array(CONSTANTS)
+            gains = drops(information_i, along_i, np.eye(len(along_i)), sizes)
+            for size, gain in zip(CONSTANTS, gains, strict=True):
+                yield held_drop + float(gain) - paid - (price(self._problem) if size else 0.0), (courses, size)
             return
-        for own in product(map(float, STDS), self._times):
-            yield (*courses[:i], own, *courses[i + 1 :]), constants
+        paid += price(self._problem) if constants else 0.0
+        for time in self._times:
+            gains = drops(information_i, along_i, self._roots[time], STDS)
+            for std, gain in zip(STDS, gains, strict=True):
+                tried = (*courses[:i], (float(std), time), *courses[i + 1 :])
+                yield held_drop + float(gain) - paid, (tried, constants)
 
     def _lines(self, scorer: Scorer, site: str) -> FloatArray:
         """Projected responses (values, k) to a course at a site, as a share of its usual value."""
@@ -126,8 +138,6 @@ class TwoCourses:
         return self._responses.usual(site) if self._responses.is_offset(site) else 1.0
 
 
-def _drop(information: FloatArray, along: FloatArray) -> float:
-    """The drop of the equation above, from B'B (k, k) and B'e (k,) in standard deviations of the prior."""
-    root = np.linalg.cholesky(np.eye(len(along)) + information)
-    own = solve_triangular(root, along, lower=True)
-    return float(own @ own - 2 * np.sum(np.log(np.diag(root))))
+def _products(responses: list[FloatArray]) -> list[list[FloatArray]]:
+    """B'B in blocks."""
+    return [[left.T @ right for right in responses] for left in responses]
