@@ -150,7 +150,9 @@ def search_one_by_one(state: State) -> State:
     problem, base = state.fitted
     nominal = rescaled(state.model, factors_of(base.model))
     found = search(problem, base, nominal, first=state.first, processes=state.processes, progress=state.progress)
-    return replace(state, search=found, first=None)
+    alone = [a for a in state.first.round.alternatives if len(a.names) == 1] if state.first else []
+    late = {site: -a.delta_bic for a in alone for site, driver in a.names if driver == "lag"}
+    return replace(state, search=found, first=None, late=late)
 
 
 def search_at_once(state: State) -> State:

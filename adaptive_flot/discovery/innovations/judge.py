@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -164,16 +164,28 @@ def _certain_alone(search: Search, base: Explanation, told: Told, without: Mappi
 
 
 def _late_anywhere(search: Search, base: Explanation, told: Told) -> Told:
-    """A lag that is named, as a class with each other place where it explains about as much.
+    """A lag that is named, as a class with each other place where it explains about as much (see `late_where`)."""
+    least = SAME_LAG * (told.best.criterion - base.criterion)
+    return late_where(search, told, lambda e, _: e.criterion - base.criterion >= least)
+
+
+def late_where(search: Search, told: Told, alike: Callable[[Explanation, str], bool]) -> Told:
+    """A lag that is named, as a class with each other place where it may be as well.
 
     Lags in a row commute: what an input does through them is the same in any order. Only what wanders within the
     process tells the order, and how it wanders is an assumption of the filter.
+
+    Parameters
+    ----------
+    search, told
+        What the innovations form says.
+    alike
+        Whether the explanation with the lag at another site, which is given, is about as good.
     """
     late = [h for h in told.certain if h.kind == "lag"]
-    if len(late) != 1:
+    if told.word != "named" or len(late) != 1:
         return told
-    least = SAME_LAG * (told.best.criterion - base.criterion)
-    others = [e for e in search.late_elsewhere(told.best, late[0]) if e.criterion - base.criterion >= least]
+    others = [e for e in search.late_elsewhere(told.best, late[0]) if alike(e, e.hypotheses[-1].site)]
     if not others:
         return told
     found = sorted([told.best, *others], key=lambda e: -e.criterion)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
@@ -50,6 +50,8 @@ class State:
         Scores along that fit and sites of adapted parameters, where a stage before the search has needed them.
     first
         Single effects on top of that fit, until the search goes on from there.
+    late
+        By how much BIC falls with a lag alone, at each site where one was fitted.
     detection
         What the residual of that fit shows.
     search, judgement
@@ -89,6 +91,7 @@ class State:
     responses: Responses | None = None
     scored: tuple[Scorer, tuple[str, ...]] | None = None
     first: FirstRound | None = None
+    late: Mapping[str, float] = field(default_factory=dict)
     detection: Detection | None = None
     search: SearchResult | None = None
     judgement: Judgement | None = None

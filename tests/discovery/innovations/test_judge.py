@@ -148,3 +148,14 @@ def test_a_small_effect_that_is_one_of_two_is_not_told_either(
     assert said.word == word
     assert [h.site for h in said.certain] == ["sensor"]
     assert [h.site for _, h in said.open] == open_ones
+
+
+@pytest.mark.parametrize(("alike", "word"), [("elsewhere", "class"), ("nowhere", "named")])
+def test_a_lag_that_a_free_run_does_not_tell_from_another_is_a_class_with_that(alike: str, word: str) -> None:
+    """The filter has the other one at half of the gain, by how it lets the process wander."""
+    search: Any = Stand(Given((), 0.0, 0.0))
+    named = told(Given((lag("sensor"),), 500.0, 1.0))
+    assert named.word == "named"
+    again = judging.late_where(search, named, lambda _, site: site == alike)
+    assert again.word == word
+    assert {h.site for h in again.effects} == ({"sensor", "elsewhere"} if word == "class" else {"sensor"})

@@ -125,3 +125,20 @@ def test_a_drift_that_helps_is_not_replaced_by_something_elsewhere(
     )  # fmt: skip
     told: Any = SimpleNamespace(effects=(SimpleNamespace(site=site, label=site),))
     assert asking._another_drift(given, told) == another
+
+
+@pytest.mark.parametrize(
+    ("gains", "as_well"),
+    [
+        ({"doser": 287.0, "probe": 290.0}, True),
+        ({"doser": 290.0, "probe": 280.0}, True),
+        ({"doser": 99.0, "probe": 75.0}, False),
+        ({"probe": 290.0}, False),
+        ({"doser": 290.0}, False),
+        ({"doser": -5.0, "probe": -5.0}, False),
+    ],
+)
+def test_a_free_run_tells_one_lag_from_another_only_by_enough(gains: dict[str, float], as_well: bool) -> None:
+    given: Any = SimpleNamespace(late=gains)
+    told: Any = SimpleNamespace(certain=(SimpleNamespace(kind="lag", site="doser"),))
+    assert rivals.late_as_well(given, told, "probe") == as_well

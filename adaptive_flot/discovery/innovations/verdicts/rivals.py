@@ -6,6 +6,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
+from adaptive_flot.discovery.innovations.judge import NEAR, Told
 from adaptive_flot.discovery.innovations.verdicts.event import FAR_ABOVE
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
@@ -100,6 +101,15 @@ def hardly_explained(changes: tuple[OutputChange, ...], above: float = FAR_ABOVE
         return c.before > above * c.noise and after - usual > (1 - share) * (before - usual)
 
     return any(map(hardly, changes))
+
+
+def late_as_well(state: State, told: Told, site: str) -> bool:
+    """Whether a lag at a site explains about as much in a free run as that which is told, each alone.
+
+    A free run has no process noise whose assumed way to wander would tell the order of lags (see `late_where`).
+    """
+    named = [state.late[h.site] for h in told.certain if h.kind == "lag" and h.site in state.late]
+    return bool(named) and state.late.get(site, 0.0) >= (1 - NEAR) * named[0] > 0
 
 
 def surely_worse(changes: tuple[OutputChange, ...], noise: FloatArray) -> bool:

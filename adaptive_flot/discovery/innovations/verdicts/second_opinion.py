@@ -16,7 +16,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
-from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
@@ -25,6 +25,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     competes,
     follows_time,
     hardly_explained,
+    late_as_well,
     leaves_too_much,
     smaller,
     surely_better,
@@ -62,6 +63,7 @@ def second_opinion(state: State) -> State:
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
         told = judge(search, base, search.run(base, state.progress))
+        told = late_where(search, told, lambda _, site: late_as_well(state, told, site))
     if told.word in ("named", "class"):
         return _told(state, search, base, told)
     return _kept(state, told)
