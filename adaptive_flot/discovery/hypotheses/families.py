@@ -14,7 +14,7 @@ from adaptive_flot.greybox.scope import Site
 
 Kind = Literal[
     "switch", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis", "dead zone",
-    "depends", "store",
+    "depends", "store", "alternative",
 ]  # fmt: skip
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""

@@ -13,6 +13,15 @@ from adaptive_flot.greybox.model import Model
 MOST_TIMES = 6
 """Times that a sentence lists at most."""
 NOTHING = "next to nothing"
+WITHOUT_SIZE = {
+    "time": "changes with time",
+    "constant": "is off all the time",
+    "own_value": "is off by more at some of its values than at others",
+    "saturation": "has a limit",
+    "lag": "answers late",
+    "delay": "answers late",
+}
+"""What is said of an alternative of the free run, by what it depends on."""
 
 
 def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
@@ -20,6 +29,9 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
 
     `value` gives the fitted value of a parameter by its full name.
     """
+    if h.kind == "alternative":  # most are curves, whose size is no single number
+        driver = f"depends on {h.driver.replace('_', ' ')}"
+        return f"{h.site.replace('_', ' ')} {WITHOUT_SIZE.get(h.driver, driver)}"
     values = dict(zip(h.free, (value(name) for name in h.parameters), strict=True))
     site = next(s for s in model.sites if s.name == h.site)
     name, unit = site.name.replace("_", " "), f" {site.unit}" if site.unit and site.unit != "-" else ""

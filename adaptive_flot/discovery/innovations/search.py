@@ -203,6 +203,30 @@ class Search:
         fit = self.fitter(model, (*start.free, *h.parameters)).fit(p, start.fit.size)
         return Explanation((*start.hypotheses, h), fit, start.numbers + numbers_of(h))
 
+    def of_effects(self, effects: Sequence[Effect], fitted: Model, names: Sequence[str]) -> Explanation | None:
+        """Effects of a free run, fitted in innovations form; None where they can not be.
+
+        Parameters
+        ----------
+        effects
+            The effects, in their order.
+        fitted
+            The model with them as the free run has fitted it.
+        names
+            Names of its fitted parameters.
+        """
+        values = {q.name: q.value for q in fitted.parameters}
+        model, own = self.model, list[Hypothesis]()
+        for effect in effects:
+            free = tuple(c.name for c in effect.terms if effect.parameter(c.name) in names)
+            own.append(Hypothesis(effect.site, effect.driver, "alternative", effect, free, ({},)))
+            model = model_with(model, own[-1])
+        p = np.array([values.get(q.name, q.value) for q in model.parameters])
+        fit = self.fitter(model, tuple(name for h in own for name in h.parameters)).fit(p)
+        if not np.isfinite(fit.log_likelihood):
+            return None
+        return Explanation(tuple(own), fit, sum(map(numbers_of, own)))
+
     def _with(self, start: Explanation, screened: Screened) -> Explanation | None:
         h = screened.suspect.hypothesis
         model = model_with(self.model_of(start), h)

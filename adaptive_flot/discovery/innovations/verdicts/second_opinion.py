@@ -19,9 +19,11 @@ from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
+from adaptive_flot.discovery.innovations.verdicts.alternatives import beside_alternatives
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
     TELLS,
     allowed_ratio,
+    but_for_what_wanders,
     competes,
     follows_time,
     hardly_explained,
@@ -119,18 +121,22 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         return _kept(state, told)
     names = tuple((h.site, h.driver) for h in told.best.hypotheses)
     best = Alternative(names, (True,) * len(names), after, before.loss - after.loss, after.bic - before.bic)
-    members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
-    judgement = Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
+    judgement = _judgement(told, best)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
-    against, follows = contradiction(judgement, error, noise), competes(state) and follows_time(state)
+    against = contradiction(judgement, error, noise)
+    follows = competes(state) and follows_time(state) and not but_for_what_wanders(state, names)
     asked = bool(against or follows) and not surely_worse(error, noise)
     over = _over_stretches(state, search, base, told.best) if asked else ()
     stands = bool(over) and not contradiction(judgement, over, noise)
     if (against and not stands) or hardly_explained(over if stands else error) or _another_drift(state, told):
         return _kept(state, told)
-    if competes(state) and not (stands and follows) and not smaller(error, state.error, allowed_ratio(state, names)):
-        return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
+    less = smaller(error, state.error, allowed_ratio(state, names))
+    if competes(state) and not (stands and follows) and not less:
+        both = beside_alternatives(state, search, base, told, names)
+        if both is None:
+            return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
+        told, judgement = both, _judgement(both, best)
     _, result = state.searched
     return replace(
         state,
@@ -142,6 +148,11 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         certain="",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
+
+
+def _judgement(told: Told, best: Alternative) -> Judgement:
+    members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
+    return Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
 
 
 def _another_drift(state: State, told: Told) -> bool:

@@ -1,0 +1,56 @@
+"""What the innovations form tells, beside what the free run has and does not tell: both in innovations form.
+
+A curve of a few values leaves the smaller error of a free run, because it bends after what wanders. And a curve in what
+drives an actuator can draw the limit of that. So alternatives of the free run are fitted with process noise as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, told_apart
+from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.verdicts.rivals import but_for_what_wanders
+from adaptive_flot.discovery.results import State
+
+COMPARED = 6
+"""Alternatives of the free run that are fitted, the best ones."""
+
+
+def beside_alternatives(
+    state: State, search: Search, base: Explanation, told: Told, names: tuple[tuple[str, str], ...]
+) -> Told | None:
+    """What is told, as a class with each alternative of the free run that explains about as much.
+
+    Parameters
+    ----------
+    state
+        Its judgement tells nothing, or the same and free curves in time beside it.
+    search, base, told, names
+        The innovations form, and what it tells by (site, driver).
+
+    Returns
+    -------
+    Told or None
+        None where an alternative explains more, where one that explains about as much has several effects, and where
+        more sites are left than a class may hold.
+    """
+    wanders = but_for_what_wanders(state, names)
+    if not wanders and (state.judged.word != "abstain" or state.contradiction):
+        return None
+    _, result = state.searched
+    compared = result.alternatives[:1] if wanders else result.alternatives[:COMPARED]
+    found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
+    alike = [e for e in found if e is not None and not told_apart(search, base, told.best, e)]
+    if any(told_apart(search, base, e, told.best) for e in alike):
+        return None
+    own = [h for h in told.effects if h.kind != "store"]  # a store beside a fault is what the model leaves out anyway
+    others = [(e, h) for e in alike for h in e.hypotheses if h.site not in {h.site for h in own}]
+    if not others:
+        return told
+    sites = {h.site for h in own} | {h.site for _, h in others}
+    if told.word != "named" or len(own) != 1 or any(len(e.hypotheses) > 1 for e in alike) or len(sites) > LARGEST_CLASS:
+        return None
+    members = {h.site: (e, h) for e, h in reversed(others)}
+    opened = ((told.best, own[0]), *sorted(members.values(), key=lambda m: -m[0].criterion))
+    return replace(told, word="class", certain=(), open=opened, alike=(told.best, *alike))
