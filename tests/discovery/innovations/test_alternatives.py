@@ -32,10 +32,10 @@ class Given:
 class Stand:
     """A search that fits what it is given."""
 
-    known: dict[str, Given] = field(default_factory=dict)
+    known: dict[str, Given | None] = field(default_factory=dict)
 
     def of_effects(self, effects: Any, fitted: Any, names: Any) -> Given | None:
-        return self.known.get(effects)
+        return self.known[effects]
 
 
 LIMIT = hypothesis("doser", "range", "saturation")
@@ -48,7 +48,7 @@ def told(*hypotheses: Hypothesis, criterion: float = 100.0) -> Any:
     return Told("named", best, hypotheses, (), (best,), "")
 
 
-def beside(said: Told, *others: Given, word: str = "abstain", contradiction: str = "") -> Told | None:
+def beside(said: Told, *others: Given | None, word: str = "abstain", contradiction: str = "") -> Told | None:
     """The answer where alternatives within 10 are not told apart."""
     named = [SimpleNamespace(effects=str(k), fit=SimpleNamespace(model=None, names=())) for k in range(len(others))]
     best = SimpleNamespace(names=(("demand", "dose"),), effects=())
@@ -100,6 +100,10 @@ def test_a_store_beside_a_fault_is_no_member() -> None:
 )
 def test_nothing_is_told_where_alternatives_do_more_or_are_many(others: tuple[Given, ...]) -> None:
     assert beside(told(LIMIT), *others) is None
+
+
+def test_an_alternative_that_can_not_be_fitted_is_not_refuted() -> None:
+    assert beside(told(LIMIT), None, Given(60.0, (hypothesis("demand"),))) is None
 
 
 @pytest.mark.parametrize(("word", "contradiction"), [("named", ""), ("class", ""), ("abstain", "the error grows")])

@@ -32,8 +32,8 @@ def beside_alternatives(
     Returns
     -------
     Told or None
-        None where an alternative explains more, where one that explains about as much has several effects, and where
-        more sites are left than a class may hold.
+        None where an alternative explains more or can not be fitted, where one that explains about as much has several
+        effects, and where more sites are left than a class may hold.
     """
     wanders = but_for_what_wanders(state, names)
     if not wanders and (state.judged.word != "abstain" or state.contradiction):
@@ -41,8 +41,9 @@ def beside_alternatives(
     _, result = state.searched
     compared = result.alternatives[:1] if wanders else result.alternatives[:COMPARED]
     found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
-    alike = [e for e in found if e is not None and not told_apart(search, base, told.best, e)]
-    if any(told_apart(search, base, e, told.best) for e in alike):
+    fitted = [e for e in found if e is not None]
+    alike = [e for e in fitted if not told_apart(search, base, told.best, e)]
+    if len(fitted) < len(found) or any(told_apart(search, base, e, told.best) for e in alike):
         return None
     own = [h for h in told.effects if h.kind != "store"]  # a store beside a fault is what the model leaves out anyway
     others = [(e, h) for e in alike for h in e.hypotheses if h.site not in {h.site for h in own}]
