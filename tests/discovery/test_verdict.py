@@ -201,6 +201,21 @@ def test_the_curve_shows_the_shape_where_a_constant_is_an_adapted_parameter(drau
     assert np.mean((curve.low - 1e-9 <= truth) & (truth <= curve.high + 1e-9)) > 0.9
 
 
+def test_a_hidden_store_has_no_curve_and_no_page_fails_of_it(draught: Discovery) -> None:
+    """What a store does depends on what was before, so that no curve in its driver shows it."""
+    assert draught.problem is not None and draught.after is not None
+    driver = draught.after.model.states[0].name
+    store = Effect("heat_loss", driver, "store", {"exchange": 0.1, "time_constant": 600.0})
+    model = draught.after.model.with_effects([store])
+    assert f"{store.label}.store" in [q.name for q in model.states]
+    with_store = replace(
+        draught.after, model=model, initial_state=np.append(draught.after.initial_state, draught.after.initial_state[0])
+    )
+    curves = effect_curves(draught.problem, with_store, 2)
+    assert [c.effect.label for c in curves] == [e.label for e in draught.after.model.fitted_effects()[-1:]]
+    assert effect_curves(draught.problem, with_store, 1) == ()
+
+
 @pytest.mark.parametrize(("profile", "said"), [([0.0, 0.1, 0.2], "+22 %"), ([0.2, 0.1, 0.0], "-18 %")])
 def test_a_drift_is_told_with_its_direction(draught: Discovery, profile: list[float], said: str) -> None:
     """A fall is no rise: the sign is that of the larger extreme coming last."""

@@ -14,9 +14,15 @@ def told_in_words(search: Search, told: Told) -> str:
     said = f"{sure[0].upper()}{sure[1:]}." if sure else ""
     if told.word != "class":
         return said
-    members = "; or ".join(words_at(search, e, h) for e, h in told.open)
+    members = "; or ".join(_open_one(search, told, e, h) for e, h in told.open)
     first = "Besides, one of these" if sure else "One of these"
     return f"{said} {first}, which the record can not tell apart: {members}.".strip()
+
+
+def _open_one(search: Search, told: Told, explanation: Explanation, h: Hypothesis) -> str:
+    """One of a class, with the store that its explanation has beside it."""
+    stores = [k for k in explanation.hypotheses if k.kind == "store" and k is not h and k not in told.certain]
+    return ", and ".join(words_at(search, explanation, k) for k in (h, *stores))
 
 
 def words_at(search: Search, explanation: Explanation, h: Hypothesis) -> str:

@@ -68,9 +68,13 @@ class EffectCurve:
 
 
 def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, ...]:
-    """Curves of the last `count` effects of a fit; those without a driver (constant, lag, dead time) have none."""
+    """Curves of the last `count` effects of a fit.
+
+    Those without a driver (constant, lag, dead time) have none, and neither has a hidden store: what it does depends on
+    what was before. A switch with two thresholds has two branches.
+    """
     effects = fit.model.fitted_effects()
-    wanted = [e for e in effects[len(effects) - count :] if e.driver not in ("constant", "lag", "delay", "saturation")]
+    wanted = [e for e in effects[len(effects) - count :] if _has_curve(fit, e)]
     if not wanted:
         return ()
     series, values = _series(problem, fit)
@@ -79,6 +83,12 @@ def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, 
     return tuple(
         replace(c, is_on=series[f"{c.effect.label}.on"][first:] > 0.5) if c.effect.family.memory else c for c in curves
     )
+
+
+def _has_curve(fit: Fit, effect: Effect) -> bool:
+    remembers = any(q.name.startswith(f"{effect.label}.") for q in fit.model.states)
+    without_driver = effect.driver in ("constant", "lag", "delay", "saturation")
+    return not without_driver and (effect.family.memory is not None or not remembers)
 
 
 def _series(problem: Problem, fit: Fit) -> tuple[dict[str, FloatArray], dict[str, float]]:
