@@ -60,14 +60,19 @@ def test_only_a_fault_at_the_place_of_an_unnamed_curve_may_leave_a_little_more()
 def test_one_effect_may_leave_a_little_more_than_a_larger_set_that_is_not_told() -> None:
     one, two = (("gains", "sun"),), (("gains", "sun"), ("loss", "wind"))
 
-    def given(word: str) -> Any:
-        best = SimpleNamespace(effects=(LAW,), names=two)
+    wind = Effect("loss", "wind", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
+
+    def given(word: str, *effects: Effect) -> Any:
+        found = effects or (LAW, wind)
+        best = SimpleNamespace(effects=found, names=tuple((e.site, e.driver) for e in found))
         return SimpleNamespace(judged=SimpleNamespace(word=word, best=best), contradiction="")
 
     assert rivals.allowed_ratio(given("abstain"), one) > 1.0
     assert rivals.allowed_ratio(given("abstain"), two) > 1.0, "what both find is the same but for the search"
     assert rivals.allowed_ratio(given("abstain"), (("gains", "sun"), ("loss", "rain"))) == 1.0
     assert rivals.allowed_ratio(given("named"), one) == 1.0
+    assert rivals.allowed_ratio(given("named", LAW, CURVE), one) > 1.0, "a free curve in time follows what wanders"
+    assert rivals.allowed_ratio(given("named", LAW, CURVE), (("loss", "wind"),)) == 1.0
 
 
 @pytest.mark.parametrize(
