@@ -11,6 +11,7 @@ import pytest
 from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import changes, verify, whiteness
 from adaptive_flot.discovery.fitting.fit import row_losses
+from adaptive_flot.discovery.hypotheses.families import hypotheses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
 from adaptive_flot.discovery.verdict.curve import effect_curves
@@ -199,6 +200,33 @@ def test_the_curve_shows_the_shape_where_a_constant_is_an_adapted_parameter(drau
     truth = (curve.driver / curve.anchor) ** 0.6
     assert np.all(curve.low <= curve.high) and np.max(curve.high - curve.low) < 0.1
     assert np.mean((curve.low - 1e-9 <= truth) & (truth <= curve.high + 1e-9)) > 0.9
+
+
+def test_a_part_that_leaks_has_no_curve_and_no_page_fails_of_it(draught: Discovery) -> None:
+    """It depends on the value at its own site, which is no series of the record."""
+    assert draught.problem is not None and draught.after is not None
+    leak = Effect("heating", "own_value", "leak", {"level": 0.1}, {"width": 0.01})
+    leaking = replace(draught.after, model=draught.after.model.with_effects([leak]))
+    assert effect_curves(draught.problem, leaking, 1) == ()
+    assert len(effect_curves(draught.problem, leaking, 2)) == 1
+
+
+def test_whatever_may_be_named_has_a_curve_or_none(draught: Discovery) -> None:
+    """Each family of the innovations form, at every site: a page that asks for its curve never fails."""
+    assert draught.problem is not None and draught.after is not None
+    fit, record = draught.after, draught.problem.record
+    levels = np.linspace(1.0, 2.0, 50)
+    seen = {site.name: levels for site in fit.model.sites}
+    drivers = {q.name: levels for q in (*fit.model.inputs, *fit.model.states)}
+    found = hypotheses(fit.model, seen, drivers, record.dt, float(record.time[-1] - record.time[0]))
+    assert len({h.kind for h in found}) > 5
+    for h in found:
+        if h.effect.label in {e.label for e in fit.model.effects}:
+            continue
+        model = fit.model.with_effects([h.effect])
+        extra = len(model.states) - len(fit.model.states)
+        named = replace(fit, model=model, initial_state=np.append(fit.initial_state, np.ones(extra)))
+        assert len(effect_curves(draught.problem, named, 1)) <= 1, h.label
 
 
 def test_a_hidden_store_has_no_curve_and_no_page_fails_of_it(draught: Discovery) -> None:

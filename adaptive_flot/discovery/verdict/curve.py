@@ -70,7 +70,8 @@ class EffectCurve:
 def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, ...]:
     """Curves of the last `count` effects of a fit.
 
-    Those without a driver (constant, lag, dead time) have none, and neither has a hidden store: what it does depends on
+    Those without a driver (constant, lag, dead time) have none, and neither has what depends on the value at the site
+    itself: a part that leaks or is stuck is told by its level. A hidden store has none, because what it does depends on
     what was before. A switch with two thresholds has two branches.
     """
     effects = fit.model.fitted_effects()
@@ -87,7 +88,7 @@ def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, 
 
 def _has_curve(fit: Fit, effect: Effect) -> bool:
     remembers = any(q.name.startswith(f"{effect.label}.") for q in fit.model.states)
-    without_driver = effect.driver in ("constant", "lag", "delay", "saturation")
+    without_driver = effect.driver in ("constant", "lag", "delay", "saturation", "own_value")
     return not without_driver and (effect.family.memory is not None or not remembers)
 
 
