@@ -37,6 +37,7 @@ TIMES, SIZES = 6, 16
 SMALLEST, LARGEST = 0.002, 0.3
 """Standard deviations of a course that are tried, as a share of the value at the site."""
 STDS: FloatArray = np.geomspace(SMALLEST, LARGEST, SIZES)
+"""All of these."""
 CONSTANTS = (0.0, 0.01, 0.02, 0.04, 0.07, 0.12, 0.2)
 """Standard deviations of the logarithm of the constants that are tried."""
 STANDS_OUT = 1.0
