@@ -175,7 +175,7 @@ class Finding:
         d = self.discovery
         if d.problem is None or d.after is None or d.judgement is None or d.judgement.best is None:
             return ()
-        return effect_curves(d.problem, d.after, len(d.judgement.best.names))
+        return effect_curves(d.problem, d.told or d.after, len(d.judgement.best.names))
 
 
 @overload

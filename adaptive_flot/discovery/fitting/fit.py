@@ -22,7 +22,7 @@ Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006), eq. (5.8
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -91,6 +91,18 @@ class Fit:
         if self.model is not None:
             return self
         return replace(self, model=make().with_parameters(dict(zip(self.names, map(float, self.values), strict=True))))
+
+    def with_sizes(self, values: Mapping[str, float], covariance: FloatArray) -> Fit:
+        """The fit with other values of some free parameters, and the covariance of these (k, k) in their order.
+
+        They are taken as independent of the others, whose values and covariance stay.
+        """
+        where = [self.names.index(name) for name in values]
+        z, P = self.values.copy(), self.covariance.copy()
+        z[where] = list(values.values())
+        P[where, :] = P[:, where] = 0.0
+        P[np.ix_(where, where)] = covariance
+        return replace(self, model=self.model.with_parameters(dict(values)), values=z, covariance=P)
 
     def std(self) -> FloatArray:
         """Standard deviation of each free parameter (q,)."""

@@ -32,10 +32,11 @@ LEVELS = np.linspace(0.0, 1.0, 11)
 """Levels at which a part may be stuck, leak or end, as shares of the range of its value."""
 LAGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 """Time constants that are tried, in sampling intervals."""
-STORES = (10.0, 30.0, 100.0, 300.0)
+STORES = (10.0, 30.0, 100.0, 300.0, 1000.0)
 """Time constants of a hidden store, likewise."""
 LONGEST = 0.1
-"""Longest time constant of a lag, as a share of the record; of a store, three times that."""
+"""Longest time constant of a lag, as a share of the record. A store may be as slow as the record is long: it begins at
+rest with its state, and is then what has been left behind."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def _at_site(
             yield from _sticks_or_idles(site.name, v, size, dt)
         if site.role == "sensor":
             yield from _wrong_scale(site.name, v)
-    yield from _constant(site, v, spread or size)
+    yield from _constant(site, v, spread)
     if site.role in ("process", "flow", "feed"):
         by = v if site.mode == "factor" else np.ones_like(v)
         for driver, d in drivers.items():
@@ -188,13 +189,19 @@ def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:
 
 
 def _constant(site: Site, v: FloatArray, spread: float) -> Iterator[Suspect]:
-    """A constant error: added at sensors, actuators and balances, a factor elsewhere."""
-    free = ("amplitude",)
-    if site.role in ("sensor", "actuator") or site.mode == "offset":
+    """A constant error: added at sensors, actuators and balances, a factor elsewhere.
+
+    An element's error is limited by what has been seen of it. What enters a balance is not: it may be nothing in the
+    model.
+    """
+    free, size = ("amplitude",), float(np.median(np.abs(v)))
+    element = site.role in ("sensor", "actuator")
+    if element or site.mode == "offset":
         effect = Effect(site.name, "constant", "shift", mode="offset")
-        hypothesis = Hypothesis(site.name, "constant", "offset", effect, free, ({},), offset_limits(spread))
+        limits = offset_limits(spread or size) if element and (spread or size) > 0 else {}
+        hypothesis = Hypothesis(site.name, "constant", "offset", effect, free, ({},), limits)
         yield Suspect(hypothesis, np.ones((len(v), 1)), free)
-    if site.role != "sensor" and site.mode == "factor" and np.median(np.abs(v)) > 0:
+    if site.role != "sensor" and site.mode == "factor" and size > 0:
         effect = Effect(site.name, "constant", "shift", mode="factor")
         yield Suspect(Hypothesis(site.name, "constant", "gain", effect, free, ({},)), v[:, None], free)
 
@@ -219,7 +226,7 @@ def _depends(site: Site, driver: str, d: FloatArray, by: FloatArray) -> Iterator
 def _stores(site: Site, state: str, x: FloatArray, v: FloatArray, dt: float) -> Iterator[Suspect]:
     for intervals in STORES:
         tau = intervals * dt
-        if tau > 3 * LONGEST * len(v) * dt:
+        if tau > len(v) * dt:
             break
         effect = Effect(site.name, state, "store", {"exchange": 0.0, "time_constant": tau})
         h = _lagged(x, tau, dt)

@@ -10,10 +10,11 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, worth
+from adaptive_flot.discovery.innovations.switching import chance_of_edges
 from adaptive_flot.greybox.model import FloatArray
 
 NEAR = 0.05
@@ -29,6 +30,8 @@ FOLDS = 5
 BLOCK = 12
 """Rows of a block of the bootstrap: innovations hardly remember."""
 DRAWS = 999
+BY_CHANCE = 1e-3
+"""Probability below which the times of an event are those of an input: then it is no event."""
 LARGEST_CLASS = 3
 """Sites that a class may hold at most."""
 
@@ -77,7 +80,9 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     """Judge the explanations, the best first.
 
     What is certain must be in every explanation about as good, and must predict stretches of rows that did not fit its
-    coefficients better than the rest of the explanation does without it. Where the rest is one of a few, it is a class.
+    coefficients better than the rest of the explanation does without it. An event beside another effect, at the times
+    of an input's steps, is none: it takes up what else is wrong with the model there. Where the rest is one of a few,
+    it is a class.
     """
     possible = [e for e in found if not _beyond(search, e)]
     matters = found[0].criterion - base.criterion >= LEAST_GAIN
@@ -89,7 +94,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}
-        failed = _contradicted(search, best, without)
+        failed = _at_steps_of_an_input(search, best) or _contradicted(search, best, without)
         if not failed:
             return _told(search, base, found, without)
         given_up.append(failed[0])
@@ -99,11 +104,40 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
         found = [e for e in found if not _has(e, failed[0])]
     if not given_up:
         return Told("none", base, (), (), (base,), "constants and process noise explain it")
-    said = ", ".join(h.label for h in given_up)
-    why = f"{said} predict{'s' if len(given_up) == 1 else ''} no rows that did not fit it"
+    why = _why(search, given_up)
     if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
         return Told("abstain", base, (), (), (base,), why)
     return Told("abstain", found[0], (), (), _alike(search, base, found), why)
+
+
+def _why(search: Search, given_up: Sequence[Hypothesis]) -> str:
+    """Why effects were given up."""
+    events = [h for h in given_up if h.kind == "switch" and _follows_an_input(search, h)]
+    others = [h for h in given_up if h not in events]
+    why = [f"{', '.join(h.label for h in events)}: at steps of an input, so it is no event"] if events else []
+    if others:
+        said = ", ".join(h.label for h in others)
+        why.append(f"{said} predict{'s' if len(others) == 1 else ''} no rows that did not fit it")
+    return "; ".join(why)
+
+
+def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hypothesis, ...]:
+    """Events beside another effect that begin and end where an input steps, more often than by chance.
+
+    One alone may well come with an input: guests when those who are counted go.
+    """
+    beside = explanation.hypotheses if len(explanation.hypotheses) > 1 else ()
+    return tuple(h for h in beside if h.kind == "switch" and _follows_an_input(search, h))
+
+
+def _follows_an_input(search: Search, event: Hypothesis) -> bool:
+    record, told, edges = search.record, event.effect.coefficients, list[float]()
+    for name in (c for c in told if c.startswith("on_")):
+        begin, long = told[name], told[name.replace("on_", "for_")]
+        edges += [begin, begin + long] if long < FOREVER else [begin]
+    rows = np.searchsorted(record.time, np.array(edges) - record.dt / 4)
+    inside = rows[(rows > 0) & (rows < len(record))]
+    return chance_of_edges(inside, record.inputs) < BY_CHANCE
 
 
 def _beyond(search: Search, explanation: Explanation) -> bool:

@@ -137,7 +137,9 @@ class Screening:
         return self._total - product**2 / max(float(x @ x), 1e-300)
 
     def _charge(self, suspect: Suspect) -> float:
-        return suspect.cost / 2 * float(np.log(self._count))
+        # of a change that is all or nothing the regression still chooses the share
+        numbers = suspect.cost + (not suspect.coefficients)
+        return numbers / 2 * float(np.log(self._count))
 
     def _rest(self, X: FloatArray) -> FloatArray:
         left: FloatArray = X - self._basis @ (self._basis.T @ X)

@@ -114,6 +114,13 @@ class Search:
         values = {c: model.parameters[model.index("parameters", h.effect.parameter(c))].value for c in h.free}
         return replace(h, starts=(values,))
 
+    def sizes(self, explanation: Explanation) -> tuple[dict[str, float], FloatArray]:
+        """Fitted coefficients of the effects of an explanation by name, and their covariance (k, k)."""
+        model, own = self.model_of(explanation), explanation.free
+        values = {name: float(model.parameters[model.index("parameters", name)].value) for name in own}
+        P = self.fitter(model, own).covariance(explanation.fit)
+        return values, P[len(self.free) :, len(self.free) :]
+
     def base(self, p: FloatArray) -> Explanation:
         """The model as it is, fitted from parameters (np,)."""
         return Explanation((), self.fitter(self.model, ()).fit(p), 0)
@@ -255,7 +262,7 @@ def numbers_of(h: Hypothesis) -> int:
 
 
 def _spread(ranked: Sequence[Screened]) -> list[Screened]:
-    """The best few: one of a kind, and few at one site."""
+    """The best few, one of a kind and few at one site; and the best store, which most models leave out."""
     chosen: list[Screened] = []
     for s in ranked:
         h = s.suspect.hypothesis
@@ -264,7 +271,8 @@ def _spread(ranked: Sequence[Screened]) -> list[Screened]:
             chosen.append(s)
         if len(chosen) == REFITTED:
             break
-    return chosen
+    stores = [s for s in ranked if s.suspect.hypothesis.kind == "store" and s.gain >= LEAST_GAIN]
+    return chosen if any(s in chosen for s in stores) else [*chosen, *stores[:1]]
 
 
 def _distinct(found: Sequence[Explanation]) -> list[Explanation]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.greybox.model import FloatArray
@@ -167,3 +168,34 @@ class _Search:
             if pulses == before:
                 break
         return pulses, self.gain(pulses)
+
+
+def chance_of_edges(rows: IntArray, inputs: FloatArray) -> float:
+    """Probability that so many edges of a switch lie beside steps of an input by chance.
+
+    With n edges, k of them within a row of a step, and a share q of all rows that are as near to one::
+
+        P(K >= k),    K ~ Binomial(n, q)
+
+    Parameters
+    ----------
+    rows
+        First row of each state of the switch (n,).
+    inputs
+        Inputs of the record (N, m), each row's held over the interval that leads to it.
+
+    Returns
+    -------
+    float
+        The smallest of all inputs, times their number; 1 without an edge or an input. An input that moves in each row
+        has q = 1, so it tells nothing.
+    """
+    found = []
+    for column in inputs.T:
+        near = np.zeros(len(column), dtype=bool)
+        steps = 1 + np.flatnonzero(np.diff(column) != 0)
+        for shift in (-1, 0, 1):
+            near[np.clip(steps + shift, 0, len(column) - 1)] = True
+        hits = int(near[rows].sum())
+        found.append(float(binom.sf(hits - 1, len(rows), near.mean())))
+    return min(1.0, len(found) * min(found)) if found and len(rows) else 1.0

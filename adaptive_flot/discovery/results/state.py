@@ -58,6 +58,8 @@ class State:
         The ranked alternatives, and what they amount to.
     before, after
         Fits of the plain and of the extended model to the estimation and confirm splits.
+    sizes
+        The second with the sizes that the innovations form has, where it has decided: these are told.
     problem_after
         The problem of the second, whose background leaves out the constants that are told.
     error
@@ -97,6 +99,7 @@ class State:
     judgement: Judgement | None = None
     before: Fit | None = None
     after: Fit | None = None
+    sizes: Fit | None = None
     problem_after: Problem | None = None
     error: tuple[OutputChange, ...] = ()
     likelihood: float = 0.0
@@ -136,6 +139,11 @@ class State:
         assert self.before is not None and self.after is not None
         return self.before, self.after
 
+    @property
+    def told(self) -> Fit:
+        """The fit whose effects are told: the extended model, by the innovations form where that has decided."""
+        return self.sizes or self.refitted[1]
+
     def ended(self, verdict: Verdict) -> Discovery:
         """The verdict with everything that stands behind it, at whatever stage it was given."""
         screening = self.screening
@@ -144,4 +152,6 @@ class State:
         before, after = self.before or self.base, self.after or self.base
         told = after if verdict.word in ("named", "class", "unnamed") else before
         model = told.model if told is not None else self.model
-        return Discovery(verdict, model, screening, self.problem, self.search, self.judgement, before, after)
+        return Discovery(
+            verdict, model, screening, self.problem, self.search, self.judgement, before, after, self.sizes or after
+        )

@@ -145,6 +145,8 @@ class Discovery:
         The stages; None from the one that was not reached.
     before, after
         Fits of the plain and of the extended model to the estimation and confirm splits.
+    told
+        The second with the sizes that are told: with those of the innovations form where that has decided.
     """
 
     verdict: Verdict
@@ -155,3 +157,4 @@ class Discovery:
     judgement: Judgement | None = None
     before: Fit | None = None
     after: Fit | None = None
+    told: Fit | None = None

@@ -29,6 +29,7 @@ NORMAL95 = 1.96
 INSTRUMENTS = {"sensor": "sensor", "actuator": "part that acts", "feed": "feed"}
 """Roles whose quantities do not depend on the state of the process, in words."""
 
+SIZES_WITH_PROCESS_NOISE = "sizes are those of the fit with process noise; errors and parameters are those of free runs"
 STILL_WRONG = 2.0
 """An output whose error on the report rows is more than so many times its noise is wrong after all."""
 
@@ -46,7 +47,7 @@ def conclude(state: State) -> Verdict:
     final = before if judgement.best is None else after
     labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
     values = final.values[: len(labels)]
-    effects = _effects(judgement, after) if tells else ()
+    effects = _effects(judgement, state.told) if tells else ()
     if any(e.effect.family.memory for e in effects):
         effects = with_ranges(effects, _curves(state, effects))
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
@@ -66,6 +67,7 @@ def conclude(state: State) -> Verdict:
         },
         notes=state.screening.notes
         + _common_nuisance_note(result)
+        + ((SIZES_WITH_PROCESS_NOISE,) if state.sizes else ())
         + suspect_notes([e.effect for e in effects], state.screening.suspects, problem.record.dt),
         detection=state.detection,
         location=locate(state.detection, result.rounds[0].scores) if state.detection else None,
@@ -77,7 +79,7 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
     """The verdict in one paragraph: in the words of the innovations form where that has decided."""
     if not state.sentence:
         wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
-        told = words_of_effects(state.refitted[1].model, effects, _curves(state, effects)) if effects else ""
+        told = words_of_effects(state.told.model, effects, _curves(state, effects)) if effects else ""
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
         likelier = beside_words(state.likelihood, much_better(state.error))
         return " ".join(filter(None, (said, likelier, state.certain, state.background)))
@@ -89,7 +91,7 @@ def _curves(state: State, effects: tuple[NamedEffect, ...]) -> tuple[EffectCurve
     """Curves of the effects that are told, over what the record covers of their drivers."""
     best, problem = state.judged.best, state.problem_after or state.known_problem
     told = {e.effect.label for e in effects}
-    curves = effect_curves(problem, state.refitted[1], len(best.names)) if best else ()
+    curves = effect_curves(problem, state.told, len(best.names)) if best else ()
     return tuple(c for c in curves if c.effect.label in told)
 
 
@@ -129,11 +131,11 @@ def _common_nuisance_note(result: SearchResult) -> tuple[str, ...]:
     return (f"close alternatives were compared with what they leave, {site} by {driver}, added to each",)
 
 
-def _effects(judgement: Judgement, after: Fit) -> tuple[NamedEffect, ...]:
+def _effects(judgement: Judgement, told: Fit) -> tuple[NamedEffect, ...]:
     """Each effect that is told, with Wald intervals c -+ 1.96 sd(c) and the names that could replace it."""
     assert judgement.best is not None  # a verdict that names has an alternative
-    model, best = after.model, judgement.best
-    std = dict(zip(after.names, after.std(), strict=True))
+    model, best = told.model, judgement.best
+    std = dict(zip(told.names, told.std(), strict=True))
     named = []
     for i, effect in enumerate(model.fitted_effects()[-len(best.names) :]):
         own = best.names[i]

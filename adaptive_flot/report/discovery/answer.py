@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results.evidence import OutputChange
+from adaptive_flot.discovery.results.verdict import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.kit.parts import Fact
@@ -25,6 +26,12 @@ WORDS = {
     "insufficient": "the record says too little",
     "abstain": "nothing can be told for sure",
 }
+
+
+def word_in_words(verdict: Verdict) -> str:
+    """What the word of a verdict says."""
+    count = len(verdict.effects)
+    return f"{count} effects stand out" if verdict.word == "named" and count > 1 else WORDS[verdict.word]
 
 
 def error_facts(changes: Sequence[OutputChange]) -> list[Fact]:

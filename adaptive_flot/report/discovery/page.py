@@ -16,7 +16,7 @@ from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
-from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
+from adaptive_flot.report.discovery.answer import error_facts, made_from, word_in_words
 from adaptive_flot.report.discovery.charts import curve_chart, score_map
 from adaptive_flot.report.discovery.figures import residual_panels, run_panels
 from adaptive_flot.report.discovery.test_design import experiment_chapter
@@ -75,7 +75,7 @@ def discovery_report(discovery: Discovery, name: str, command: str = "", read: S
         title=_title(discovery),
         lead=f"Record: {name}, {len(record)} rows, one every {record.dt:g} s. Model: {discovery.model.name}.",
         answer=[spaced(verdict.reason), *(spaced(f) for f in _facts(discovery) if not _repeats(f, verdict.reason))],
-        facts=[Fact("Verdict", verdict.word, WORDS[verdict.word]), *error_facts(verdict.error)],
+        facts=[Fact("Verdict", verdict.word, word_in_words(verdict)), *error_facts(verdict.error)],
         first=first,
         sections=[*sections, data],
         made=made_by(command, made_from(discovery.model.name, verdict.seconds, [record]), read),
@@ -174,7 +174,7 @@ def _data(discovery: Discovery) -> list[str]:
 
 def _curve_pictures(discovery: Discovery, problem: Problem, after: Fit, album: Album) -> list[Picture]:
     best = discovery.judgement.best if discovery.judgement else None
-    curves = effect_curves(problem, after, len(best.names)) if best else ()
+    curves = effect_curves(problem, discovery.told or after, len(best.names)) if best else ()
     if not curves:
         return []
     told = "the effect" if discovery.verdict.effects else "the best alternative, which the verdict does not tell"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.verdict.conclude import SIZES_WITH_PROCESS_NOISE
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, GUESTS = 60.0, ((9000.0, 12_000.0), (24_000.0, 27_600.0))
@@ -59,9 +60,14 @@ def test_guests_that_nobody_counts_are_told_as_an_amount_with_their_times() -> N
     """Truth: 6 x 0.02 = 0.12 m3/h more. A fan that stands still looks much the same, and must not be named."""
     verdict = discover(model(), record()).verdict
     assert verdict.word == "named", verdict.reason
-    (told,) = (e.effect for e in verdict.effects)
+    (named,) = verdict.effects
+    told, (low, high) = named.effect, named.interval95["amplitude"]
     assert (told.site, told.form, told.mode) == ("breath", "switch", "offset"), verdict.reason
     assert told.coefficients["amplitude"] == pytest.approx(0.12, rel=0.1)
+    assert low < 0.12 < high and high - low < 0.03
+    # the sentence has the same size, and says which fit it is of
+    assert f"{told.coefficients['amplitude']:.3g} m3/h more" in verdict.reason
+    assert SIZES_WITH_PROCESS_NOISE in verdict.notes
     for k, (a, b) in enumerate(GUESTS, start=1):
         assert told.coefficients[f"on_{k}"] == pytest.approx(a, abs=2 * DT)
         assert told.coefficients[f"for_{k}"] == pytest.approx(b - a, abs=3 * DT)

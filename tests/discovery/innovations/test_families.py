@@ -7,7 +7,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Search
-from tests.discovery.innovations.thermostat import BAND, PERIOD, SWING, ZONE, Wrong, model, record
+from tests.discovery.innovations.thermostat import BAND, LAMP, PERIOD, SWING, ZONE, Wrong, model, record
 
 
 def _told(wrong: Wrong) -> tuple[Told, str, Search]:
@@ -50,6 +50,17 @@ def test_a_disturbance_that_comes_and_goes_is_told_with_its_period() -> None:
     values = _values(search, told, "other_heat")
     assert values["period"] == pytest.approx(PERIOD, rel=0.02)
     assert np.hypot(values["sine"], values["cosine"]) == pytest.approx(SWING, rel=0.1)
+
+
+def test_a_constant_heat_where_the_model_has_none_is_told_with_its_size() -> None:
+    """The model's other heat is 0 W: what enters a balance is not limited by what has been seen of it.
+
+    An element that gives as much too much is the same record, and so is a loss that is as much smaller.
+    """
+    told, words, search = _told("lamp")
+    assert told.word in ("named", "class"), words
+    assert "other_heat" in {h.site for h in told.effects} and {h.driver for h in told.effects} == {"constant"}, words
+    assert _values(search, told, "other_heat")["amplitude"] == pytest.approx(LAMP, rel=0.15)
 
 
 def test_nothing_is_told_of_a_plate_that_does_as_it_is_told() -> None:

@@ -10,6 +10,7 @@ import pytest
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations import judge as judging
 from adaptive_flot.discovery.innovations.search import worth
+from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.effects import Effect
 
 ROWS = 200
@@ -35,6 +36,11 @@ class Rows:
 class Stand:
     """A search that knows three explanations; without an effect, an explanation is the rest of it."""
 
+    record = Dataset(
+        "", np.arange(0, 10.0 * ROWS, 10.0), 10.0, np.sign(np.arange(ROWS) // 20 % 2.0)[:, None], np.zeros((ROWS, 1))
+    )
+    """An input that is switched every 200 s."""
+
     def __init__(self, *known: Given) -> None:
         self.known = {tuple(h.site for h in e.hypotheses): e for e in known}
 
@@ -55,6 +61,13 @@ def lag(site: str) -> Hypothesis:
     return Hypothesis(
         site, "lag", "lag", Effect(site, "lag", "lag", settings={"scale": 1.0}), ("time_constant",), ({},)
     )
+
+
+def event(site: str, *times: tuple[float, float]) -> Hypothesis:
+    """Something that is switched on for a while, at times [s]."""
+    told = {f"{name}_{k}": t for k, pair in enumerate(times, 1) for name, t in zip(("on", "for"), pair, strict=True)}
+    effect = Effect(site, "time", "switch", told, {"count": float(len(times)), "width": 0.5}, mode="offset")
+    return Hypothesis(site, "time", "switch", effect, ("amplitude",), ({},))
 
 
 SPAN = Hypothesis("sensor", "own_value", "span", Effect("sensor", "own_value", "span", settings={"middle": 1.0}),
@@ -159,3 +172,27 @@ def test_a_lag_that_a_free_run_does_not_tell_from_another_is_a_class_with_that(a
     again = judging.late_where(search, named, lambda _, site: site == alike)
     assert again.word == word
     assert {h.site for h in again.effects} == ({"sensor", "elsewhere"} if word == "class" else {"sensor"})
+
+
+AT_STEPS, BETWEEN = ((200.0, 200.0), (600.0, 210.0), (1000.0, 190.0)), ((250.0, 200.0), (650.0, 200.0), (1050.0, 200.0))
+
+
+@pytest.mark.parametrize(("times", "sites"), [(AT_STEPS, ["valve"]), (BETWEEN, ["valve", "sensor"])])
+def test_an_event_at_the_steps_of_an_input_is_none(times: tuple[tuple[float, float], ...], sites: list[str]) -> None:
+    """It follows the input, so it takes up what is wrong with the model there; what is beside it is told."""
+    valve, shift = lag("valve"), event("sensor", *times)
+    said = told(Given((valve, shift), 500.0, 0.9), Given((valve,), 300.0, 0.5), Given((shift,), 200.0, 0.3))
+    assert said.word == "named"
+    assert [h.site for h in said.certain] == sites
+
+
+def test_an_event_alone_may_come_with_an_input() -> None:
+    """Guests come when those who are counted go."""
+    assert told(Given((event("sensor", *AT_STEPS),), 500.0, 0.9)).word == "named"
+
+
+def test_why_nothing_is_told_says_that_an_event_follows_an_input() -> None:
+    valve, shift = lag("valve"), event("sensor", *AT_STEPS)
+    said = told(Given((valve, shift), 500.0, 0.9), Given((valve,), 300.0, -0.5), Given((shift,), 200.0, -0.3))
+    assert said.word == "abstain"
+    assert "sensor switch: at steps of an input, so it is no event" in said.why and "valve lag predicts" in said.why

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.innovations.switching import Switch, best_switch
+from adaptive_flot.discovery.innovations.switching import Switch, best_switch, chance_of_edges
 
 N = 120
 
@@ -54,3 +54,27 @@ def test_slow_edges_are_as_wide_as_half_the_pulse_or_the_pause_before_it() -> No
     assert slow[40:60].min() < 0.6 and slow[:30].max() == 0 and slow[70:].max() == 0
     stays = Switch(((90, N),), 1.0, 1.0).slow(N)
     assert stays[-1] == pytest.approx(1.0) and 0.4 < stays[90] < 0.6
+
+
+def test_edges_at_the_steps_of_an_input_are_not_there_by_chance() -> None:
+    """Four edges at four of five steps: a row in eight is as near to a step, so chance does it once in 8^4 = 4096."""
+    steps = np.array([20, 40, 60, 80, 100])
+    levels = np.cumsum(np.isin(np.arange(N), steps))[:, None].astype(float)
+    assert chance_of_edges(np.array([20, 41, 59, 100]), levels) == pytest.approx(8.0**-4)
+    assert chance_of_edges(np.array([30, 50, 70, 90]), levels) == 1.0
+    # beside an input that moves in each row, the steps of the other are still seen
+    both = np.column_stack([levels, np.arange(N)])
+    assert chance_of_edges(np.array([20, 41, 59, 100]), both) == pytest.approx(2 * 8.0**-4)
+    assert chance_of_edges(np.array([20, 40]), both[:, 1:]) == 1.0
+    assert chance_of_edges(np.array([], dtype=int), levels) == 1.0
+    assert chance_of_edges(np.array([20, 40]), np.empty((N, 0))) == 1.0
+
+
+def test_edges_that_know_nothing_of_an_input_seem_to_follow_it_as_rarely_as_is_said() -> None:
+    rng = np.random.default_rng(3)
+    said = []
+    for _ in range(300):
+        held = np.repeat(rng.normal(size=N // 8), 8)[:, None]
+        said.append(chance_of_edges(rng.choice(np.arange(1, N), 6, replace=False), held))
+    for limit in (0.2, 0.05, 0.01):
+        assert np.mean(np.array(said) < limit) <= limit + 0.02

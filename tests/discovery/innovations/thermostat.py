@@ -1,4 +1,4 @@
-"""A plate that a Peltier element heats and cools: the element sticks, idles about zero, or a draught comes and goes."""
+"""A plate that a Peltier element heats and cools: it sticks, idles about zero, or a draught or a lamp is beside it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, ROOM, CAPACITY, LOSS = 10.0, 20.0, 300.0, 2.0
-BAND, ZONE, SWING, PERIOD = 6.0, 5.0, 4.0, 700.0
-Wrong = Literal["nothing", "hysteresis", "dead zone", "periodic"]
+BAND, ZONE, SWING, PERIOD, LAMP = 6.0, 5.0, 4.0, 700.0, 3.0
+Wrong = Literal["nothing", "hysteresis", "dead zone", "periodic", "lamp"]
 
 
 def record(wrong: Wrong, rows: int = 500, seed: int = 0) -> Dataset:
@@ -31,6 +31,7 @@ def record(wrong: Wrong, rows: int = 500, seed: int = 0) -> Dataset:
             elif wrong == "dead zone":
                 u -= min(max(u, -ZONE), ZONE)
             other = SWING * np.sin(2 * np.pi * t / PERIOD + 1.0) if wrong == "periodic" else 0.0
+            other += LAMP if wrong == "lamp" else 0.0
             room += h * (ROOM - room) / 2000.0 + 0.02 * np.sqrt(h / 60.0) * rng.normal()
             plate += h * (u + other - LOSS * (plate - room)) / CAPACITY
     y += 0.03 * rng.normal(size=rows)

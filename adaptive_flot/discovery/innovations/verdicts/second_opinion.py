@@ -143,6 +143,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         search=replace(result, alternatives=(best,), verification=None),
         judgement=judgement,
         after=after,
+        sizes=after.with_sizes(*search.sizes(told.best)),
         error=error,
         contradiction="",
         certain="",
