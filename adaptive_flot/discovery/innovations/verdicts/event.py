@@ -15,7 +15,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.hypotheses.telling import verdict_of
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Search
 from adaptive_flot.discovery.results import OutputChange
@@ -27,8 +27,8 @@ FAR_ABOVE, HARDLY_LESS = 2.0, 0.9
 def with_event(compared: Comparison, search: Search, told: Told, seconds: float) -> Comparison:
     """The comparison with the event told; unchanged where free runs do not get better by it, or need not.
 
-    Where no output's error without the event is larger than on the reference, there is nothing for it to explain. Where
-    another output stays far above it, there is more than the event explains, and its name would be a guess.
+    Where no output's error without the event is above what is usual on the reference, there is nothing to explain.
+    Where another output stays far above it, there is more than the event explains, and its name would be a guess.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))  # type: ignore[arg-type]
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, seconds)
-    if all(c.before <= c.noise for c in verdict.error) or any(map(_not_touched, verdict.error)):
+    if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or any(map(_not_touched, verdict.error)):
         return compared
     over_all = f"Over the whole record: {compared.verdict.reason}"
     return replace(
