@@ -38,7 +38,7 @@ class Alternative:
         Standard deviation of the difference between its minus two log-likelihood and that of the best one.
     adjusted_bic
         Its criterion with the common nuisance added, where that was worked out (see `adjust_for_common_nuisance`). Of
-        alternatives to a pulse, with the confirm rows added.
+        alternatives to a pulse, with the confirm rows added. Where the innovations form has decided, that of its fits.
     problem
         Its own problem, where it has a background of its own: a course that is told as an effect.
     """

@@ -158,3 +158,8 @@ class Discovery:
     before: Fit | None = None
     after: Fit | None = None
     told: Fit | None = None
+
+    @property
+    def by_process_noise(self) -> bool:
+        """Whether the innovations form has decided, with sizes of its own."""
+        return self.told is not None and self.told is not self.after

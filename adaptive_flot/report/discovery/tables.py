@@ -82,6 +82,8 @@ def alternative_table(discovery: Discovery) -> Table:
         "resampled blocks of rows), and its difference to the model without an effect (negative is better). Known: "
         "whether the model's catalogue has a name for it."
     )
+    if discovery.by_process_noise:
+        caption += " To the best one it is that of fits with process noise, which have decided; else of free runs."
     header = ("Rank", "Effect", "Form", "Known", "Δ BIC to best", "Δ BIC to no effect")
     return Table(caption, header, tuple(rows), words=4)
 
@@ -176,6 +178,14 @@ def not_told_apart(discovery: Discovery) -> list[str]:
     if judged is None or judged.best is None:
         return ["There is no alternative to tell apart."]
     best = judged.best
+    if discovery.by_process_noise:
+        said = [
+            f"{effect_text(a.names)} explains the record about as well as {effect_text(best.names)}, both with process "
+            f"noise: its criterion is worse by {number(a.worse_than(best), '.1f')} ± "
+            f"{number(a.loglik_difference_sd, '.1f')}, or what it is worse by comes from a few rows."
+            for a in judged.rivals
+        ]
+        return said or ["With process noise, nothing comes near the best alternative."]
     said = []
     for a in judged.rivals:
         if judged.near(a):

@@ -20,6 +20,7 @@ from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.alternatives import beside_alternatives
+from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
     TELLS,
     allowed_ratio,
@@ -116,11 +117,11 @@ def _taken_back(state: State, why: str) -> State:
 def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     """The verdict of the innovations form, with a free run of the extended model beside that of the plain one."""
     problem, (before, _) = state.known_problem, state.refitted
-    after = _free_run(state, search, told, before)
+    after = _free_run(state, search, told.best, before)
     if after is None:
         return _kept(state, told)
-    names = tuple((h.site, h.driver) for h in told.best.hypotheses)
-    best = Alternative(names, (True,) * len(names), after, before.loss - after.loss, after.bic - before.bic)
+    best = alternative(told.best, after, before, told.best)
+    names = best.names
     judgement = _judgement(told, best)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
@@ -138,10 +139,12 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
         told, judgement = both, _judgement(both, best)
     _, result = state.searched
+    members = [e for e, _ in told.open]
+    rivals = others(told.best, members, lambda e: _free_run(state, search, e, before), before)
     return replace(
         state,
-        search=replace(result, alternatives=(best,), verification=None),
-        judgement=judgement,
+        search=replace(result, alternatives=(best, *rivals), verification=None),
+        judgement=replace(judgement, rivals=rivals, margin=max((a.worse_than(best) + 1 for a in rivals), default=0.0)),
         after=after,
         sizes=after.with_sizes(*search.sizes(told.best)),
         error=error,
@@ -180,11 +183,11 @@ def _over_words(changes: tuple[OutputChange, ...]) -> str:
     return f" Error on held-out stretches, each predicted from the filter's state before it: {said}."
 
 
-def _free_run(state: State, search: Search, told: Told, before: Fit) -> Fit | None:
-    """The extended model fitted to all rows but the report split, from where the innovations form has it."""
+def _free_run(state: State, search: Search, explanation: Explanation, before: Fit) -> Fit | None:
+    """The model with the effects of an explanation, fitted to all rows but the report split, from its own values."""
     problem = replace(state.known_problem, nodes=None)
-    model = search.model_of(told.best)
+    model = search.model_of(explanation)
     fitter = Fitter(problem, ("estimate", "confirm"))
     start = {p.name: p.value for p in model.parameters}
-    fit = fitter.fit(model, told.best.free, start, like=before, rounds=2)
+    fit = fitter.fit(model, explanation.free, start, like=before, rounds=2)
     return None if fit is None else fitter.with_intervals(fit)
