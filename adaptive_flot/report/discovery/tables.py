@@ -58,8 +58,9 @@ def coefficient_table(discovery: Discovery) -> Table:
             site = effect_text([(named.effect.site, named.effect.driver)])
             unit = unit_text(units.get(name) or "-")
             rows.append((site, named.effect.form, spaced(name), unit, number(value, ".4g"), interval))
+    by = "with process noise, on all rows" if discovery.by_process_noise else "on the estimation and confirm splits"
     caption = (
-        "Coefficients of the effect, fitted on the estimation and confirm splits. A factor form multiplies its site by "
+        f"Coefficients of the effect, fitted {by}. A factor form multiplies its site by "
         "exp(g); coefficients of g are logarithms of that factor."
     )
     return Table(caption, ("Effect", "Form", "Coefficient", "Unit", "Value", "95 % interval"), tuple(rows), words=4)

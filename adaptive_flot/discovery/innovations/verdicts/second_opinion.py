@@ -126,14 +126,15 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
     against = contradiction(judgement, error, noise)
-    follows = competes(state) and follows_time(state) and not but_for_what_wanders(state, names)
+    wanders = but_for_what_wanders(state, names)
+    follows = competes(state) and follows_time(state) and not wanders
     asked = bool(against or follows) and not surely_worse(error, noise)
     over = _over_stretches(state, search, base, told.best) if asked else ()
     stands = bool(over) and not contradiction(judgement, over, noise)
     if (against and not stands) or hardly_explained(over if stands else error) or _another_drift(state, told):
         return _kept(state, told)
     less = smaller(error, state.error, allowed_ratio(state, names))
-    if competes(state) and not (stands and follows) and not less:
+    if competes(state) and not (stands and (follows or wanders)) and not less:
         both = beside_alternatives(state, search, base, told, names)
         if both is None:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
