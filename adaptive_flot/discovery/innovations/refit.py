@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student_t
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, stores_at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
@@ -33,6 +35,8 @@ LOOSE = 30.0
 UNSURE = 3.0
 """Standard deviation of the state before the first row, in scales of the states."""
 HOPELESS = 1e12
+STRETCHES = 5
+"""Stretches of a record that are compared for the covariance of a parameter."""
 DIFFERENCE = 0.05
 """Width of a difference of the cost, in standard deviations of a parameter."""
 
@@ -216,6 +220,28 @@ class Refitter:
         """Covariance of the free parameters at a fit (q, q): the inverse of the normal equations."""
         A, _ = self._normal_equations(fit.p, fit.size, fit.p[self._where])
         return np.asarray(np.linalg.pinv(A, hermitian=True) * np.outer(self._scale, self._scale), dtype=np.float64)
+
+    def robust_covariance(self, fit: Refit) -> FloatArray:
+        """The same (q, q), where a parameter differs between stretches by more than the noise: as far as they differ.
+
+        With the scores s_b of B stretches, each the sum over its rows of the slopes of the log-likelihood::
+
+            R = A^-1 (sum_b s_b s_b') A^-1 B / (B - 1)
+
+        Liang & Zeger, *Biometrika* 73 (1986) 13. Variances are at least those of the normal equations A, and R's count
+        (t / 1.96)^2 times, with the 97.5 % point t of Student's t for B - 1 degrees of freedom: so ±1.96 standard
+        deviations are a 95 % interval. What wanders more slowly than a stretch is seen in part.
+        """
+        A, _ = self._normal_equations(fit.p, fit.size, fit.p[self._where])
+        inverse = np.linalg.pinv(A, hermitian=True)
+        L = self._functions.at(self.record, fit.noise, fit.p, self.start(fit.noise, fit.p))
+        pull = np.repeat(self.counted[1:], len(self.columns)) * L.innovations
+        scores = L.by_constants * self._scale * (pull * weight_of(L.innovations**2, self.degrees_of_freedom))[:, None]
+        sums = np.array([b.sum(axis=0) for b in np.array_split(scores, STRETCHES)])
+        robust = np.diag(inverse @ sums.T @ sums @ inverse) * STRETCHES / (STRETCHES - 1)
+        robust = robust * (student_t.ppf(0.975, STRETCHES - 1) / norm.ppf(0.975)) ** 2
+        wider = np.sqrt(np.maximum(robust / np.maximum(np.diag(inverse), 1e-300), 1.0)) * self._scale
+        return np.asarray(inverse * np.outer(wider, wider), dtype=np.float64)
 
     def _normal_equations(
         self, p: FloatArray, size: tuple[float, float], first: FloatArray

@@ -118,7 +118,7 @@ class Search:
         """Fitted coefficients of the effects of an explanation by name, and their covariance (k, k)."""
         model, own = self.model_of(explanation), explanation.free
         values = {name: float(model.parameters[model.index("parameters", name)].value) for name in own}
-        P = self.fitter(model, own).covariance(explanation.fit)
+        P = self.fitter(model, own).robust_covariance(explanation.fit)
         return values, P[len(self.free) :, len(self.free) :]
 
     def base(self, p: FloatArray) -> Explanation:

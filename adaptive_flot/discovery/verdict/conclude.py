@@ -29,7 +29,10 @@ NORMAL95 = 1.96
 INSTRUMENTS = {"sensor": "sensor", "actuator": "part that acts", "feed": "feed"}
 """Roles whose quantities do not depend on the state of the process, in words."""
 
-SIZES_WITH_PROCESS_NOISE = "sizes are those of the fit with process noise; errors and parameters are those of free runs"
+SIZES_WITH_PROCESS_NOISE = (
+    "sizes are those of the fit with process noise, errors and parameters those of free runs; a disturbance that stays "
+    "for most of the record is part of a size, and not of its interval"
+)
 STILL_WRONG = 2.0
 """An output whose error on the report rows is more than so many times its noise is wrong after all."""
 
