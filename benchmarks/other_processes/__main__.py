@@ -6,6 +6,8 @@ import json
 import os
 import shlex
 import sys
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +16,9 @@ import typer
 from adaptive_flot.files import replace_file, write_text
 from benchmarks.hidden_effects.__main__ import progress
 from benchmarks.hidden_effects.score.commands import run_command
+from benchmarks.other_processes.further import FURTHER
+from benchmarks.other_processes.plants import PROCESSES
+from benchmarks.other_processes.process import Process
 from benchmarks.other_processes.record import make_record
 from benchmarks.other_processes.score import by_process, told
 from benchmarks.plant_like.__main__ import make_missing
@@ -28,9 +33,9 @@ def _main() -> None:
     """Records of processes that are not flotation, and the score of whoever tries to find what is missing."""
 
 
-def _make(job: tuple[Path, int, int]) -> None:
+def _make(job: tuple[Path, int, int], processes: Sequence[Process] = PROCESSES) -> None:
     folder, seed, k = job
-    made, name = make_record(seed, k), f"record_{k:04d}"
+    made, name = make_record(seed, k, processes), f"record_{k:04d}"
     for table, file in ((made.table, name), (made.reference, f"reference_{k:04d}")):
         if table is not None:
             with replace_file(folder / "records" / f"{file}.csv") as stream:
@@ -45,9 +50,10 @@ def generate(
     count: Annotated[int, typer.Option(min=1, help="Number of records.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Seed; record k is the same whatever the count.")] = 2029,
     jobs: Jobs = 2,
+    further: Annotated[bool, typer.Option("--further", help="Of the four further processes.")] = False,
 ) -> None:
     """Write records and answers."""
-    make_missing(_make, out, seed, count, jobs)
+    make_missing(partial(_make, processes=FURTHER) if further else _make, out, seed, count, jobs)
 
 
 @app.command()

@@ -35,16 +35,17 @@ class Record:
     answer: dict[str, Any]
 
 
-def make_record(seed: int, k: int) -> Record:
-    """Record k of a seed, always the same whatever the number of records.
+def make_record(seed: int, k: int, processes: Sequence[Process] = PROCESSES) -> Record:
+    """Record k of a seed, always the same whatever the number of records; processes take their turn.
 
     Raises
     ------
     RuntimeError
         No attempt gave an effect that shows.
     """
-    process, referred = PROCESSES[k % len(PROCESSES)], has_reference(k)
-    name = case_of(process, seed, k)
+    count = len(processes)
+    process, referred = processes[k % count], has_reference(k, count)
+    name = case_of(process, seed, k, count)
     for attempt in range(ATTEMPTS):
         streams = np.random.SeedSequence(seed, spawn_key=(k, attempt)).spawn(5)
         rng = np.random.default_rng(streams[4])
@@ -62,24 +63,24 @@ def make_record(seed: int, k: int) -> Record:
             before = simulate(process, streams, int(REFERENCE_ROWS * rows), NOTHING, feedback, again=True)
             old = _table(process, measured(rng, before, process.noise))
         case = process.cases[name]
-        told = {"model": f"benchmarks.other_processes.plants.{process.name}:{case.model}", "reference": referred}
+        told = {"model": f"{process.make_model.__module__}:{case.model}", "reference": referred}
         return Record(table, old, told, _answer(process, name, case, k, size, referred, feedback))
     raise RuntimeError(f"record {k} of seed {seed}: {process.name}, {name}: no attempt shows")
 
 
-def has_reference(k: int) -> bool:
-    """Whether record k has a reference: a third of those of each process."""
-    return (k // len(PROCESSES) + k % len(PROCESSES)) % 3 == 2
+def has_reference(k: int, count: int = len(PROCESSES)) -> bool:
+    """Whether record k of so many processes has a reference: a third of those of each process."""
+    return (k // count + k % count) % 3 == 2
 
 
-def case_of(process: Process, seed: int, k: int) -> str:
+def case_of(process: Process, seed: int, k: int, count: int = len(PROCESSES)) -> str:
     """What is the matter in record k: nothing in some, else every case of the process in turn."""
-    referred, place = has_reference(k), k % len(PROCESSES)
+    referred, place = has_reference(k, count), k % count
     allowed = ("both", "reference") if referred else ("both", "alone")
     names = [n for n, c in process.cases.items() if n != NOTHING and c.when in allowed]
     if np.random.default_rng((seed, k)).random() < QUIET:
         return NOTHING
-    earlier = sum(has_reference(j) == referred for j in range(place, k, len(PROCESSES)))
+    earlier = sum(has_reference(j, count) == referred for j in range(place, k, count))
     order = np.random.default_rng((seed, place, referred)).permutation(len(names))
     return names[int(order[earlier % len(names)])]
 

@@ -7,6 +7,7 @@ import pytest
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes.registry import make_model, read_measurements
 from benchmarks.hidden_effects.score.verdict import SubmittedVerdict
+from benchmarks.other_processes.further import FURTHER
 from benchmarks.other_processes.plants import PROCESSES
 from benchmarks.other_processes.process import NOTHING, Process
 from benchmarks.other_processes.record import case_of, make_record, simulate
@@ -23,8 +24,15 @@ CONSTANTS = {
     "room_air": {"fan_air": 350.0, "infiltration": 60.0, "breath": 0.018},
     "fan_filter": {"head": 900.0, "filter_drop": 60.0, "duct_drop": 22.0, "inertia": 600.0},
     "dosing": {"decay": 0.6, "volume": 25.0},
+    "battery": {"capacity": 2.0, "ohms": 0.05, "empty": 3.3, "rise": 0.8},
+    "spring": {"gain": 28.0, "stiffness": 13.0, "damping": 1.2},
+    "dryer": {"watts": 280.0, "air": 9.0, "conductance": 1.2, "store": 50.0},
+    "reactor": {"speed": 0.1, "heat": 28.0, "transfer": 0.13},
 }
 """Of the plants, without what is off."""
+FIRST = {"battery": [0.5], "spring": [0.0, 0.0]}
+"""State in the first row, where no output shows it."""
+SETS = (PROCESSES, FURTHER)
 
 
 def said(word: str, *names: tuple[str, str]) -> SubmittedVerdict:
@@ -32,14 +40,15 @@ def said(word: str, *names: tuple[str, str]) -> SubmittedVerdict:
     return SubmittedVerdict.model_validate({"verdict": word, ("class" if word == "class" else "effects"): told})
 
 
-@pytest.mark.parametrize("process", PROCESSES, ids=lambda p: p.name)
+@pytest.mark.parametrize("process", (*PROCESSES, *FURTHER), ids=lambda p: p.name)
 def test_a_plant_without_extras_is_its_model(process: Process) -> None:
     """The plant's own steps of Euler against the model: no error of a sign, a unit or a row between the two."""
     columns = simulate(process, np.random.SeedSequence(1).spawn(4), 300, NOTHING, False, rich=0.0)
     table = pd.DataFrame({"time_s": process.dt * (1.0 + np.arange(300))} | columns)
     model = process.make_model().with_parameters(CONSTANTS[process.name])
     record = read_measurements(table, model).record
-    first = np.array([columns[c][0] for c in process.noise][: len(model.states)])
+    shown = [columns[c][0] for c in process.noise][: len(model.states)]
+    first = np.array(FIRST.get(process.name, shown))
     run = RecordSimulator(model, record.dt).outputs(record, first, model.parameter_values)
     assert np.abs(run - record.outputs).max() < 0.01 * np.ptp(record.outputs, axis=0).max()
 
@@ -53,13 +62,14 @@ def test_a_record_is_the_same_whenever_it_is_made_and_its_reference_is_of_the_sa
 
 
 def test_every_case_names_sites_of_its_model_and_comes_up_with_and_without_a_reference() -> None:
-    for i, process in enumerate(PROCESSES):
-        for case in process.cases.values():
-            model = make_model(f"benchmarks.other_processes.plants.{process.name}:{case.model}")
-            sites = {site.name for site in model.sites}
-            assert {site for site, _ in (*case.names, *process.tolerated)} <= sites
-        ks = range(i, 40 * len(PROCESSES), len(PROCESSES))
-        assert {case_of(process, 1, k) for k in ks} == set(process.cases)
+    for processes in SETS:
+        count = len(processes)
+        for i, process in enumerate(processes):
+            for case in process.cases.values():
+                model = make_model(f"{process.make_model.__module__}:{case.model}")
+                sites = {site.name for site in model.sites}
+                assert {site for site, _ in (*case.names, *process.tolerated)} <= sites
+            assert {case_of(process, 1, k, count) for k in range(i, 40 * count, count)} == set(process.cases)
 
 
 def test_what_a_plant_has_all_the_time_is_no_wrong_name_and_no_change_since_a_reference() -> None:
