@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,10 +14,7 @@ from adaptive_flot.greybox.filtering.noise_model import STUDENT, NoiseModel
 from adaptive_flot.greybox.filtering.step import filter_step, first_correction
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from adaptive_flot.greybox.stepping.recursion import Recursion
-
-CHUNK = 100
-"""Rows of one call."""
+from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
 
 
 @dataclass(frozen=True)
@@ -111,28 +107,17 @@ class RecordFilter:
         z, P, predicted, variance, likelihood = self._first(
             z0, P0, float(record.time[0]), record.inputs[0], p, r, y[0], there[0]
         )
-        count = math.ceil((rows - 1) / CHUNK) * CHUNK
-        take = np.minimum(1 + np.arange(count), rows - 1)
-        real = 1 + np.arange(count) <= rows - 1
-        t = record.time[0] + self.dt * np.arange(count, dtype=float)
-        u, seen, present = record.inputs[take], y[take], there[take] * real[:, None]
-        parts: list[dict[str, FloatArray]] = []
-        at = {"z": z, "P": P}
-        for start in range(0, count, CHUNK):
-            cut = slice(start, start + CHUNK)
-            each = {
-                "t": t[cut, None], "u": u[cut], "p": p, "Q": Q, "r": r, "y": seen[cut], "there": present[cut],
-            }  # fmt: skip
-            part = self._many(at, each)
-            part["F"] = part["F"].reshape(-1, n, n).transpose(0, 2, 1)  # a matrix comes row by row, transposed
-            parts.append(part)
-            at = {"z": part["z_next"][-1], "P": part["P_next"][-1]}
-        if not parts:
+        if rows == 1:
             empty = np.empty((0, n, n))
             return Filtered(
                 predicted[None], variance[None], likelihood.ravel(), z[None], P[None], np.empty((0, n)), empty, Q
             )
-        joined = {k: np.concatenate([part[k] for part in parts])[: rows - 1] for k in parts[0]}
+        t = record.time[0] + self.dt * np.arange(rows - 1, dtype=float)
+        each = {
+            "t": t[:, None], "u": record.inputs[1:], "p": p, "Q": Q, "r": r, "y": y[1:], "there": there[1:],
+        }  # fmt: skip
+        joined = self._many({"z": z, "P": P}, each)
+        F = joined["F"].reshape(-1, n, n).transpose(0, 2, 1)  # a matrix comes row by row, transposed
         return Filtered(
             np.vstack([predicted[None], joined["predicted"]]),
             np.vstack([variance[None], joined["variance"]]),
@@ -140,19 +125,19 @@ class RecordFilter:
             np.vstack([z[None], joined["z_next"]]),
             np.concatenate([P[None], joined["P_next"].reshape(-1, n, n)]),
             joined["ahead"],
-            joined["F"],
+            F,
             Q,
         )
 
 
 def _calls(
     model: Model, dt: float, outputs: tuple[int, ...], walking: tuple[str, ...], degrees_of_freedom: float, thread: int
-) -> tuple[FastCall, Recursion]:
-    """The first correction, and the step for `CHUNK` rows, with their working memory: those of one thread.
+) -> tuple[FastCall, RowByRow]:
+    """The first correction, and the step from row to row, with their working memory: those of one thread.
 
     A search of the noise makes a filter for each size that it tries.
     """
     del thread
     first = first_correction(model, outputs, walking, degrees_of_freedom)
     step = filter_step(model, dt, outputs, walking, degrees_of_freedom)
-    return FastCall(first, ["P", "P_next"]), Recursion(step, {"z": "z_next", "P": "P_next"}, CHUNK)
+    return FastCall(first, ["P", "P_next"]), row_by_row(step, {"z": "z_next", "P": "P_next"}, ("p", "Q", "r"))

@@ -5,10 +5,15 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.stepping import recursion
+from adaptive_flot.greybox.stepping.compiled import CompileError, compiler_problem
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from adaptive_flot.greybox.stepping.recursion import Recursion
+from adaptive_flot.greybox.stepping.recursion import Recursion, row_by_row
+from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 ROWS = 30
 
@@ -45,3 +50,61 @@ def test_another_number_of_rows_is_refused() -> None:
     recursion = Recursion(function(), {"x": "x_next", "P": "P_next"}, ROWS)
     with pytest.raises(ModelError, match="'u' has the shape"):
         recursion({"x": np.ones(2), "P": np.eye(2)}, {"u": np.ones((ROWS - 1, 2)), "c": np.ones(3)})
+
+
+CARRIED = {"x": "x_next", "P": "P_next"}
+
+
+def _without_compiler(monkeypatch: pytest.MonkeyPatch) -> recursion.RowByRow:
+    def refused(*given: object) -> None:
+        raise CompileError("no compiler")
+
+    with monkeypatch.context() as m:
+        m.setattr(recursion, "TapeRecursion", refused)
+        return row_by_row(function(), CARRIED, ("c",))
+
+
+@pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
+@pytest.mark.parametrize("rows", [1, 99, 100, 101, 250])
+def test_with_and_without_a_compiler_it_has_the_same_numbers_to_the_bit(
+    rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For any number of rows; the tape by one call, CasADi by as many as it takes."""
+    rng = np.random.default_rng(rows)
+    given = {"x": rng.standard_normal(2), "P": rng.standard_normal((2, 2))}
+    each = {"u": rng.standard_normal((rows, 2)), "c": rng.standard_normal(3)}
+    plain, tape = _without_compiler(monkeypatch), row_by_row(function(), CARRIED, ("c",))
+    assert isinstance(tape, TapeRecursion) and not isinstance(plain, TapeRecursion)
+    one, other = plain(given, each), tape(given, each)
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        np.testing.assert_array_equal(value, other[name])
+        np.testing.assert_array_equal(value, tape(given, each)[name])  # it keeps nothing from call to call
+
+
+@pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
+@settings(max_examples=30, deadline=None)
+@given(held=st.sets(st.sampled_from(["c", "d"])), changes=st.booleans(), rows=st.integers(1, 40))
+def test_what_is_held_is_worked_out_once_with_the_same_result(held: set[str], changes: bool, rows: int) -> None:
+    x, u, c, d = (ca.SX.sym(name) for name in "xucd")
+    f = ca.Function("f", [u, d, x, c], [ca.exp(-c * d) * x + u * ca.sqrt(d), d * c], list("udxc"), ["x_next", "y"])
+    rng = np.random.default_rng(rows)
+    each = {"u": rng.normal(size=(rows, 1)), "c": np.array([0.3]), "d": np.array([1.7])}
+    if changes and "d" not in held:
+        each["d"] = rng.uniform(0.5, 2.0, (rows, 1))
+    found = row_by_row(f, {"x": "x_next"}, held)({"x": np.array([0.5])}, each)
+    at, table = 0.5, np.broadcast_to(each["d"], (rows, 1))
+    for k in range(rows):
+        at = float(np.exp(-0.3 * table[k, 0]) * at + each["u"][k, 0] * np.sqrt(table[k, 0]))
+        assert found["x_next"][k, 0] == pytest.approx(at, rel=1e-13)
+        assert found["y"][k, 0] == pytest.approx(0.3 * table[k, 0], rel=1e-13)
+
+
+@pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
+def test_a_wrong_shape_is_refused_before_anything_is_read() -> None:
+    run, given = row_by_row(function(), CARRIED, ("c",)), {"x": np.ones(2), "P": np.eye(2)}
+    for each in ({"u": np.ones((5, 3)), "c": np.ones(3)}, {"u": np.ones((5, 2)), "c": np.ones((5, 3))}):
+        with pytest.raises(ValueError, match=r"(u|c): shape"):
+            run(given, each)
+    with pytest.raises(ValueError, match="x: shape"):
+        run(given | {"x": np.ones(3)}, {"u": np.ones((5, 2)), "c": np.ones(3)})

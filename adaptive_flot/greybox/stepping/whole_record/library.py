@@ -19,7 +19,7 @@ from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
 from adaptive_flot.greybox.stepping.whole_record.source import RECORD_SOURCE, kernel_source
 from adaptive_flot.greybox.stepping.whole_record.tape import Tape, tape_of
 
-_FLAGS = ("-O2", "-ftree-vectorize", "-fno-gcse", "-fno-crossjumping", "-ffp-contract=off", "-fPIC", "-shared")
+LIBRARY_FLAGS = ("-O2", "-ftree-vectorize", "-fno-gcse", "-fno-crossjumping", "-ffp-contract=off", "-fPIC", "-shared")
 """Without `gcse` and `crossjumping` each operation keeps a jump of its own, which the processor then foresees."""
 _KERNEL_FLAGS = (*FLAGS, "-fno-builtin-pow")
 """A compiler that knows a power writes it as a product, whose last bit may be another."""
@@ -49,7 +49,7 @@ class Rows:
     last_gradient: FloatArray
 
 
-class _Tape(ctypes.Structure):
+class TapeStruct(ctypes.Structure):
     """A tape as the library sees it."""
 
     _fields_ = [
@@ -74,7 +74,7 @@ class _Kernels(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int64) for name in _SIZES),
         *((name, ctypes.c_void_p) for name in _TABLES),
-        *((name, _Tape) for name in _HELD),
+        *((name, TapeStruct) for name in _HELD),
     ]
 
 
@@ -160,7 +160,7 @@ class WholeRecord:
         compiled = self._machine_code(rows)
         memories = {name: tape.memory.copy() for name, tape in self._tapes.items()}  # so that threads may run at once
         tapes = [
-            _Tape(tape, memories[name], compiled.get(f"{name}_held"), compiled.get(name))
+            TapeStruct(tape, memories[name], compiled.get(f"{name}_held"), compiled.get(name))
             for name, tape in self._tapes.items()
         ]
         given = _Kernels(*self._sizes, *(table.ctypes.data for table in self._tables), *tapes)
@@ -222,7 +222,7 @@ def _pointer(array: FloatArray | None) -> ctypes.c_void_p:
 
 @lru_cache(maxsize=1)
 def _library() -> Any:
-    return load_library("record", RECORD_SOURCE, _FLAGS, _open)
+    return load_library("record", RECORD_SOURCE, LIBRARY_FLAGS, _open)
 
 
 def _open(library: Path) -> Any:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from adaptive_flot.greybox.stepping.whole_record.statements import HELPERS
 from adaptive_flot.greybox.stepping.whole_record.tape import END, OPERATIONS, TEMPLATES, Tape
 
-_HEAD = """
+_TAPE = """
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -21,6 +21,12 @@ typedef struct {
     const uint16_t *held, *code; double *memory; const int64_t *arguments, *results;
     void (*compiled_held)(const double *, double *), (*compiled)(const double *, double *);
 } Tape;
+static double *argument(const Tape *tape, int k) { return tape->memory + tape->arguments[k]; }
+static double *result(const Tape *tape, int k) { return tape->memory + tape->results[k]; }
+static void copy(double *to, const double *from, int64_t n) { memcpy(to, from, (size_t)n * sizeof(double)); }
+"""
+
+_HEAD = """
 typedef struct {
     int64_t nx, nu, ny, ns, np, nr, rx, ne;
     const uint8_t *decays;
@@ -30,10 +36,6 @@ typedef struct {
 """
 
 _LOOPS = """
-static double *argument(const Tape *tape, int k) { return tape->memory + tape->arguments[k]; }
-static double *result(const Tape *tape, int k) { return tape->memory + tape->results[k]; }
-static void copy(double *to, const double *from, int64_t n) { memcpy(to, from, (size_t)n * sizeof(double)); }
-
 /* Inputs and parameters of a row: they stay where rates and ends read them, with what depends on them alone. */
 static void hold(const Tape *tape, const Kernels *k, const double *u, const double *p) {
     copy(argument(tape, 2), u, k->nu);
@@ -180,6 +182,24 @@ void run(const Kernels *K, int64_t rows, int64_t substeps, double dt, double t0,
 }
 """
 
+_RECURSION = """
+/* The tape for each of so many rows. The first `carried` arguments are the first results of the row before. A stride of
+   zero is an argument that stays. Row k's results go to `found[j] + k * widths[j]`. */
+void recur(const Tape *tape, int64_t rows, int64_t given, int64_t carried, const int64_t *sizes,
+           const double *const *values, const int64_t *strides, int64_t made, const int64_t *widths,
+           double *const *found) {
+    for (int64_t row = 0; row < rows; row++) {
+        for (int64_t k = 0; k < given; k++) {
+            if (row && k < carried) copy(argument(tape, k), result(tape, k), sizes[k]);
+            else if (!row || strides[k]) copy(argument(tape, k), values[k] + row * strides[k], sizes[k]);
+        }
+        if (!row) evaluate(tape->held, tape->memory);
+        evaluate(tape->code, tape->memory);
+        for (int64_t j = 0; j < made; j++) copy(found[j] + row * widths[j], result(tape, j), widths[j]);
+    }
+}
+"""
+
 
 def _evaluation() -> str:
     """The function that reads a tape: from one operation it goes straight to the next."""
@@ -199,8 +219,10 @@ def _evaluation() -> str:
     ])  # fmt: skip
 
 
-RECORD_SOURCE = "\n".join([_HEAD, HELPERS, _evaluation(), _LOOPS])
+RECORD_SOURCE = "\n".join([_TAPE, _HEAD, HELPERS, _evaluation(), _LOOPS])
 """The whole of it, the same for every model."""
+RECURSION_SOURCE = "\n".join([_TAPE, HELPERS, _evaluation(), _RECURSION])
+"""Any function whose results are arguments of its next call."""
 
 
 def kernel_source(tapes: Mapping[str, Tape]) -> str:
