@@ -16,12 +16,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CLIP = 100.0
@@ -159,25 +161,18 @@ class LinearResponse:
             ((N - 1) m, f), scaled like the innovations.
         """
         which = self._functions.sites.index(site)
-        return self._respond(self._B[:, :, which, None], self._h[:, :, which, None], course[:, None, :])
+        return self._respond(np.full(course.shape[1], which), course)
 
-    def _constants(self, which: range) -> FloatArray:
+    def _constants(self, which: Sequence[int]) -> FloatArray:
         """All constants at once: the course of each is 1 throughout."""
-        chosen = list(which)
-        if not chosen:
-            return np.empty((len(self.innovations), 0))
-        always = np.ones((len(self._H), 1, 1))
-        return self._respond(self._B[:, :, chosen], self._h[:, :, chosen], always)
+        return self._respond(np.array(which, dtype=np.intp), np.ones((len(self._H), len(which))))
 
-    def _respond(self, b: FloatArray, h: FloatArray, course: FloatArray) -> FloatArray:
-        rows, f = len(course), max(b.shape[2], course.shape[2])
-        d = np.zeros((self._A.shape[1], f))
-        moved = np.empty((rows, self._H.shape[1], f))
-        for k in range(rows):
-            moved[k] = self._H[k] @ d + h[k] * course[k]
-            d = self._A[k] @ d + b[k] * course[k]
+    def _respond(self, source: NDArray[np.intp], course: FloatArray) -> FloatArray:
+        """Responses ((N - 1) m, f) to courses (N - 1, f), each of what is asked about at a place (f,)."""
+        start = np.zeros((self._A.shape[1], len(source)))
+        moved = linear_run((self._A, self._B, self._H, self._h), start, source, course, as_machine_code=True)
         moved *= self._weight[:, :, None]
-        return moved.reshape(-1, f)
+        return moved.reshape(self._weight.size, len(source))
 
     def seen(self) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
         """Value at each site, and of each input, state and signal, in the interval that leads to each row (N - 1,)."""
