@@ -24,7 +24,7 @@ from adaptive_flot.greybox.scope import Site
 
 BANDS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
 """Half widths of a dead band that are tried, as shares of the range of the value."""
-FASTEST, SLOWEST, MOST_PERIODS = 8, 3, 200
+FASTEST, SLOWEST, MOST_PERIODS = 8, 5, 200
 """Fewest rows of a period, fewest periods in a record, and most periods that are tried, one a period more a record."""
 FOLLOWS = 0.5
 """Time constant by which an actuator follows once it moves, in sampling intervals."""

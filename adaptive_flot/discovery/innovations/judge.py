@@ -161,9 +161,8 @@ def _told(
             return _certain_alone(search, base, Told("class", best, certain, members, alike, ""), without)
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
-        return _late_anywhere(
-            search, base, _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
-        )
+        named = _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
+        return _late_anywhere(search, base, named)
     # "one of these" is true where each explanation has one effect beside what is certain, and not where it has two
     one_open = all(len(e.hypotheses) == len(certain) + 1 for e in alike)
     if 2 <= len(members) <= LARGEST_CLASS and one_open:

@@ -10,6 +10,7 @@ import pytest
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations import judge as judging
 from adaptive_flot.discovery.innovations.search import worth
+from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.effects import Effect
 
@@ -196,3 +197,15 @@ def test_why_nothing_is_told_says_that_an_event_follows_an_input() -> None:
     said = told(Given((valve, shift), 500.0, 0.9), Given((valve,), 300.0, -0.5), Given((shift,), 200.0, -0.3))
     assert said.word == "abstain"
     assert "sensor switch: at steps of an input, so it is no event" in said.why and "valve lag predicts" in said.why
+
+
+@pytest.mark.parametrize(("kind", "word"), [("offset", "abstain"), ("store", "named")])
+def test_two_effects_by_name_are_rarer_than_a_third_thing_that_they_stand_in_for(kind: str, word: str) -> None:
+    """But for a store, which most models leave out."""
+    first = lag("sensor")
+    other = replace(lag("valve"), kind=kind, driver="level")  # type: ignore[arg-type]
+    said = told(Given((first, other), 500.0, 0.9), Given((first,), 300.0, 0.5), Given((other,), 250.0, 0.4))
+    assert said.word == "named" and len(said.certain) == 2
+    asked = rivals.not_two(said)
+    assert asked.word == word and "sensor" in asked.why + str(asked.certain)
+    assert rivals.not_two(told(Given((first,), 500.0, 1.0))).word == "named"

@@ -111,6 +111,18 @@ def hardly_explained(changes: tuple[OutputChange, ...], above: float = FAR_ABOVE
     return any(map(hardly, changes))
 
 
+def not_two(told: Told) -> Told:
+    """Nothing where two effects are named and neither is a store, which most models leave out.
+
+    Two things that have gone wrong at a time are rarer than a model that is wrong in a third way, which two effects
+    stand in for.
+    """
+    if len(told.certain) < 2 or any(h.kind == "store" for h in told.certain):
+        return told
+    said = " and ".join(h.label for h in told.certain)
+    return replace(told, word="abstain", certain=(), why=f"two effects are needed, {said}: more likely another one is")
+
+
 def late_as_well(state: State, told: Told, site: str) -> bool:
     """Whether a lag at a site explains about as much in a free run as that which is told, each alone.
 

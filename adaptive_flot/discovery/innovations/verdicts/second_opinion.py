@@ -30,6 +30,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     hardly_explained,
     late_as_well,
     leaves_too_much,
+    not_two,
     smaller,
     surely_better,
     surely_worse,
@@ -66,7 +67,7 @@ def second_opinion(state: State) -> State:
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
         told = judge(search, base, search.run(base, state.progress))
-        told = late_where(search, told, lambda _, site: late_as_well(state, told, site))
+        told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
     if told.word in ("named", "class"):
         return _told(state, search, base, told)
     return _kept(state, told)
