@@ -231,8 +231,18 @@ def late_where(search: Search, told: Told, alike: Callable[[Explanation, str], b
 
 
 def _alike(search: Search, base: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
-    """The best explanation, and those that the record does not tell from it."""
-    return (found[0], *(e for e in found[1:] if not told_apart(search, base, found[0], e)))
+    """The best explanation, and those that the record does not tell from it.
+
+    Not those that have all effects of another of these and one more: "one of these" is as true without them.
+    """
+    near = (found[0], *(e for e in found[1:] if not told_apart(search, base, found[0], e)))
+    return (near[0], *(e for e in near[1:] if not any(_only_adds(e, other) for other in near)))
+
+
+def _only_adds(explanation: Explanation, other: Explanation) -> bool:
+    """Whether an explanation has the effects of another one, which has some, and more."""
+    one, two = (frozenset((h.site, h.driver, h.kind) for h in e.hypotheses) for e in (explanation, other))
+    return bool(two) and two < one
 
 
 def _one_a_site(pairs: Sequence[tuple[Explanation, Hypothesis]]) -> tuple[tuple[Explanation, Hypothesis], ...]:

@@ -209,3 +209,12 @@ def test_two_effects_by_name_are_rarer_than_a_third_thing_that_they_stand_in_for
     asked = rivals.not_two(said)
     assert asked.word == word and "sensor" in asked.why + str(asked.certain)
     assert rivals.not_two(told(Given((first,), 500.0, 1.0))).word == "named"
+
+
+def test_an_effect_more_beside_one_of_a_class_is_no_other_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gains by wind, or the loss by wind, or the loss by wind and something else: one of the first two."""
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
+    one, two, more = lag("gains"), lag("loss"), lag("heater")
+    said = told(Given((one,), 500.0, 0.9), Given((two,), 498.0, 0.9), Given((two, more), 505.0, 0.9))
+    assert said.word == "class" and not said.certain
+    assert [h.site for _, h in said.open] == ["gains", "loss"]
