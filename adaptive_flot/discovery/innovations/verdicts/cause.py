@@ -36,6 +36,8 @@ def with_cause(
     told: Told,
     reference: tuple[Search, Explanation],
     seconds: float,
+    *,
+    unusual: bool = False,
 ) -> Comparison:
     """The comparison with the cause told; unchanged where errors over stretches do not fall to those of the reference.
 
@@ -49,6 +51,8 @@ def with_cause(
         The search in the reference, and the model as it is there.
     seconds
         How long it took.
+    unusual
+        Whether errors over stretches without the cause must be above those of the reference.
     """
     found = _tested(compared, search, told)
     if not found:
@@ -56,6 +60,8 @@ def with_cause(
     error = errors_over_folds(search, base, told.best)
     usual = usual_over_folds(*reference)
     error = tuple(replace(c, noise=usual[c.output]) for c in error)
+    if unusual and all(c.before <= ABOVE_USUAL * c.noise for c in error):
+        return compared
     word: Literal["named", "class"] = "named" if told.word == "named" else "class"
     against = contradiction(Judgement(word, None, (), (), 0.0), error, np.array([c.noise for c in error]))
     if against or hardly_explained(error, ABOVE_USUAL, MOST):
