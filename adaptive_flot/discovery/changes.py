@@ -25,7 +25,8 @@ from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
-from adaptive_flot.discovery.innovations.verdicts.event import FAR_ABOVE, with_event
+from adaptive_flot.discovery.innovations.verdicts.event import with_event
+from adaptive_flot.discovery.innovations.verdicts.rivals import FAR_ABOVE
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model

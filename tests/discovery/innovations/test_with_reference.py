@@ -9,24 +9,23 @@ import pytest
 from adaptive_flot.discovery.changes import _unless_contradicted
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST
-from adaptive_flot.discovery.innovations.verdicts.event import _not_touched
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import OutputChange, Verdict
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "untouched"),
+    ("before", "after", "hardly"),
     [
         (5.0, 4.9, True),  # five times as large as on the reference, and the event does nothing to it
+        (6.9, 6.1, True),  # (37 - 1) / (48 - 1): three quarters of what is unusual are left
         (5.0, 1.2, False),  # the event brings it down
-        (5.0, 3.0, False),  # much is left, but the event is at work there
+        (5.0, 3.0, False),  # a third is left, but the event is at work there
         (1.5, 1.5, False),  # about as on the reference: nothing has changed there
     ],
 )
-def test_an_output_far_above_the_reference_that_an_event_leaves_alone(
-    before: float, after: float, untouched: bool
-) -> None:
-    assert _not_touched(OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))) == untouched
+def test_an_event_must_explain_half_of_what_is_unusual(before: float, after: float, hardly: bool) -> None:
+    change = OutputChange("flow", "m3/s", before, after, 1.0, (0.0, 0.1))
+    assert hardly_explained((change,), ABOVE_USUAL) == hardly
 
 
 @pytest.mark.parametrize(

@@ -18,17 +18,15 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Search
-from adaptive_flot.discovery.results import OutputChange
-
-FAR_ABOVE, HARDLY_LESS = 2.0, 0.9
-"""An error so many times that of the reference is far above it; one of this share of that before is hardly less."""
+from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 
 
 def with_event(compared: Comparison, search: Search, told: Told, seconds: float) -> Comparison:
     """The comparison with the event told; unchanged where free runs do not get better by it, or need not.
 
     Where no output's error without the event is above what is usual on the reference, there is nothing to explain.
-    Where another output stays far above it, there is more than the event explains, and its name would be a guess.
+    Where an output keeps more than half of what its squared error is above that, there is more than the event explains,
+    and its name would be a guess.
 
     Parameters
     ----------
@@ -58,7 +56,7 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))  # type: ignore[arg-type]
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, seconds)
-    if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or any(map(_not_touched, verdict.error)):
+    if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or hardly_explained(verdict.error, ABOVE_USUAL):
         return compared
     over_all = f"Over the whole record: {compared.verdict.reason}"
     return replace(
@@ -71,11 +69,3 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
         tested=(*found, *compared.tested),
         judged=judged,
     )
-
-
-def _not_touched(change: OutputChange) -> bool:
-    """Whether an output is far above its error on the reference, and hardly better with the event.
-
-    What has changed shows there as well. So the event is not the cause, or stands in for one that explains both.
-    """
-    return change.after > FAR_ABOVE * change.noise and change.after > HARDLY_LESS * change.before

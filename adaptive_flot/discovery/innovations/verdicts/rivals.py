@@ -9,7 +9,6 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
-from adaptive_flot.discovery.innovations.verdicts.event import FAR_ABOVE
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
 from adaptive_flot.greybox.effects import Effect
@@ -17,6 +16,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
+FAR_ABOVE = 2.0
+"""An error so many times its usual one is far above it."""
 TELLS = ("named", "class", "unnamed")
 """Words of the free run that tell something."""
 
