@@ -131,11 +131,11 @@ def _with_process_noise(
 
 def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:
     """What is told, without what explains the reference as well: that has not changed."""
-    model = search.model_of(told.best)
 
-    def there(h: Hypothesis) -> bool:
+    def there(explanation: Explanation, h: Hypothesis) -> bool:
         if h.kind == "switch":
             return False
+        model = search.model_of(explanation)
         extended = model_with(before.model, h)
         p = np.array([model.parameters[model.index("parameters", q.name)].value for q in extended.parameters])
         p[list(extended.indices("parameters", before.free))] = start.fit.p[
@@ -143,8 +143,8 @@ def _changed(told: Told, search: Search, before: Search, start: Explanation) -> 
         ]
         return before.added(start, h, p).criterion > start.criterion + LEAST_GAIN
 
-    certain = tuple(h for h in told.certain if not there(h))
-    return replace(told, certain=certain, open=tuple((e, h) for e, h in told.open if not there(h)))
+    certain = tuple(h for h in told.certain if not there(told.best, h))
+    return replace(told, certain=certain, open=tuple((e, h) for e, h in told.open if not there(e, h)))
 
 
 def _has_event(told: Told) -> bool:
