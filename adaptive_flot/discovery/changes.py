@@ -31,6 +31,8 @@ from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
+MUCH_LEFT = 3.0
+"""An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
 LACKING = ("lag", "store", "depends", "sign")
 """Kinds of effects that a model may lack on its reference."""
 
@@ -52,10 +54,10 @@ def find_changes(
     """
     began = time.perf_counter()
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
-    if not references or len(records) != 1 or compared.verdict.word == "insufficient":
+    if not references or compared.verdict.word == "insufficient":
         return compared
-    if not is_short(records[0], model):
-        return compared
+    if len(records) != 1 or not is_short(records[0], model):
+        return _unless_much_is_left(compared)
     reference = max(references, key=len)
     with np.errstate(all="ignore"):
         search, base, told, before = _with_process_noise(compared, records[0], reference, processes, progress)
@@ -68,7 +70,7 @@ def find_changes(
                 with_it = with_cause(compared, search, base, told, before, seconds, unusual=True)
         elif _leaves_more(compared.verdict):
             with_it = with_cause(compared, search, base, told, before, seconds)
-    return with_it if with_it is not compared else _unless_contradicted(compared, told)
+    return _unless_much_is_left(with_it if with_it is not compared else _unless_contradicted(compared, told))
 
 
 def _leaves_more(verdict: Verdict) -> bool:
@@ -94,12 +96,28 @@ def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
         why = "errors are not far above those of the reference, and with process noise it is not confirmed"
     else:
         return compared
+    return _taken_back(compared, why)
+
+
+def _unless_much_is_left(compared: Comparison) -> Comparison:
+    """The comparison, its name or class taken back where an output stays far above the error of the reference."""
+    verdict = compared.verdict
+    left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0}
+    most = max(left, key=lambda name: left[name], default=None)
+    if verdict.word not in ("named", "class") or most is None or left[most] <= MUCH_LEFT:
+        return compared
+    why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
+    return _taken_back(compared, f"{why}, so it may stand in for something else")
+
+
+def _taken_back(compared: Comparison, why: str) -> Comparison:
+    """The comparison without its name, and why."""
     word: Literal["abstain"] = "abstain"
+    verdict = compared.verdict
+    reason = f"Something has changed, and it is not told what: {why}. The nearest: {verdict.reason[:1].lower() + verdict.reason[1:]}"
     return replace(
         compared,
-        verdict=replace(
-            verdict, word=word, reason=f"{verdict.reason} This is not told: {why}.", effects=(), members=()
-        ),
+        verdict=replace(verdict, word=word, reason=reason, effects=(), members=()),
         judged=replace(compared.judged, word=word),
         model=compared.calibration.model,
     )

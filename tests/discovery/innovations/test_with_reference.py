@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.changes import _unless_contradicted
+from adaptive_flot.discovery.changes import _unless_contradicted, _unless_much_is_left
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
@@ -81,3 +81,24 @@ def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_
         word="named" if sites else "none", effects=tuple(SimpleNamespace(site=s, label=s) for s in sites)
     )
     assert _unless_contradicted(compared, told).verdict.word == word
+
+
+@pytest.mark.parametrize(("after", "word"), [((1.1, 0.9), "named"), ((2.9, 1.0), "named"), ((1.0, 3.2), "abstain")])
+def test_a_name_that_leaves_three_times_the_error_of_the_reference_is_not_told(
+    after: tuple[float, float], word: str
+) -> None:
+    """A meter that is off, told as a charger that leaks: nine tenths of the square are gone, and still much is left."""
+    error = tuple(
+        OutputChange(n, "V", 20.0, a, 1.0, (0.5, 0.9)) for n, a in zip(("volts", "amperes"), after, strict=True)
+    )
+    compared: Any = Compared(
+        Verdict(
+            word="named", reason="Charger does not go below 1 A.", effects=(), members=(), error=error, split="fresh"
+        )
+    )
+    verdict = _unless_much_is_left(compared).verdict
+    assert verdict.word == word
+    if word == "abstain":
+        assert verdict.reason.startswith("Something has changed, and it is not told what: ")
+        assert "the error of amperes is still 3.2 times" in verdict.reason
+        assert "The nearest: charger does not go below 1 A." in verdict.reason
