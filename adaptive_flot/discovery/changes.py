@@ -114,7 +114,8 @@ def _taken_back(compared: Comparison, why: str) -> Comparison:
     """The comparison without its name, and why."""
     word: Literal["abstain"] = "abstain"
     verdict = compared.verdict
-    reason = f"Something has changed, and it is not told what: {why}. The nearest: {verdict.reason[:1].lower() + verdict.reason[1:]}"
+    nearest = verdict.reason[:1].lower() + verdict.reason[1:]
+    reason = f"Something has changed, and it is not told what: {why}. The nearest: {nearest}"
     return replace(
         compared,
         verdict=replace(verdict, word=word, reason=reason, effects=(), members=()),
