@@ -171,6 +171,13 @@ class Search:
         again = self._with(without, placed) if placed is not None else None
         return again if again is not None and again.criterion > explanation.criterion else explanation
 
+    def switched_again(self, explanation: Explanation, switch: Hypothesis) -> float:
+        """Gain of a further switch at the site of one that an explanation has; 0 where none is found."""
+        model = self.model_of(explanation)
+        response = self.fitter(model, explanation.free).response(explanation.fit, [switch.site])
+        again = Screening(model, response).switch(next(s for s in self.model.sites if s.name == switch.site))
+        return again.gain if again is not None else 0.0
+
     def without(self, explanation: Explanation, left_out: Hypothesis) -> Explanation:
         """The explanation without one of its effects, fitted anew."""
         others = tuple(h for h in explanation.hypotheses if h is not left_out)

@@ -218,3 +218,15 @@ def test_an_effect_more_beside_one_of_a_class_is_no_other_explanation(monkeypatc
     said = told(Given((one,), 500.0, 0.9), Given((two,), 498.0, 0.9), Given((two, more), 505.0, 0.9))
     assert said.word == "class" and not said.certain
     assert [h.site for _, h in said.open] == ["gains", "loss"]
+
+
+@pytest.mark.parametrize(("again", "word"), [(0.0, "named"), (60.0, "named"), (90.0, "abstain")])
+def test_an_event_at_a_site_that_changes_as_much_at_other_times_is_none(again: float, word: str) -> None:
+    """The event gains 300; a fan's pressure that wanders gains 138 by its largest swing, and 64 by the next."""
+    lid = event("lid", (250.0, 200.0))
+    said = told(Given((lid,), 300.0, 0.9))
+    search: Any = SimpleNamespace(switched_again=lambda explanation, h: again)
+    asked = rivals.unless_it_wanders(search, Given((), 0.0, 0.0), said)  # type: ignore[arg-type]
+    assert asked.word == word and (word == "named" or "it wanders" in asked.why)
+    lasting = told(Given((lag("valve"),), 300.0, 0.9))
+    assert rivals.unless_it_wanders(search, Given((), 0.0, 0.0), lasting) is lasting  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
+from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
 from adaptive_flot.greybox.effects import Effect
@@ -16,6 +17,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
+WANDERS = 0.25
+"""Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
 FAR_ABOVE = 2.0
 """An error so many times its usual one is far above it."""
 TELLS = ("named", "class", "unnamed")
@@ -124,6 +127,22 @@ def not_two(told: Told) -> Told:
         return told
     said = " and ".join(h.label for h in told.certain)
     return replace(told, word="abstain", certain=(), why=f"two effects are needed, {said}: more likely another one is")
+
+
+def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
+    """Nothing where an event is told, and at its site about as much happens at other times.
+
+    An event is there or not. What wanders goes up and down all the time, and the largest of its swings looks like one:
+    beside that, a further switch at the site gains about as much (WANDERS).
+    """
+    event = next((h for h in told.best.hypotheses if h.kind == "switch" and h in told.effects), None)
+    if told.word not in ("named", "class") or event is None:
+        return told
+    rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)
+    if search.switched_again(told.best, event) < WANDERS * (told.best.criterion - rest.criterion):
+        return told
+    why = f"{event.site} changes about as much at other times, so that it wanders"
+    return replace(told, word="abstain", certain=(), open=(), why=why)
 
 
 def late_as_well(state: State, told: Told, site: str) -> bool:

@@ -35,6 +35,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     surely_better,
     surely_worse,
     unexpected_drift,
+    unless_it_wanders,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_stretches
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
@@ -68,6 +69,7 @@ def second_opinion(state: State) -> State:
         base = search.base(before.model.parameter_values)
         told = judge(search, base, search.run(base, state.progress))
         told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
+        told = unless_it_wanders(search, base, told)
     if told.word in ("named", "class"):
         return _told(state, search, base, told)
     return _kept(state, told)
