@@ -100,12 +100,17 @@ def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
 
 
 def _unless_much_is_left(compared: Comparison) -> Comparison:
-    """The comparison, its name or class taken back where an output stays far above the error of the reference."""
+    """The comparison, its name or class taken back where it stays far above the errors of the reference.
+
+    By the geometric mean of after / usual over the outputs: a fault may well leave one output of several as it was.
+    """
     verdict = compared.verdict
-    left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0}
-    most = max(left, key=lambda name: left[name], default=None)
-    if verdict.word not in ("named", "class") or most is None or left[most] <= MUCH_LEFT:
+    left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
+    if verdict.word not in ("named", "class") or not left:
         return compared
+    if float(np.mean(np.log(list(left.values())))) <= np.log(MUCH_LEFT):
+        return compared
+    most = max(left, key=lambda name: left[name])
     why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
     return _taken_back(compared, f"{why}, so it may stand in for something else")
 
