@@ -83,7 +83,9 @@ def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_
     assert _unless_contradicted(compared, told).verdict.word == word
 
 
-@pytest.mark.parametrize(("after", "word"), [((1.1, 0.9), "named"), ((4.6, 1.2), "named"), ((3.5, 3.2), "named"), ((4.0, 4.3), "abstain")])
+@pytest.mark.parametrize(
+    ("after", "word"), [((1.1, 0.9), "named"), ((4.6, 1.2), "named"), ((3.5, 3.2), "named"), ((4.0, 4.3), "abstain")]
+)
 def test_a_name_that_leaves_four_times_the_error_of_the_reference_is_not_told(
     after: tuple[float, float], word: str
 ) -> None:
