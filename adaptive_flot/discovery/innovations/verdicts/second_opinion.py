@@ -37,7 +37,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     unexpected_drift,
     unless_it_wanders,
 )
-from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_stretches
+from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
@@ -172,10 +172,16 @@ def _another_drift(state: State, told: Told) -> bool:
 
 
 def _over_stretches(state: State, search: Search, base: Explanation, best: Explanation) -> tuple[OutputChange, ...]:
-    """Errors over the stretches of the report split, or of a record of its own that reports."""
+    """Errors over the stretches of the report split, or of a record of its own that reports.
+
+    Over all rows, each held out once, where an event is not on in those: they can not tell whether it is there.
+    """
     problem = state.known_problem
     held_out = np.isin(search.record.time, problem.record.time[problem.rows("report")])
     report = state.report_record
+    on = is_on(best, search.record.time) if any(h.kind == "switch" for h in best.hypotheses) else held_out
+    if on.any() and not (on & held_out).any():
+        return errors_over_folds(search, base, best)
     report = searchable(report, search.model) if report is not None else None
     if report is None and not held_out.any():
         return ()

@@ -68,6 +68,17 @@ def usual_over_folds(search: Search, explanation: Explanation) -> dict[str, floa
     return {search.model.outputs[c].name: float(e) for c, e in zip(search.columns, found, strict=True)}
 
 
+def is_on(explanation: Explanation, time: FloatArray) -> BoolArray:
+    """Rows in which an event of an explanation is on, by their times (N,) [s]."""
+    on = np.zeros(len(time), dtype=bool)
+    for h in explanation.hypotheses:
+        told = h.effect.coefficients if h.kind == "switch" else {}
+        for name in (c for c in told if c.startswith("on_")):
+            begin = told[name]
+            on |= (time >= begin) & (time < begin + told[name.replace("on_", "for_")])
+    return on
+
+
 def _over_folds(search: Search, explanation: Explanation) -> FloatArray:
     """Squared errors on all tenths, one below the other (rows, m)."""
     tenths, half = _tenths(len(search.record)), OF_A_RECORD // 2

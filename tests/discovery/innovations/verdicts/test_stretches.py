@@ -1,14 +1,17 @@
 """Errors on held-out stretches: what wanders before a stretch is not in them, and no row of one fits anything."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.changes import find_changes
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches
-from adaptive_flot.greybox import Dataset
+from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
+from adaptive_flot.greybox import Dataset, Effect
 from tests.discovery.innovations.late_tank import DT, TIME, model
 
 NOISE, DEAD = 0.01, 0.3
@@ -77,3 +80,15 @@ def test_a_pump_that_rests_near_zero_is_told_beside_what_wanders() -> None:
     )
     (error,) = compared.verdict.error
     assert error.after < 0.5 * error.before
+
+
+def test_rows_in_which_an_event_is_on_are_those_between_its_times() -> None:
+    """Two pulses, the second for good; what lasts is no event."""
+    told = {"on_1": 20.0, "for_1": 15.0, "on_2": 70.0, "for_2": FOREVER}
+    effect = Effect("pump", "time", "switch", told, {"count": 2.0, "width": 0.1}, mode="offset")
+    event = Hypothesis("pump", "time", "switch", effect, ("amplitude",), ({},))
+    lasting = Hypothesis("gauge", "constant", "offset", Effect("gauge", "constant", "shift"), ("amplitude",), ({},))
+    explanation: Any = SimpleNamespace(hypotheses=(lasting, event))
+    time = np.arange(0.0, 100.0, 10.0)
+    np.testing.assert_array_equal(time[is_on(explanation, time)], [20.0, 30.0, 70.0, 80.0, 90.0])
+    assert not is_on(SimpleNamespace(hypotheses=(lasting,)), time).any()  # type: ignore[arg-type]
