@@ -21,11 +21,13 @@ def change(interval: tuple[float, float], after: float) -> OutputChange:
 
 def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over: OutputChange) -> Judgement:
     """What is told beside a free run that has a curve in time for its best, told or not, with an error of 0.02."""
-    fit = SimpleNamespace(loss=0.0, bic=0.0, model=None)
+    fit: Any = SimpleNamespace(loss=0.0, bic=0.0, model=None)
+    fit.with_sizes = lambda values, covariance: fit
     h = SimpleNamespace(site="valve", driver="own_value", label="valve leaks")
+    best = SimpleNamespace(hypotheses=(h,), criterion=10.0, fit=SimpleNamespace(rows=np.zeros(50)))
     told: Any = SimpleNamespace(
-        word="named", effects=(h,), open=(), best=SimpleNamespace(hypotheses=(h,)), sites=frozenset(["valve"]), why=""
-    )
+        word="named", effects=(h,), open=(), best=best, sites=frozenset(["valve"]), why=""
+    )  # fmt: skip
     monkeypatch.setattr(asking, "_free_run", lambda *a: fit)
     monkeypatch.setattr(asking, "report_errors", lambda *a: (free,))
     monkeypatch.setattr(asking, "noise_from_row_to_row", lambda *a: np.array([NOISE]))
@@ -38,7 +40,7 @@ def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over
         judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
         known_problem=None, refitted=(fit, fit), searched=(None, fit),
     )  # fmt: skip
-    search: Any = None
+    search: Any = SimpleNamespace(sizes=lambda explanation: ({}, np.zeros((0, 0))))
     found: Judgement = asking._told(state, search, told.best, told).judgement  # type: ignore[assignment]
     return found
 
