@@ -45,6 +45,10 @@ def test_an_event_is_not_told_where_no_error_is_unusual(share: float, monkeypatc
         return replace(verdict, error=tuple(replace(c, noise=share * c.before) for c in verdict.error))
 
     monkeypatch.setattr("adaptive_flot.discovery.innovations.verdicts.event.verdict_of", as_noisy)
+    # neither in a free run nor over stretches
+    monkeypatch.setattr(
+        "adaptive_flot.discovery.innovations.verdicts.cause.usual_over_folds", lambda *given: {"thermometer": 10.0}
+    )
     verdict = find_changes(model(), [record(seed=3)], [record((), seed=2)]).verdict
     assert all(e.effect.form != "switch" for e in verdict.effects)
     assert not any(note.startswith("Over the whole record") for note in verdict.notes)
