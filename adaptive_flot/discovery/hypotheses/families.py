@@ -75,6 +75,12 @@ class Hypothesis:
         return tuple(self.effect.parameter(c) for c in self.free)
 
     @property
+    def pulses(self) -> tuple[tuple[float, float], ...]:
+        """When a switch is on and for how long [s], FOREVER where it stays; none of anything else."""
+        told = self.effect.coefficients if self.kind == "switch" else {}
+        return tuple((told[c], told[c.replace("on_", "for_")]) for c in told if c.startswith("on_"))
+
+    @property
     def label(self) -> str:
         """Name in tables: ``heating_valve leaks``."""
         by = f" by {self.driver}" if self.kind in ("depends", "store") else ""

@@ -131,9 +131,8 @@ def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hyp
 
 
 def _follows_an_input(search: Search, event: Hypothesis) -> bool:
-    record, told, edges = search.record, event.effect.coefficients, list[float]()
-    for name in (c for c in told if c.startswith("on_")):
-        begin, long = told[name], told[name.replace("on_", "for_")]
+    record, edges = search.record, list[float]()
+    for begin, long in event.pulses:
         edges += [begin, begin + long] if long < FOREVER else [begin]
     rows = np.searchsorted(record.time, np.array(edges) - record.dt / 4)
     inside = rows[(rows > 0) & (rows < len(record))]
@@ -268,13 +267,18 @@ def _adequate(search: Search, explanation: Explanation) -> bool:
     return float(np.max(np.nanmedian(np.sqrt(fit.filtered.variance), axis=0) / r)) <= ADEQUATE
 
 
+def block_sums(gain: FloatArray) -> FloatArray:
+    """Sums of values (N,) over blocks of BLOCK rows, four at least (k,)."""
+    return np.array([b.sum() for b in np.array_split(gain, max(len(gain) // BLOCK, 4))])
+
+
 def low_end(gain: FloatArray, numbers: int = 0, effects: int = 0) -> float:
     """Lower end of the 95 % interval of a sum over rows (N,) by the block bootstrap.
 
     Less k / 2 log n for k numbers, and LEAST_GAIN for each effect.
     """
     counted = gain[gain != 0]
-    blocks = np.array([b.sum() for b in np.array_split(gain, max(len(gain) // BLOCK, 4))])
+    blocks = block_sums(gain)
     charge = (numbers / 2 * float(np.log(max(len(counted), 2))) + LEAST_GAIN * effects) / len(blocks)
     if not blocks.std() > 0:
         return float((blocks - charge).sum())

@@ -28,10 +28,8 @@ def row_by_row(function: ca.Function, carried: Mapping[str, str], held: Collecti
 
     Parameters
     ----------
-    function
-        An SX function with column vectors; what is carried may be a matrix (n, m).
-    carried
-        Result that takes the place of each carried argument in the next row, by the argument's name.
+    function, carried
+        As `Recursion` has them.
     held
         Names of arguments that are the same in all rows.
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.innovations.judge import BLOCK
+from adaptive_flot.discovery.innovations.judge import block_sums
 from adaptive_flot.discovery.innovations.search import Explanation
 from adaptive_flot.discovery.results import Alternative
 
@@ -26,8 +26,7 @@ def alternative(explanation: Explanation, fit: Fit, before: Fit, best: Explanati
         Fits of a free run with its effects, and of the model as it is.
     """
     names = tuple((h.site, h.driver) for h in explanation.hypotheses)
-    lead = best.fit.rows - explanation.fit.rows
-    blocks = np.array([b.sum() for b in np.array_split(lead, max(len(lead) // BLOCK, 4))])
+    blocks = block_sums(best.fit.rows - explanation.fit.rows)
     return Alternative(
         names,
         (True,) * len(names),

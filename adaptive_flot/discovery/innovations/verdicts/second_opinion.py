@@ -145,6 +145,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     _, result = state.searched
     members = [e for e, _ in told.open]
     rivals = others(told.best, members, lambda e: _free_run(state, search, e, before), before)
+    # members are near by what the innovations form has compared, whatever the difference of their criteria
     return replace(
         state,
         search=replace(result, alternatives=(best, *rivals), verification=None),

@@ -72,10 +72,8 @@ def is_on(explanation: Explanation, time: FloatArray) -> BoolArray:
     """Rows in which an event of an explanation is on, by their times (N,) [s]."""
     on = np.zeros(len(time), dtype=bool)
     for h in explanation.hypotheses:
-        told = h.effect.coefficients if h.kind == "switch" else {}
-        for name in (c for c in told if c.startswith("on_")):
-            begin = told[name]
-            on |= (time >= begin) & (time < begin + told[name.replace("on_", "for_")])
+        for begin, long in h.pulses:
+            on |= (time >= begin) & (time < begin + long)
     return on
 
 

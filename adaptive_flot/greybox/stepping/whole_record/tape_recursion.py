@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError, load_library
+from adaptive_flot.greybox.stepping.compiled import load_library
 from adaptive_flot.greybox.stepping.whole_record.library import LIBRARY_FLAGS, TapeStruct
 from adaptive_flot.greybox.stepping.whole_record.source import RECURSION_SOURCE
 from adaptive_flot.greybox.stepping.whole_record.tape import tape_of
@@ -102,6 +102,3 @@ def _open(library: Path) -> Any:
     recur.argtypes = [pointer, whole, whole, whole, pointer, pointer, pointer, whole, pointer, pointer]
     recur.restype = None
     return recur
-
-
-__all__ = ["CompileError", "TapeRecursion"]
