@@ -27,6 +27,7 @@ from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import FAR_ABOVE
+from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -60,7 +61,7 @@ def find_changes(
         return _unless_much_is_left(compared)
     reference = max(references, key=len)
     with np.errstate(all="ignore"):
-        search, base, told, before = _with_process_noise(compared, records[0], reference, processes, progress)
+        search, base, told, sole, before = _with_process_noise(compared, records[0], reference, processes, progress)
         seconds = time.perf_counter() - began
         with_it = compared
         if _has_event(told):
@@ -70,6 +71,8 @@ def find_changes(
                 with_it = with_cause(compared, search, base, told, before, seconds, unusual=True)
         elif _leaves_more(compared.verdict):
             with_it = with_cause(compared, search, base, told, before, seconds)
+            if with_it is compared and sole is not None:
+                with_it = with_cause(compared, search, base, sole, before, seconds)
     return _unless_much_is_left(with_it if with_it is not compared else _unless_contradicted(compared, told))
 
 
@@ -131,8 +134,11 @@ def _taken_back(compared: Comparison, why: str) -> Comparison:
 
 def _with_process_noise(
     compared: Comparison, record: Dataset, reference: Dataset, processes: int, progress: Callable[[str], None]
-) -> tuple[Search, Explanation, Told, tuple[Search, Explanation]]:
-    """What has changed, by a model that has what the reference lacks; both searches with the model as it is."""
+) -> tuple[Search, Explanation, Told, Told | None, tuple[Search, Explanation]]:
+    """What has changed, by a model that has what the reference lacks; both searches with the model as it is.
+
+    Of explanations of two effects also what is certain alone.
+    """
     calibration, columns = compared.calibration, compared.rows.columns
     constants, model = calibration.constants, calibration.model
     floor = noise_floor([reference], columns)
@@ -147,10 +153,11 @@ def _with_process_noise(
     progress("events in the new record")
     search = Search(extended, record, columns, floor, constants.names, known, processes)
     base = search.base(extended.parameter_values)
-    told = judge(search, base, search.run(base, progress))
+    found = search.run(base, progress)
     before = replace(before, model=extended)
     there = before.base(extended.parameter_values)
-    return search, base, _changed(told, search, before, there), (before, there)
+    told = _changed(judge(search, base, found), search, before, there)
+    return search, base, told, sole_cause(search, base, found, told), (before, there)
 
 
 def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:

@@ -18,6 +18,8 @@ from adaptive_flot.greybox.scope import Site
 
 ONSETS = 18
 """Steps at this many onsets score an event in time."""
+EDGE = 1e-3
+"""Width of the edge of a step, as a share of the record: a fit has to see which way to move it."""
 TIME_KNOTS = 7
 DRIVER_KNOTS = 4
 FINE_KNOTS = 8
@@ -142,7 +144,7 @@ def event(site: Site, form: str, time: FloatArray, onset: float, length: float, 
     start: tuple[tuple[str, float], ...] = (("onset", onset),)
     if form == "step":
         values = (time >= onset).astype(float)
-        settings["width"] = max(2.0, float(time[-1] - time[0]) / 1000)
+        settings["width"] = EDGE * float(time[-1] - time[0])
     elif form == "ramp":
         values = np.minimum(since / length, 1)
         start += (("duration", length),)

@@ -14,12 +14,16 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.scope import Site
 
-LAGS_S = (5.0, 15.0, 45.0, 120.0)
+LAGS = (1.5, 5.0, 15.0, 45.0, 120.0)
+"""Time constants that are tried, in sampling intervals."""
+LONGEST_LAG = 0.1
+"""Longest of them, as a share of the record."""
 SECOND_LAG = 0.5
 """The second of two lags in a row starts at this share of the first."""
-LEAST_FOLLOW_S = 2.0
-"""Time constant of a valve that has come loose; where rows are further apart, their distance."""
-DELAYS_S = (10.0, 30.0, 60.0, 120.0, 240.0)
+FOLLOWS = 1.0
+"""Time constant of a valve that has come loose, or of a relay, in sampling intervals."""
+DELAYS = (3.0, 10.0, 30.0, 60.0, 120.0, 240.0)
+"""Dead times that are tried, in sampling intervals."""
 LONGEST_DELAY = 0.2
 """Longest dead time that is tried, as a share of the record."""
 LIMIT_QUANTILES = (0.6, 0.75, 0.9)
@@ -38,8 +42,8 @@ def late(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
         yield from _delayed(site, responses)
         return
     v, scale = _asked(site, responses)
-    dt = responses.problem.record.dt
-    for constant in LAGS_S:
+    dt, time = responses.problem.record.dt, responses.problem.record.time
+    for constant in (n * dt for n in LAGS if n * dt <= LONGEST_LAG * (time[-1] - time[0])):
         once = _first_order(v, float(np.exp(-dt / constant)))
         effect = Effect(site.name, "lag", "lag", settings={"scale": scale})
         start = (("time_constant", constant),)
@@ -66,9 +70,9 @@ def _asked(site: Site, responses: Responses) -> tuple[FloatArray, float]:
 def _delayed(site: Site, responses: Responses) -> Iterator[Variant]:
     v, scale = _asked(site, responses)
     effect = Effect(site.name, "delay", "delay", settings={"scale": scale})
-    time = responses.problem.record.time
-    for dead_time in (d for d in DELAYS_S if d <= LONGEST_DELAY * (time[-1] - time[0])):
-        rows = max(1, round(dead_time / responses.problem.record.dt))
+    dt, time = responses.problem.record.dt, responses.problem.record.time
+    for dead_time in (n * dt for n in DELAYS if n * dt <= LONGEST_DELAY * (time[-1] - time[0])):
+        rows = round(dead_time / dt)
         delayed = np.concatenate([np.full(rows, v[0]), v[:-rows]])
         yield Variant(effect, (TimeProfile(site.name, delayed - v, True),), ("amplitude",), (("dead_time", dead_time),))
 
@@ -90,7 +94,7 @@ def limited(site: Site, responses: Responses) -> Iterator[Variant]:
 def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
     """An actuator that follows only when the demand leaves a band around where it stands."""
     v, scale = _asked(site, responses)
-    settings = {"scale": scale, "follow_s": max(LEAST_FOLLOW_S, responses.problem.record.dt)}
+    settings = {"scale": scale, "follow_s": FOLLOWS * responses.problem.record.dt}
     for share in BANDS:
         band = share * float(np.std(v))
         if band > 0:

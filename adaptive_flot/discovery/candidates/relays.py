@@ -19,7 +19,7 @@ from itertools import combinations
 
 import numpy as np
 
-from adaptive_flot.discovery.candidates.dynamics import LEAST_FOLLOW_S
+from adaptive_flot.discovery.candidates.dynamics import FOLLOWS
 from adaptive_flot.discovery.candidates.responses import TimeProfile
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.variant import Variant
@@ -123,7 +123,7 @@ def _best(scorer: Scorer, score: Score, pairs: Sequence[Thresholds]) -> tuple[Th
 def _variant(scorer: Scorer, score: Score, start: dict[str, float]) -> Variant:
     site, driver = score.candidate.site, score.candidate.driver
     is_on = course(scorer.drivers[driver], start["on_above"], start["off_below"])
-    effect = Effect(site.name, driver, RELAY, settings={"follow_s": max(LEAST_FOLLOW_S, scorer.problem.record.dt)})
+    effect = Effect(site.name, driver, RELAY, settings={"follow_s": FOLLOWS * scorer.problem.record.dt})
     profile = TimeProfile(site.name, is_on.astype(float), site.mode == "offset")
     shape = ("on_above", start["on_above"]), ("off_below", start["off_below"])
     return Variant(effect, (profile,), ("amplitude",), shape)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.candidates.catalogue import ONSETS, event
+from adaptive_flot.discovery.candidates.catalogue import EDGE, ONSETS, event
 from adaptive_flot.discovery.candidates.knots import MOST_KNOTS, is_even
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.spline import drawn, knots_of, through
@@ -105,7 +105,7 @@ def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
     if length is None or length > SUDDEN * span:
         return None
     (amplitude,), (onset,) = fitted.levels, fitted.values(CoefficientRole.ONSET)
-    return _event(score, "step", amplitude, (("onset", onset + length / 2),), fitted, {"width": max(2.0, span / 1000)})
+    return _event(score, "step", amplitude, (("onset", onset + length / 2),), fitted, {"width": EDGE * span})
 
 
 def _event(

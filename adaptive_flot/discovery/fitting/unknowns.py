@@ -59,7 +59,7 @@ class Unknowns:
         self.base = np.array([start.get(p.name, p.value) for p in model.parameters])
         self.x0 = self._first_state(like)
         self.q = len(self.names)
-        sized = coefficient_scales(model, problem.site_sizes)
+        sized = coefficient_scales(model, problem.site_sizes, problem.record.dt)
         self.scale = np.array([sized.get(p.name, p.scale) for p in parameters])
         low = [max(p.lower, bounds.get(p.name, (-np.inf, np.inf))[0]) for p in parameters]
         high = [min(p.upper, bounds.get(p.name, (-np.inf, np.inf))[1]) for p in parameters]
@@ -152,10 +152,11 @@ class Unknowns:
         return np.hstack([np.zeros((len(self.x0), self.q)), self.directions])
 
 
-def coefficient_scales(model: Model, sizes: Mapping[str, float]) -> dict[str, float]:
-    """Scale of each coefficient that is given in the unit of its site, by full name: an ordinary change there.
+def coefficient_scales(model: Model, sizes: Mapping[str, float], dt: float) -> dict[str, float]:
+    """Scale of each time, and of each coefficient in the unit of its site, by full name: an ordinary change there.
 
-    A form knows neither its site nor its unit: a tenth of a kelvin may be much, a tenth of a watt is nothing.
+    A form knows neither its site nor its unit: a tenth of a kelvin may be much, a tenth of a watt is nothing. Its times
+    are those of a process with a row a second; of another they count in sampling intervals (`dt` [s]).
     """
     modes = {site.name: site.mode for site in model.sites}
     scales = {}
@@ -164,6 +165,8 @@ def coefficient_scales(model: Model, sizes: Mapping[str, float]) -> dict[str, fl
         for c in effect.terms:
             if size > 0 and (c.unit == "value" or (c.unit == "g" and offset)):
                 scales[effect.parameter(c.name)] = size
+            elif c.unit == "s":
+                scales[effect.parameter(c.name)] = c.scale * dt
     return scales
 
 

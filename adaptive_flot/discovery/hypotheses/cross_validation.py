@@ -11,7 +11,7 @@ from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.fit import MOST_EVALUATIONS, JointFit, JointFitter
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, first_states, stores_at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, BoolArray, Rows
-from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.model import FloatArray, Model, Parameter
 
 FOLDS = 5
 """Stretches of a record that are left out in turn."""
@@ -209,20 +209,20 @@ def _step(fitter: JointFitter, whole: JointFit) -> FloatArray:
 
 
 def model_with(model: Model, hypothesis: Hypothesis | None) -> Model:
-    """Return the model with a hypothesis, its coefficients kept inside its own limits."""
+    """Return the model with a hypothesis, its coefficients with its own limits and scales."""
     if hypothesis is None:
         return model
     extended = model.with_effects([hypothesis.effect])
     limits = {hypothesis.effect.parameter(c): ends for c, ends in hypothesis.limits.items()}
-    if not limits:
+    scales = {hypothesis.effect.parameter(c): scale for c, scale in hypothesis.scales.items() if scale > 0}
+    if not limits and not scales:
         return extended
-    parameters = tuple(
-        replace(p, lower=max(p.lower, limits[p.name][0]), upper=min(p.upper, limits[p.name][1]))
-        if p.name in limits
-        else p
-        for p in extended.parameters
-    )
-    return replace(extended, parameters=parameters)
+
+    def own(p: Parameter) -> Parameter:
+        low, high = limits.get(p.name, (p.lower, p.upper))
+        return replace(p, lower=max(p.lower, low), upper=min(p.upper, high), scale=scales.get(p.name, p.scale))
+
+    return replace(extended, parameters=tuple(map(own, extended.parameters)))
 
 
 def _first_fit(

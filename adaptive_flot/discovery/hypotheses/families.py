@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
@@ -22,6 +22,8 @@ LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Levels at which a part may be stuck or leak, as shares of the range that its signal has been seen in."""
 GAINS = (-2.0, -0.7, -0.2, 0.2, 0.7)
 """Starts of a constant factor, in its logarithm."""
+STORES = (20.0, 100.0)
+"""Time constants of a hidden store to start from, in sampling intervals."""
 LAGS = (2.0, 10.0, 50.0)
 """Starts of a time constant, in sampling intervals. A slower sensor would show next to nothing of what happens."""
 SLOPES = (-0.3, 0.3)
@@ -35,6 +37,8 @@ WIDEST_OFFSET = 0.5
 has failed, which reads otherwise."""
 LONGEST_LAG = 0.1
 """Longest time constant of a sensor, as a share of a record."""
+MATTERS = 0.1
+"""A change that matters, as a share of the range of a value: the scale of a fit."""
 LEAST_MOVE = 1e-3
 """A driver that moves by a smaller share of its size can not be told from a constant."""
 ROUNDING = 1e-3
@@ -59,6 +63,8 @@ class Hypothesis:
         Values of these to start from; the best few are refined.
     limits
         Range of coefficients that is narrower than their form's.
+    scales
+        Size of a change of a coefficient that matters, where its form, which knows no unit, can not say it.
     """
 
     site: str
@@ -68,11 +74,22 @@ class Hypothesis:
     free: tuple[str, ...]
     starts: tuple[Mapping[str, float], ...]
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Full names of the fitted coefficients."""
         return tuple(self.effect.parameter(c) for c in self.free)
+
+    def with_scales(self, values: Mapping[str, float], mode: Mode) -> Hypothesis:
+        """The same; a coefficient in seconds or in the unit of its site has the size of its value for a scale.
+
+        Not where it has a scale, or is 0. Changes by a factor are as large at any site; `mode` is how effects act there
+        by default.
+        """
+        own_unit = {"s", "value", "value/driver"} | ({"g"} if (self.effect.mode or mode) == "offset" else set())
+        sizes = {c.name: abs(values[c.name]) for c in self.effect.terms if c.unit in own_unit and c.name in values}
+        return replace(self, scales={**{name: size for name, size in sizes.items() if size > 0}, **self.scales})
 
     @property
     def pulses(self) -> tuple[tuple[float, float], ...]:
@@ -124,10 +141,8 @@ def _at_site(
         if low < 0 < high or low >= 0:
             yield _sign(site, spread)
         yield _frozen(site, low, spread)
-        lag = _lag(site, size, dt, LONGEST_LAG * duration)
-        shortest = next(c.lower for c in lag.effect.terms if c.name == "time_constant")
-        if shortest < LONGEST_LAG * duration:
-            yield lag
+        if dt < LONGEST_LAG * duration:
+            yield _lag(site, size, dt, LONGEST_LAG * duration)
         yield _span(site, float(np.median(v)), spread)
     if size > 0 and site.role != "sensor":
         yield _gain(site)
@@ -146,20 +161,19 @@ def _at_site(
 
 def _stuck_or_leaking(site: Site, low: float, spread: float) -> Iterator[Hypothesis]:
     levels, seen = tuple({"level": low + share * spread} for share in LEVELS), {"level": (low, low + spread)}
-    stuck = Effect(site.name, "own_value", "stuck", {"amplitude": 1.0})
-    yield Hypothesis(site.name, "own_value", "stuck", stuck, ("level",), levels, seen)
+    stuck, size = Effect(site.name, "own_value", "stuck", {"amplitude": 1.0}), {"level": MATTERS * spread}
+    yield Hypothesis(site.name, "own_value", "stuck", stuck, ("level",), levels, seen, size)
     effect = Effect(
         site.name, "own_value", "leak", {"amplitude": 1.0, "level": low}, {"width": ROUNDING * spread}
     )  # fmt: skip
-    yield Hypothesis(site.name, "own_value", "leaks", effect, ("level",), levels[1:], seen)
+    yield Hypothesis(site.name, "own_value", "leaks", effect, ("level",), levels[1:], seen, size)
 
 
 def _frozen(site: Site, low: float, spread: float) -> Hypothesis:
     """A sensor that has stopped; its level may be anywhere."""
     effect = Effect(site.name, "own_value", "stuck", {"amplitude": 1.0})
-    return Hypothesis(
-        site.name, "own_value", "stuck", effect, ("level",), tuple({"level": low + s * spread} for s in LEVELS)
-    )
+    starts = tuple({"level": low + s * spread} for s in LEVELS)
+    return Hypothesis(site.name, "own_value", "stuck", effect, ("level",), starts, {}, {"level": MATTERS * spread})
 
 
 def _limited(site: Site, low: float, spread: float) -> Hypothesis:
@@ -174,6 +188,7 @@ def _limited(site: Site, low: float, spread: float) -> Hypothesis:
         ("limit",),
         tuple({"limit": low + s * spread} for s in (0.3, 0.6, 0.9)),
         {"limit": (low, low + spread)},
+        {"limit": MATTERS * spread},
     )
 
 
@@ -185,8 +200,8 @@ def _sign(site: Site, spread: float) -> Hypothesis:
 def _lag(site: Site, size: float, dt: float, longest: float) -> Hypothesis:
     effect = Effect(site.name, "lag", "lag", {"amplitude": 1.0}, {"scale": size or 1.0})
     starts = tuple({"time_constant": n * dt} for n in LAGS)
-    limits = {"time_constant": (0.0, longest)}
-    return Hypothesis(site.name, "lag", "lag", effect, ("time_constant",), starts, limits)
+    limits, scales = {"time_constant": (dt, longest)}, {"time_constant": LAGS[1] * dt}
+    return Hypothesis(site.name, "lag", "lag", effect, ("time_constant",), starts, limits, scales)
 
 
 def span_limits(spread: float) -> dict[str, tuple[float, float]]:
@@ -202,7 +217,16 @@ def offset_limits(spread: float) -> dict[str, tuple[float, float]]:
 def _span(site: Site, middle: float, spread: float) -> Hypothesis:
     effect = Effect(site.name, "own_value", "span", settings={"middle": middle})
     starts = tuple({"offset": o * spread, "slope": s} for o in (-0.3, 0.3) for s in (-0.2, 0.2))
-    return Hypothesis(site.name, "own_value", "span", effect, ("offset", "slope"), starts, span_limits(spread))
+    return Hypothesis(
+        site.name,
+        "own_value",
+        "span",
+        effect,
+        ("offset", "slope"),
+        starts,
+        span_limits(spread),
+        {"offset": MATTERS * spread},
+    )
 
 
 def _gain(site: Site) -> Hypothesis:
@@ -213,7 +237,16 @@ def _gain(site: Site) -> Hypothesis:
 def _offset(site: Site, spread: float) -> Hypothesis:
     effect = Effect(site.name, "constant", "shift", mode="offset")
     starts = tuple({"amplitude": s * spread} for s in (-0.3, 0.3))
-    return Hypothesis(site.name, "constant", "offset", effect, ("amplitude",), starts, offset_limits(spread))
+    return Hypothesis(
+        site.name,
+        "constant",
+        "offset",
+        effect,
+        ("amplitude",),
+        starts,
+        offset_limits(spread),
+        {"amplitude": MATTERS * spread},
+    )
 
 
 def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:
@@ -225,5 +258,6 @@ def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:
 
 def _store(site: Site, state: str, moved: float, size: float, dt: float) -> Hypothesis:
     effect = Effect(site.name, state, "store")
-    starts = tuple({"exchange": 0.3 * size / moved, "time_constant": n * dt} for n in (20.0, 100.0))
-    return Hypothesis(site.name, state, "store", effect, ("exchange", "time_constant"), starts)
+    starts = tuple({"exchange": 0.3 * size / moved, "time_constant": n * dt} for n in STORES)
+    scales = {"exchange": size / moved, "time_constant": STORES[-1] * dt}
+    return Hypothesis(site.name, state, "store", effect, ("exchange", "time_constant"), starts, {}, scales)

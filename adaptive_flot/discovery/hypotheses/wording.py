@@ -24,6 +24,11 @@ WITHOUT_SIZE = {
 """What is said of an alternative of the free run, by what it depends on."""
 
 
+def clock(time: float) -> str:
+    """A time [s]: whole seconds, and three digits below a hundred."""
+    return f"{time:.0f}" if abs(time) >= 100 else f"{time:.3g}"
+
+
 def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     """One sentence without its full stop: what is the matter and by how much.
 
@@ -122,9 +127,10 @@ def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -
     else:
         rest = f"is {_factor(size)}"
     if lasting:
-        return f"{rest} from {on[0]:.0f} s on"
+        return f"{rest} from {clock(on[0])} s on"
     times = [
-        f"{a:.0f}-{a + d:.0f} s" if d < FOREVER else f"from {a:.0f} s on" for a, d in zip(on, duration, strict=True)
+        f"{clock(a)}-{clock(a + d)} s" if d < FOREVER else f"from {clock(a)} s on"
+        for a, d in zip(on, duration, strict=True)
     ]
     listed = ", ".join(times[:MOST_TIMES]) + (f" and {len(times) - MOST_TIMES} more" if len(times) > MOST_TIMES else "")
     return f"{rest} while something is switched: {listed}"

@@ -12,6 +12,7 @@ from adaptive_flot.discovery.candidates.dynamics import dragged
 from adaptive_flot.discovery.hypotheses.families import (
     ENDS,
     LEAST_MOVE,
+    MATTERS,
     ROUNDING,
     Hypothesis,
     Kind,
@@ -143,12 +144,12 @@ def _stuck_or_late(site: str, v: FloatArray, size: float, dt: float) -> Iterator
     """What a sensor and an actuator have in common: one level for all that is asked, or a lag."""
     for level in v.min() + LEVELS * np.ptp(v):
         told = {"amplitude": 1.0, "level": float(level)}
-        yield _fixed(Effect(site, "own_value", "stuck", told), "stuck", "level", level - v)
+        yield _fixed(Effect(site, "own_value", "stuck", told), "stuck", "level", level - v, MATTERS * float(np.ptp(v)))
     for tau in (intervals * dt for intervals in LAGS):
-        if 1.0 <= tau <= LONGEST * len(v) * dt:
+        if tau <= LONGEST * len(v) * dt:
             told = {"amplitude": 1.0, "time_constant": tau}
             effect = Effect(site, "lag", "lag", told, {"scale": size or 1.0})
-            yield _fixed(effect, "lag", "time_constant", _lagged(v, tau, dt) - v)
+            yield _fixed(effect, "lag", "time_constant", _lagged(v, tau, dt) - v, tau)
 
 
 def _leaks_or_ends(site: str, v: FloatArray) -> Iterator[Suspect]:
@@ -157,10 +158,18 @@ def _leaks_or_ends(site: str, v: FloatArray) -> Iterator[Suspect]:
     width = {"width": ROUNDING * spread}
     for level in low + LEVELS[1:] * spread:
         told = {"amplitude": 1.0, "level": float(level)}
-        yield _fixed(Effect(site, "own_value", "leak", told, width), "leaks", "level", np.maximum(v, level) - v)
+        yield _fixed(
+            Effect(site, "own_value", "leak", told, width), "leaks", "level", np.maximum(v, level) - v, MATTERS * spread
+        )
     for limit in low + LEVELS[1:-1] * spread:
         told = {"amplitude": 1.0, "limit": float(limit)}
-        yield _fixed(Effect(site, "saturation", "saturation", told, width), "range", "limit", np.minimum(v, limit) - v)
+        yield _fixed(
+            Effect(site, "saturation", "saturation", told, width),
+            "range",
+            "limit",
+            np.minimum(v, limit) - v,
+            MATTERS * spread,
+        )
 
 
 def _sticks_or_idles(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
@@ -169,11 +178,19 @@ def _sticks_or_idles(site: str, v: FloatArray, size: float, dt: float) -> Iterat
     settings = {"scale": size or 1.0, "follow_s": FOLLOWS * dt}
     for band in (share * spread for share in BANDS):
         told = {"amplitude": 1.0, "band": band}
-        yield _fixed(Effect(site, "lag", "stiction", told, settings), "hysteresis", "band", dragged(v, band) - v)
+        yield _fixed(
+            Effect(site, "lag", "stiction", told, settings),
+            "hysteresis",
+            "band",
+            dragged(v, band) - v,
+            MATTERS * spread,
+        )
         if v.min() < 0 < v.max():
             told = {"amplitude": 1.0, "centre": 0.0, "half_width": band}
             course = -np.clip(v, -band, band)
-            yield _fixed(Effect(site, "own_value", "dead_zone", told), "dead zone", "half_width", course)
+            yield _fixed(
+                Effect(site, "own_value", "dead_zone", told), "dead zone", "half_width", course, MATTERS * spread
+            )
 
 
 def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:
@@ -181,7 +198,7 @@ def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:
     spread = float(np.ptp(v))
     if v.min() < 0 < v.max():
         effect = Effect(site, "own_value", "rectified", {"amplitude": 1.0}, {"width": ROUNDING * spread})
-        yield _fixed(effect, "sign", "amplitude", np.abs(v) - v)
+        yield _fixed(effect, "sign", "amplitude", np.abs(v) - v, 1.0)
     middle = float(np.median(v))
     effect = Effect(site, "own_value", "span", settings={"middle": middle})
     hypothesis = Hypothesis(site, "own_value", "span", effect, ("offset", "slope"), ({},), span_limits(spread))
@@ -236,9 +253,9 @@ def _stores(site: Site, state: str, x: FloatArray, v: FloatArray, dt: float) -> 
         )  # fmt: skip
 
 
-def _fixed(effect: Effect, kind: Kind, fitted: str, course: FloatArray) -> Suspect:
-    """A change that is all or nothing; one number of its shape is fitted, or its amplitude."""
-    hypothesis = Hypothesis(effect.site, effect.driver, kind, effect, (fitted,), ({},))
+def _fixed(effect: Effect, kind: Kind, fitted: str, course: FloatArray, scale: float) -> Suspect:
+    """A change that is all or nothing; one number of its shape is fitted, of a scale, or its amplitude."""
+    hypothesis = Hypothesis(effect.site, effect.driver, kind, effect, (fitted,), ({},), {}, {fitted: scale})
     return Suspect(hypothesis, course[:, None], (), 1)
 
 

@@ -161,7 +161,7 @@ def _told(
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
         named = _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
-        return _late_anywhere(search, base, named)
+        return late_anywhere(search, base, named)
     # "one of these" is true where each explanation has one effect beside what is certain, and not where it has two
     one_open = all(len(e.hypotheses) == len(certain) + 1 for e in alike)
     if 2 <= len(members) <= LARGEST_CLASS and one_open:
@@ -192,10 +192,10 @@ def _certain_alone(search: Search, base: Explanation, told: Told, without: Mappi
     rest = without[open_ones[0].label]
     if best.criterion - rest.criterion >= SMALL * (best.criterion - base.criterion):
         return told
-    return _late_anywhere(search, base, replace(told, word="named", best=rest, open=()))
+    return late_anywhere(search, base, replace(told, word="named", best=rest, open=()))
 
 
-def _late_anywhere(search: Search, base: Explanation, told: Told) -> Told:
+def late_anywhere(search: Search, base: Explanation, told: Told) -> Told:
     """A lag that is named, as a class with each other place where it explains about as much (see `late_where`)."""
     least = SAME_LAG * (told.best.criterion - base.criterion)
     return late_where(search, told, lambda e, _: e.criterion - base.criterion >= least)

@@ -18,7 +18,7 @@ from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 
 REFITTED, SAME_SITE = 6, 2
@@ -155,6 +155,10 @@ class Search:
         refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
 
+    @property
+    def _modes(self) -> dict[str, Mode]:
+        return {s.name: s.mode for s in self.model.sites}
+
     def _may(self, kind: str) -> bool:
         return self.kinds is None or kind in self.kinds
 
@@ -205,7 +209,7 @@ class Search:
             effect = Effect(site, "lag", late.effect.form, told, {"scale": size or 1.0})
             if effect.label in taken or not np.isfinite(size):
                 continue
-            moved = Hypothesis(site, "lag", late.kind, effect, late.free, ({},))
+            moved = Hypothesis(site, "lag", late.kind, effect, late.free, ({},), {}, late.scales)
             p = model_with(self.model_of(rest), moved).parameter_values
             again = self.added(rest, moved, p)
             found += [again] if np.isfinite(again.fit.log_likelihood) else []
@@ -233,7 +237,12 @@ class Search:
         model, own = self.model, list[Hypothesis]()
         for effect in effects:
             free = tuple(c.name for c in effect.terms if effect.parameter(c.name) in names)
-            own.append(Hypothesis(effect.site, effect.driver, "alternative", effect, free, ({},)))
+            told = {c: values[name] for c in free if (name := effect.parameter(c)) in values}
+            own.append(
+                Hypothesis(effect.site, effect.driver, "alternative", effect, free, ({},)).with_scales(
+                    told, self._modes[effect.site]
+                )
+            )
             model = model_with(model, own[-1])
         p = np.array([values.get(q.name, q.value) for q in model.parameters])
         fit = self.fitter(model, tuple(name for h in own for name in h.parameters)).fit(p)
@@ -242,11 +251,13 @@ class Search:
         return Explanation(tuple(own), fit, sum(map(numbers_of, own)))
 
     def _with(self, start: Explanation, screened: Screened) -> Explanation | None:
+        told = dict(zip(screened.suspect.coefficients, map(float, screened.size), strict=True))
         h = screened.suspect.hypothesis
+        h = h.with_scales({**h.effect.coefficients, **told}, self._modes[h.site])
         model = model_with(self.model_of(start), h)
         p = model.parameter_values
         p[: len(start.fit.p)] = start.fit.p
-        for name, value in zip(screened.suspect.coefficients, screened.size, strict=True):
+        for name, value in told.items():
             q = model.parameters[model.index("parameters", h.effect.parameter(name))]
             first = np.log(np.clip(1 + value, 1 / FURTHEST, FURTHEST)) if h.effect.mode == "factor" else value
             p[model.index("parameters", q.name)] = np.clip(first, q.lower, q.upper)

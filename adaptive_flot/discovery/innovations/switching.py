@@ -1,9 +1,9 @@
 """When something at a site was switched on and off: one size for all times, the times from the innovations.
 
 The response to a switch is that of the steps at its edges, so all pairs of edges are compared through one matrix of
-products. Pulses are added while they are worth their two times by the Bayesian information criterion. Then each is
-taken out and placed anew until none moves. Basseville & Nikiforov (1993), 2.6; Fearnhead & Rigaill, *J. Am. Stat.
-Assoc.* 114 (2019) 169, on changes of level that are found in order of their gain.
+products. Pulses are added, and pauses in them, while they are worth their two times by the Bayesian information
+criterion. Then each pulse is taken out and placed anew until none moves. Basseville & Nikiforov (1993), 2.6; Fearnhead
+& Rigaill, *J. Am. Stat. Assoc.* 114 (2019) 169, on changes of level that are found in order of their gain.
 """
 
 from __future__ import annotations
@@ -99,10 +99,13 @@ def best_switch(steps: FloatArray, edges: IntArray, innovations: FloatArray, cou
     chosen: list[tuple[int, int]] = []
     best = 0.0
     while len(chosen) < MOST_PULSES:
-        pulse, gain = search.best_beside(chosen)
-        if pulse is None or gain - best < WORTH * np.log(n):
+        pulse, beside = search.best_beside(chosen)
+        # two pulses and the pause between them may look like one that is longer and smaller
+        parted, inside = search.best_parted(chosen)
+        if max(beside, inside) - best < WORTH * np.log(n):
             break
-        chosen, best = search.settled([*chosen, pulse])
+        more = parted if pulse is None or inside > beside else [*chosen, pulse]
+        chosen, best = search.settled(more)
     if not chosen:
         return None
     pulses = tuple(sorted((int(ends[i]), int(ends[j])) for i, j in chosen))
@@ -140,17 +143,38 @@ class _Search:
 
     def best_beside(self, chosen: Sequence[tuple[int, int]]) -> tuple[tuple[int, int] | None, float]:
         """The pulse that explains most together with the chosen ones, and the gain of all."""
-        num, den, row = self._sums(chosen)
-        diagonal = np.diag(self.G)
-        both = num + self.b[:, None] - self.b[None, :]
-        spread = den + diagonal[:, None] + diagonal[None, :] - 2 * self.G + 2 * (row[:, None] - row[None, :])
         free = self.allowed.copy()
         for i, j in chosen:  # no overlap, not even an edge in common
             free &= (self.ends[None, :] < self.ends[i]) | (self.ends[:, None] > self.ends[j])
+        return self._best(chosen, free, 1.0)
+
+    def best_parted(self, chosen: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], float]:
+        """The chosen pulses with one of them parted by a pause, where that explains most, and the gain of all."""
+        ends = self.ends
+        free = np.zeros_like(self.allowed)
+        for i, j in chosen:
+            inner = (ends >= ends[i] + SHORTEST) & (ends <= ends[j] - SHORTEST)
+            free |= self.allowed & inner[:, None] & inner[None, :]
+        pause, gain = self._best(chosen, free, -1.0)
+        if pause is None:
+            return list(chosen), 0.0
+        a, b = pause
+        parted = [p for i, j in chosen for p in (((i, a), (b, j)) if ends[i] < ends[a] < ends[j] else ((i, j),))]
+        return parted, gain
+
+    def _best(
+        self, chosen: Sequence[tuple[int, int]], free: BoolArray, sign: float
+    ) -> tuple[tuple[int, int] | None, float]:
+        """The free pair of edges between which one more pulse, or one less, explains most, and the gain of all."""
+        if not free.any():
+            return None, 0.0
+        num, den, row = self._sums(chosen)
+        diagonal = np.diag(self.G)
+        both = num + sign * (self.b[:, None] - self.b[None, :])
+        spread = den + diagonal[:, None] + diagonal[None, :] - 2 * self.G + 2 * sign * (row[:, None] - row[None, :])
         least = 1e-9 * float(diagonal.max() or 1.0)
         explained = np.where(free & (spread > least), both**2 / np.maximum(spread, least), 0.0)
-        where = int(np.argmax(explained))
-        i, j = divmod(where, explained.shape[1])
+        i, j = divmod(int(np.argmax(explained)), explained.shape[1])
         if not explained[i, j] > 0:
             return None, 0.0
         return (i, j), self._log_gain(float(explained[i, j]))

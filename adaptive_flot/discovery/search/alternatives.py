@@ -218,8 +218,8 @@ def shape_bounds(problem: Problem, effect: Effect) -> dict[str, tuple[float, flo
     margin = 0.02 * span
     by_role = {
         CoefficientRole.ONSET: (float(t[0]) + margin, float(t[-1]) - margin),
-        CoefficientRole.DURATION: (1.0, span),
-        CoefficientRole.TIME_CONSTANT: (0.2 * problem.record.dt, span),
+        CoefficientRole.DURATION: (problem.record.dt, span),
+        CoefficientRole.TIME_CONSTANT: (problem.record.dt, span),
         CoefficientRole.DEAD_TIME: (2.0 * problem.record.dt, LONGEST_DELAY * span),
     }
     if effect.family.passes:  # what is shorter is an outlier, or noise

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from adaptive_flot.discovery.hypotheses.wording import clock
 from adaptive_flot.discovery.results import Alternative, NamedEffect
 from adaptive_flot.discovery.verdict.curve import EffectCurve
 from adaptive_flot.greybox.effects import Effect
@@ -114,9 +115,10 @@ def _event(site: Site, effect: Effect) -> str:
         if level < 0:
             stood = "less" if site.role == "sensor" else "smaller"
         end = onset + durations[0]
-        return f"{verb} {_amount(site, effect, level)} {stood} from {onset:.0f} s to {end:.0f} s than before and after"
+        when = f"from {clock(onset)} s to {clock(end)} s"
+        return f"{verb} {_amount(site, effect, level)} {stood} {when} than before and after"
     lasts = [*durations, *(SETTLED * t for t in effect.values(CoefficientRole.TIME_CONSTANT))]
-    when = f"from {onset:.0f} s to {onset + lasts[0]:.0f} s" if lasts else f"at {onset:.0f} s"
+    when = f"from {clock(onset)} s to {clock(onset + lasts[0])} s" if lasts else f"at {clock(onset)} s"
     factor = float(np.exp(level)) if _is_factor(site, effect) else None
     return f"{_moved(site, _amount(site, effect, level), rises=level > 0, factor=factor)} {when}"
 
@@ -141,7 +143,7 @@ def _until_the_end(site: Site, curve: EffectCurve) -> str:
     rises, factor = bool(curve.change[-1] > curve.change[0]), _ratio(curve, 0, -1) if curve.relative else None
     onset = max(curve.effect.values(CoefficientRole.ONSET))
     moved = _moved(site, _between(site, curve, 0, -1), rises=rises, factor=factor)
-    return f"{moved} from {onset:.0f} s to the end of the record"
+    return f"{moved} from {clock(onset)} s to the end of the record"
 
 
 def _in_time(site: Site, curve: EffectCurve) -> str:
@@ -153,7 +155,7 @@ def _in_time(site: Site, curve: EffectCurve) -> str:
     a, b = _extremes(curve)
     factor = _ratio(curve, a, b) if curve.relative else None
     moved = _moved(site, _between(site, curve, a, b), rises=bool(curve.change[b] > curve.change[a]), factor=factor)
-    return f"{moved} from {curve.driver[a]:.0f} s to {curve.driver[b]:.0f} s"
+    return f"{moved} from {clock(curve.driver[a])} s to {clock(curve.driver[b])} s"
 
 
 def _moved(site: Site, size: str, *, rises: bool, factor: float | None) -> str:

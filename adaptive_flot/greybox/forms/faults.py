@@ -10,6 +10,7 @@ import numpy as np
 
 from adaptive_flot.greybox.forms.form import (
     BLEND,
+    SHORTEST,
     Coefficient,
     CoefficientRole,
     Coefs,
@@ -166,7 +167,7 @@ FAULT_FORMS: tuple[Form, ...] = (
         fixed(
             Coefficient("sine", CoefficientRole.LEVEL, unit="g"),
             Coefficient("cosine", CoefficientRole.LEVEL, unit="g"),
-            Coefficient("period", CoefficientRole.PERIOD, 60.0, 1e-3, scale=10.0, unit="s"),
+            Coefficient("period", CoefficientRole.PERIOD, 60.0, SHORTEST, scale=10.0, unit="s"),
         ),
         ("time",),
         {},
@@ -178,7 +179,7 @@ FAULT_FORMS: tuple[Form, ...] = (
         FormKind.MEMORY,
         fixed(
             Coefficient("exchange", CoefficientRole.SLOPE, 0.0, 0.0, scale=0.1, unit="value/driver"),
-            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 600.0, 1e-3, scale=300.0, unit="s"),
+            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 600.0, SHORTEST, scale=300.0, unit="s"),
         ),
         ("signal",),
         {},

@@ -236,6 +236,8 @@ def wrong_setting(name: str, value: float | tuple[float, ...]) -> str | None:
     return "give a whole number" if name in ("stages", "count") and several[0] % 1 else None
 
 
+SHORTEST = 1e-6
+"""Least time constant, dead time, duration or period [s]: a search sets its own by the sampling interval."""
 BLEND = Coefficient("amplitude", CoefficientRole.BLEND, 0.0, 0.0, 1.0, 1.0)
 """Fraction of the way from the value as it was (0) to the value transformed (1)."""
 

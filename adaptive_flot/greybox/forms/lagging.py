@@ -6,6 +6,7 @@ import casadi as ca
 
 from adaptive_flot.greybox.forms.form import (
     BLEND,
+    SHORTEST,
     Coefficient,
     CoefficientRole,
     Coefs,
@@ -77,7 +78,7 @@ LAGGING_FORMS: tuple[Form, ...] = (
         "lag",
         "first-order lag",
         FormKind.MEMORY,
-        fixed(BLEND, Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 30.0, 1.0, scale=10.0, unit="s")),
+        fixed(BLEND, Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 30.0, SHORTEST, scale=10.0, unit="s")),
         ("lag",),
         {"scale": None},
         {"scale": "value"},
@@ -91,8 +92,8 @@ LAGGING_FORMS: tuple[Form, ...] = (
         FormKind.MEMORY,
         fixed(
             BLEND,
-            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 20.0, 1.0, scale=10.0, unit="s"),
-            Coefficient("time_constant_2", CoefficientRole.TIME_CONSTANT, 10.0, 1.0, scale=10.0, unit="s"),
+            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 20.0, SHORTEST, scale=10.0, unit="s"),
+            Coefficient("time_constant_2", CoefficientRole.TIME_CONSTANT, 10.0, SHORTEST, scale=10.0, unit="s"),
         ),
         ("lag",),
         {"scale": None},
@@ -105,7 +106,7 @@ LAGGING_FORMS: tuple[Form, ...] = (
         "delay",
         "dead time, as a chain of equal lags",
         FormKind.MEMORY,
-        fixed(BLEND, Coefficient("dead_time", CoefficientRole.DEAD_TIME, 30.0, 2.0, scale=10.0, unit="s")),
+        fixed(BLEND, Coefficient("dead_time", CoefficientRole.DEAD_TIME, 30.0, SHORTEST, scale=10.0, unit="s")),
         ("delay",),
         {"scale": None, "stages": 12.0},
         {"scale": "value"},

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.forms.form import (
+    SHORTEST,
     Coefficient,
     CoefficientRole,
     Coefs,
@@ -198,7 +199,11 @@ STATIC_FORMS: tuple[Form, ...] = (
         "ramp",
         "a ramp from an onset, then constant",
         FormKind.EVENT,
-        fixed(_AMPLITUDE, _ONSET, Coefficient("duration", CoefficientRole.DURATION, 600.0, 1.0, scale=100.0, unit="s")),
+        fixed(
+            _AMPLITUDE,
+            _ONSET,
+            Coefficient("duration", CoefficientRole.DURATION, 600.0, SHORTEST, scale=100.0, unit="s"),
+        ),
         ("time",),
         {},
         static=_ramp,
@@ -210,7 +215,7 @@ STATIC_FORMS: tuple[Form, ...] = (
         fixed(
             _AMPLITUDE,
             _ONSET,
-            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 300.0, 1.0, scale=100.0, unit="s"),
+            Coefficient("time_constant", CoefficientRole.TIME_CONSTANT, 300.0, SHORTEST, scale=100.0, unit="s"),
         ),
         ("time",),
         {},

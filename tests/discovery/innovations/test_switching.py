@@ -78,3 +78,22 @@ def test_edges_that_know_nothing_of_an_input_seem_to_follow_it_as_rarely_as_is_s
         said.append(chance_of_edges(rng.choice(np.arange(1, N), 6, replace=False), held))
     for limit in (0.2, 0.05, 0.01):
         assert np.mean(np.array(said) < limit) <= limit + 0.02
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    lengths=st.lists(st.integers(12, 18), min_size=3, max_size=3),
+    pauses=st.lists(st.integers(5, 9), min_size=2, max_size=2),
+)
+def test_pulses_with_short_pauses_are_not_taken_for_one_long_one(lengths: list[int], pauses: list[int]) -> None:
+    """The best single pulse spans them all, at a smaller size: only a pause within it leads on."""
+    mask, at = np.zeros(N), 8
+    for length, pause in zip(lengths, [*pauses, 0], strict=True):
+        mask[at : at + length] = 1.0
+        at += length + pause
+    steps, edges = _steps()
+    noise = 0.4 * np.random.default_rng(2).normal(size=N)
+    found = best_switch(steps, edges, 2.0 * mask + noise, N)
+    assert found is not None and len(found.pulses) == 3
+    assert np.abs(found.mask(N) - mask).sum() <= 4
+    assert found.size == pytest.approx(2.0, abs=0.3)
