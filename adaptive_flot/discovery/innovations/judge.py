@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -101,7 +102,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
         if len(best.hypotheses) == 1:
             break
         # the one that does least is given up, and the rest judged anew
-        found = [e for e in found if not _has(e, failed[0])]
+        found = [e for e in found if all(_name(h) != _name(failed[0]) for h in e.hypotheses)]
     if not given_up:
         return Told("none", base, (), (), (base,), "constants and process noise explain it")
     why = _why(search, given_up)
@@ -239,8 +240,14 @@ def _alike(search: Search, base: Explanation, found: Sequence[Explanation]) -> t
 
 
 def _only_adds(explanation: Explanation, other: Explanation) -> bool:
-    """Whether an explanation has the effects of another one, which has some, and more."""
-    one, two = (frozenset((h.site, h.driver, h.kind) for h in e.hypotheses) for e in (explanation, other))
+    """Whether an explanation has the effects of another one, which has some, and more; a lag is one at any place.
+
+    Lags in a row commute (see `late_where`): its place is asked once more, alone.
+    """
+    one, two = (
+        Counter(("", h.driver, h.kind) if h.kind == "lag" else _name(h) for h in e.hypotheses)
+        for e in (explanation, other)
+    )
     return bool(two) and two < one
 
 
@@ -284,6 +291,10 @@ def low_end(gain: FloatArray, numbers: int = 0, effects: int = 0) -> float:
         return float((blocks - charge).sum())
     found = bootstrap((blocks - charge,), np.sum, n_resamples=DRAWS, method="percentile", rng=0, vectorized=True)
     return float(found.confidence_interval.low)
+
+
+def _name(h: Hypothesis) -> tuple[str, str, str]:
+    return h.site, h.driver, h.kind
 
 
 def _has(explanation: Explanation, h: Hypothesis) -> bool:

@@ -230,3 +230,29 @@ def test_an_event_at_a_site_that_changes_as_much_at_other_times_is_none(again: f
     assert asked.word == word and (word == "named" or "it wanders" in asked.why)
     lasting = told(Given((lag("valve"),), 300.0, 0.9))
     assert rivals.unless_it_wanders(search, Given((), 0.0, 0.0), lasting) is lasting  # type: ignore[arg-type]
+
+
+def shift(site: str) -> Hypothesis:
+    """A constant error at a site."""
+    return Hypothesis(site, "constant", "offset", Effect(site, "constant", "shift"), ("amplitude",), ({},))
+
+
+def test_what_is_given_up_takes_nothing_else_at_its_site_with_it() -> None:
+    """An amplifier that answers late, and beside that an offset there which predicts nothing."""
+    late, off = lag("amplifier"), shift("amplifier")
+    pair, alone = Given((late, off), 520.0, 0.5), Given((late,), 500.0, 0.6)
+    base = Given((), 0.0, 0.0)
+    search: Any = Stand(base, pair)
+    search.without = lambda e, h: alone if h is off else Given((off,), 3.0, 0.0)
+    ranked: Any = [pair, alone, base]
+    said = judging.judge(search, ranked[-1], ranked)
+    assert said.word == "named" and said.certain == (late,)
+
+
+def test_a_lag_elsewhere_with_something_more_is_no_other_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lags commute: a late amplifier, or a late tachometer and a load, are a lag, and a lag with a load."""
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
+    one, two, load = lag("amplifier"), lag("tachometer"), event("load", (100.0, 300.0))
+    monkeypatch.setattr(judging, "_at_steps_of_an_input", lambda search, e: ())
+    said = told(Given((one,), 500.0, 0.9), Given((two, load), 505.0, 0.9), Given((two,), 490.0, 0.8))
+    assert said.word == "class" and [h.site for _, h in said.open] == ["amplifier", "tachometer"]

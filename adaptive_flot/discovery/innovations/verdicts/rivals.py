@@ -19,6 +19,8 @@ FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
 WANDERS = 0.25
 """Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
+MUCH = 100.0
+"""Fall of the Bayesian information criterion by which an alternative explains much."""
 FAR_ABOVE = 2.0
 """An error so many times its usual one is far above it."""
 TELLS = ("named", "class", "unnamed")
@@ -50,6 +52,17 @@ def unexpected_drift(state: State) -> bool:
     before, _ = state.refitted
     fitted = {p.name: p for p in before.model.parameters}
     return not all(fitted[name].drifts for name in state.known_problem.adapted)
+
+
+def unconfirmed(state: State) -> bool:
+    """Whether a `none` rests on a search whose best alternative explains much (MUCH), and was not confirmed.
+
+    Then something is there, and the alternative is not it.
+    """
+    if state.judged.word != "none" or state.judged.best is not None:
+        return False
+    _, result = state.searched
+    return any(a.delta_bic <= -MUCH for a in result.alternatives)
 
 
 def surely_better(state: State) -> bool:

@@ -34,6 +34,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     smaller,
     surely_better,
     surely_worse,
+    unconfirmed,
     unexpected_drift,
     unless_it_wanders,
 )
@@ -46,9 +47,9 @@ from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_fro
 def second_opinion(state: State) -> State:
     """Ask the innovations form where the free run leaves too much, and keep only what both allow.
 
-    It is asked where nothing has a name, where a free curve in time has one, where what is fitted drifts, and where too
-    much is left. What it names takes the place of the free run's verdict, where the report rows do not contradict it. A
-    name of the free run that it does not know is taken back.
+    It is asked where nothing has a name, where a free curve in time has one, where what is fitted drifts, where much
+    was found and not confirmed, and where too much is left. What it names takes the place of the free run's verdict,
+    where the report rows do not contradict it. A name of the free run that it does not know is taken back.
 
     Two errors on the report rows may contradict it. That of a free run over the record must not surely grow. Where it
     does not surely fall, or the free run has a free curve in time for a rival, that over stretches must (see
@@ -56,7 +57,7 @@ def second_opinion(state: State) -> State:
     """
     problem, (before, _) = state.known_problem, state.refitted
     silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
-    asked = silent or follows_time(state) or unexpected_drift(state) or leaves_too_much(state)
+    asked = silent or follows_time(state) or unexpected_drift(state) or unconfirmed(state) or leaves_too_much(state)
     record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
     if record is None or time.monotonic() > state.ends:  # a budget that is spent has no time for it
         return state

@@ -147,3 +147,13 @@ def test_a_free_run_tells_one_lag_from_another_only_by_enough(gains: dict[str, f
     given: Any = SimpleNamespace(late=gains)
     told: Any = SimpleNamespace(certain=(SimpleNamespace(kind="lag", site="doser"),))
     assert rivals.late_as_well(given, told, "probe") == as_well
+
+
+@pytest.mark.parametrize(
+    ("word", "fall", "asked"), [("none", -900.0, True), ("none", -20.0, False), ("named", -900.0, False)]
+)
+def test_much_that_is_found_and_not_confirmed_is_not_nothing(word: str, fall: float, asked: bool) -> None:
+    """A curve explains the rows that chose it and fails on others: something is there, and not the curve."""
+    result = SimpleNamespace(alternatives=(SimpleNamespace(delta_bic=fall), SimpleNamespace(delta_bic=3.0)))
+    given: Any = SimpleNamespace(judged=SimpleNamespace(word=word, best=None), searched=(None, result))
+    assert rivals.unconfirmed(given) == asked
