@@ -72,11 +72,7 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
     try:
         module = _import(module_name, folder)
     except ModuleNotFoundError as error:
-        stem = Path(module_name).stem
-        if module_file(module_name, folder) is not None:
-            reason = f"{stem}.py imports {error.name!r}, which is not there; put it beside {stem}.py, or install it"
-        else:
-            reason = f"no module {error.name!r}; put {stem}.py beside the file that names it or here"
+        reason = _not_there(module_name, error.name or module_name, folder)
         raise PluginError(f"{what} {address!r}: {reason}") from error
     except (Exception, SystemExit) as error:
         file = module_file(module_name, folder)
@@ -91,6 +87,18 @@ def load(address: str, shipped: Mapping[str, str], what: str, folder: Path | Non
             f"{what} {address!r}: module {module_name!r} has no {attribute!r}; {near_match(attribute, names)}"
         )
     return getattr(module, attribute)
+
+
+def _not_there(module: str, missing: str, folder: Path | None) -> str:
+    """Why a module could not be imported, and what to do."""
+    stem = Path(module).stem
+    if module_file(module, folder) is not None:
+        return f"{stem}.py imports {missing!r}, which is not there; put it beside {stem}.py, or install it"
+    if module.endswith(".py"):
+        return f"no file {module}; give its path"
+    # a dotted name is that of a package, and not of a file in another folder
+    do = f"put {stem}.py beside the file that names it or here" if stem == module else "install it"
+    return f"no module {missing!r}; {do}"
 
 
 def _import(name: str, folder: Path | None) -> ModuleType:

@@ -49,6 +49,8 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     if name == "flotation":
         return flotation.make_model(flotation.read_cell(find_cell(cell, folder)))
     if name not in PROCESSES and ":" not in name:
+        if name.endswith(".py"):
+            raise PluginError(f"model {name!r}: which function of that file makes it? Write {name}:make_model")
         known = near_match(name, PROCESSES)
         raise PluginError(f"unknown model {name!r}; {known}, or a model file, or your own as my_file:make_model")
     if cell is not None:

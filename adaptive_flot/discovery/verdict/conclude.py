@@ -21,11 +21,15 @@ from adaptive_flot.discovery.verdict.thresholds import with_ranges
 from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 NORMAL95 = 1.96
 """Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
+TIMES = (CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME, CoefficientRole.DURATION, CoefficientRole.PERIOD)
+FAR = 50.0
+"""Logarithm of a factor that says nothing any more."""
 INSTRUMENTS = {"sensor": "sensor", "actuator": "part that acts", "feed": "feed"}
 """Roles whose quantities do not depend on the state of the process, in words."""
 
@@ -135,7 +139,7 @@ def _common_nuisance_note(result: SearchResult) -> tuple[str, ...]:
 
 
 def _effects(judgement: Judgement, told: Fit) -> tuple[NamedEffect, ...]:
-    """Each effect that is told, with Wald intervals c -+ 1.96 sd(c) and the names that could replace it."""
+    """Each effect that is told, with Wald intervals and the names that could replace it."""
     assert judgement.best is not None  # a verdict that names has an alternative
     model, best = told.model, judgement.best
     std = dict(zip(told.names, told.std(), strict=True))
@@ -151,12 +155,27 @@ def _effects(judgement: Judgement, told: Fit) -> tuple[NamedEffect, ...]:
             and set(best.names) - set(a.names) == {own}
         )
         interval = {
-            c: (v - NORMAL95 * std[effect.parameter(c)], v + NORMAL95 * std[effect.parameter(c)])
-            for c, v in effect.coefficients.items()
-            if effect.parameter(c) in std
+            c.name: wald(c, effect.coefficients[c.name], std[effect.parameter(c.name)])
+            for c in effect.terms
+            if c.name in effect.coefficients and effect.parameter(c.name) in std
         }
         named.append(NamedEffect(effect, _meaning(model, effect), interval, others))
     return tuple(named)
+
+
+def wald(coefficient: Coefficient, value: float, std: float) -> tuple[float, float]:
+    """Wald's 95 % interval of a fitted coefficient, inside the range of the coefficient.
+
+    Of a coefficient c with a standard deviation s, and of a time in its logarithm, since it is above zero::
+
+        c -+ 1.96 s        c exp(-+ 1.96 s / c)
+    """
+    if coefficient.role in TIMES and value > 0:
+        reach = float(np.exp(min(NORMAL95 * std / value, FAR)))
+        low, high = value / reach, value * reach
+    else:
+        low, high = value - NORMAL95 * std, value + NORMAL95 * std
+    return max(low, min(value, coefficient.lower)), min(high, max(value, coefficient.upper))
 
 
 def _meaning(model: Model, effect: Effect) -> str:
