@@ -8,7 +8,7 @@ The steps are those of the prediction error method with the derivatives of the f
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -32,6 +32,8 @@ ENOUGH, LARGE = 0.05, 5.0
 """Gain below which a fit is where it stays, and below which the noise is searched for again."""
 LOOSE = 30.0
 """Standard deviation of the prior of a free parameter about its start, in its scales."""
+OUTLIER, USUAL = 5.0, 3.0
+"""Standard deviations of an innovation beyond which it is an outlier where those beside it are at most usual."""
 UNSURE = 3.0
 """Standard deviation of the state before the first row, in scales of the states."""
 HOPELESS = 1e12
@@ -158,9 +160,16 @@ class Refitter:
         return Refit(p.copy(), noise, size, self.run(p, noise), -self._cost(p, size, first))
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
-        """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside."""
+        """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside.
+
+        Single outliers are missing values there: a Gaussian filter believes them, and one may outweigh all other rows.
+        """
         functions = ResponseFunctions(self.model, self.record.dt, self.columns, sites, self.free)
-        return functions.at(self.record, fit.noise, fit.p, self.start(fit.noise, fit.p))
+        outputs, columns = self.record.outputs.copy(), list(self.columns)
+        off = single_outliers(outputs[:, columns] - fit.filtered.predicted, fit.filtered.variance)
+        outputs[:, columns] = np.where(off, np.nan, outputs[:, columns])
+        record = replace(self.record, outputs=outputs)
+        return functions.at(record, fit.noise, fit.p, self.start(fit.noise, fit.p))
 
     def run(self, p: FloatArray, noise: NoiseModel) -> Filtered:
         """The filter over the record."""
@@ -284,3 +293,16 @@ class Refitter:
                 moved: FloatArray = move * self._scale
                 return moved
             held |= beyond
+
+
+def single_outliers(innovation: FloatArray, variance: FloatArray) -> BoolArray:
+    """Innovations (N, m) of a filter by Student's t that no measured one beside them goes with (N, m).
+
+    After a step the filter is as far off for some rows more, so that a step is none.
+    """
+    size = np.nan_to_num(np.abs(innovation) / np.sqrt(variance))
+    beside = np.zeros_like(size)
+    beside[1:] = size[:-1]
+    beside[:-1] = np.maximum(beside[:-1], size[1:])
+    found: BoolArray = (size > OUTLIER) & (beside <= USUAL)
+    return found
