@@ -23,6 +23,8 @@ from adaptive_flot.greybox.model import FloatArray, Model
 
 REFITTED, SAME_SITE = 6, 2
 """Suspects that are refitted, and of these at one site."""
+LAGS_ELSEWHERE = 3
+"""Lags that are refitted besides, one a site."""
 BEAM = 3
 """Explanations that are carried on."""
 MOST_EFFECTS = 2
@@ -280,7 +282,10 @@ def numbers_of(h: Hypothesis) -> int:
 
 
 def _spread(ranked: Sequence[Screened]) -> list[Screened]:
-    """The best few, one of a kind and few at one site; and the best store, which most models leave out."""
+    """The best few, one of a kind and few at one site; the best store, which most models leave out; and lags elsewhere.
+
+    A lag is all or nothing, and process noise follows what it does, so that a regression says little of it.
+    """
     chosen: list[Screened] = []
     for s in ranked:
         h = s.suspect.hypothesis
@@ -290,7 +295,12 @@ def _spread(ranked: Sequence[Screened]) -> list[Screened]:
         if len(chosen) == REFITTED:
             break
     stores = [s for s in ranked if s.suspect.hypothesis.kind == "store" and s.gain >= LEAST_GAIN]
-    return chosen if any(s in chosen for s in stores) else [*chosen, *stores[:1]]
+    further = [] if any(s in chosen for s in stores) else stores[:1]
+    by_site = {
+        s.suspect.hypothesis.site: s for s in reversed(ranked) if s.suspect.hypothesis.kind == "lag" and s.gain > 0
+    }
+    lags = sorted((s for s in by_site.values() if s not in chosen), key=lambda s: -s.gain)
+    return [*chosen, *further, *lags[:LAGS_ELSEWHERE]]
 
 
 def _distinct(found: Sequence[Explanation]) -> list[Explanation]:

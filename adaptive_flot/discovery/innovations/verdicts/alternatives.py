@@ -6,8 +6,10 @@ drives an actuator can draw the limit of that. So alternatives of the free run a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, told_apart
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import but_for_what_wanders
@@ -32,8 +34,9 @@ def beside_alternatives(
     Returns
     -------
     Told or None
-        None where an alternative explains more or can not be fitted, where one that explains about as much has several
-        effects, and where more sites are left than a class may hold.
+        None where an alternative elsewhere explains more, where one can not be fitted, where one that explains about as
+        much has several effects, and where more sites are left than a class may hold. Where one at the same site
+        explains more, a curve that bends after what else is wrong, both are a class.
     """
     wanders = but_for_what_wanders(state, names)
     if not wanders and (state.judged.word != "abstain" or state.contradiction):
@@ -43,9 +46,15 @@ def beside_alternatives(
     found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
     fitted = [e for e in found if e is not None]
     alike = [e for e in fitted if not told_apart(search, base, told.best, e)]
-    if len(fitted) < len(found) or any(told_apart(search, base, e, told.best) for e in alike):
-        return None
     own = [h for h in told.effects if h.kind != "store"]  # a store beside a fault is what the model leaves out anyway
+    better = [e for e in alike if told_apart(search, base, e, told.best)]
+    if len(fitted) < len(found) or any(not _alone_at(e, own) for e in better):
+        return None
+    if better and told.word == "named":  # it is that part, and how it is off is not told
+        (curve,) = better[0].hypotheses
+        return replace(
+            told, word="class", certain=(), open=((told.best, own[0]), (better[0], curve)), alike=(told.best, *alike)
+        )
     others = [(e, h) for e in alike for h in e.hypotheses if h.site not in {h.site for h in own}]
     if not others:
         return told
@@ -55,3 +64,9 @@ def beside_alternatives(
     members = {h.site: (e, h) for e, h in reversed(others)}
     opened = ((told.best, own[0]), *sorted(members.values(), key=lambda m: -m[0].criterion))
     return replace(told, word="class", certain=(), open=opened, alike=(told.best, *alike))
+
+
+def _alone_at(explanation: Explanation, own: Sequence[Hypothesis]) -> bool:
+    """Whether an explanation has one effect, and at the only site of what is told."""
+    effects = explanation.hypotheses
+    return len(own) == 1 and len(effects) == 1 and effects[0].site == own[0].site

@@ -129,3 +129,16 @@ def test_an_effect_of_a_free_run_is_fitted_as_one_that_was_searched() -> None:
 )
 def test_an_alternative_is_said_without_a_size(driver: str, words: str) -> None:
     assert words_of(model(), hypothesis("pump", driver=driver), lambda name: 0.0) == words
+
+
+@pytest.mark.parametrize(("site", "word"), [("doser", "class"), ("demand", "nothing")])
+def test_a_curve_that_explains_more_at_the_same_site_leaves_the_site(site: str, word: str) -> None:
+    """It is the doser; whether it has a limit or depends on what is asked is not told. Elsewhere nothing is."""
+    said = beside(told(LIMIT), Given(150.0, (hypothesis(site),)), Given(60.0, (hypothesis("decay"),)))
+    assert (said.word if said is not None else "nothing") == word
+    if said is not None:
+        assert [(h.site, h.driver) for h in said.effects] == [("doser", "saturation"), ("doser", "dose")]
+
+
+def test_a_curve_that_explains_more_with_something_else_leaves_nothing() -> None:
+    assert beside(told(LIMIT), Given(150.0, (hypothesis("doser"), hypothesis("decay")))) is None
