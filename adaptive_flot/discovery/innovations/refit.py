@@ -189,6 +189,24 @@ class Refitter:
         told: FloatArray = self._root @ (x[self._constants] - self.known.mean)
         return np.concatenate([loose, told])
 
+    def known_rows(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is known before of the constants as further rows of a regression on innovations, at parameters (np,).
+
+        With the covariance S of what is known and its mean m, and L L' = S::
+
+            0 = L^-1 (p - m) + L^-1 dp
+
+        Returns
+        -------
+        tuple
+            L^-1 by the free parameters (c, q), and -L^-1 (p - m) (c,); no rows where nothing is known.
+        """
+        rows = np.zeros((len(self._root), len(self.free)))
+        if self.known is None:
+            return rows, np.empty(0)
+        rows[:, self._constants] = self._root
+        return rows, -self._root @ (p[self._where][self._constants] - self.known.mean)
+
     def _moved(
         self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float
     ) -> tuple[FloatArray, float]:

@@ -43,12 +43,21 @@ class Screening:
         The fitted model.
     response
         How its innovations answer.
+    known
+        What is known before of the free parameters as further rows: their slopes (c, q), and what is to be explained
+        (c,). Without it a change that looks like another constant is taken for that, however well the constant is
+        known.
     """
 
-    def __init__(self, model: Model, response: LinearResponse) -> None:
+    def __init__(
+        self, model: Model, response: LinearResponse, known: tuple[FloatArray, FloatArray] | None = None
+    ) -> None:
         self.model, self._response = model, response
-        self._basis = _span(response.by_constants)
-        self._left = self._rest(response.innovations)
+        slopes, told = known if known is not None else (np.empty((0, response.by_constants.shape[1])), np.empty(0))
+        self._further = len(told)
+        self._basis = _span(np.vstack([response.by_constants, slopes]))
+        innovations = np.concatenate([response.innovations, told])
+        self._left = innovations - self._basis @ (self._basis.T @ innovations)
         self._total = float(self._left @ self._left)
         self._count = int(np.count_nonzero(response.innovations))
         self._values, self._drivers = response.seen()
@@ -142,6 +151,8 @@ class Screening:
         return numbers / 2 * float(np.log(self._count))
 
     def _rest(self, X: FloatArray) -> FloatArray:
+        """Responses (n, f), and that what is known before does not answer, less what the free parameters explain."""
+        X = np.vstack([X, np.zeros((self._further, X.shape[1]))])
         left: FloatArray = X - self._basis @ (self._basis.T @ X)
         return left
 

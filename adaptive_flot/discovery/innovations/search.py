@@ -148,11 +148,10 @@ class Search:
 
     def _further(self, start: Explanation) -> list[Explanation]:
         """The explanation with one more effect, for each that is worth its numbers."""
-        model = self.model_of(start)
-        response = self.fitter(model, start.free).response(start.fit, [s.name for s in self.model.sites])
+        screening = self.screening(start, [s.name for s in self.model.sites])
         # one course in time at most: a second one would draw whatever is left
         events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
-        screened = Screening(model, response).all(events=events)
+        screened = screening.all(events=events)
         chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
         refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
@@ -164,24 +163,27 @@ class Search:
     def _may(self, kind: str) -> bool:
         return self.kinds is None or kind in self.kinds
 
+    def screening(self, start: Explanation, sites: Sequence[str]) -> Screening:
+        """The regressions on an explanation, of changes at some sites."""
+        model = self.model_of(start)
+        fitter = self.fitter(model, start.free)
+        return Screening(model, fitter.response(start.fit, sites), fitter.known_rows(start.fit.p))
+
     def settled(self, explanation: Explanation) -> Explanation:
         """The same, its switch placed anew beside the other effects, where that is better."""
         switch = next((h for h in explanation.hypotheses if h.kind == "switch"), None)
         if switch is None or len(explanation.hypotheses) < 2:
             return explanation
         without = self.without(explanation, switch)
-        model = self.model_of(without)
-        response = self.fitter(model, without.free).response(without.fit, [switch.site])
         site = next(s for s in self.model.sites if s.name == switch.site)
-        placed = Screening(model, response).switch(site)
+        placed = self.screening(without, [site.name]).switch(site)
         again = self._with(without, placed) if placed is not None else None
         return again if again is not None and again.criterion > explanation.criterion else explanation
 
     def switched_again(self, explanation: Explanation, switch: Hypothesis) -> float:
         """Gain of a further switch at the site of one that an explanation has; 0 where none is found."""
-        model = self.model_of(explanation)
-        response = self.fitter(model, explanation.free).response(explanation.fit, [switch.site])
-        again = Screening(model, response).switch(next(s for s in self.model.sites if s.name == switch.site))
+        site = next(s for s in self.model.sites if s.name == switch.site)
+        again = self.screening(explanation, [site.name]).switch(site)
         return again.gain if again is not None else 0.0
 
     def without(self, explanation: Explanation, left_out: Hypothesis) -> Explanation:
