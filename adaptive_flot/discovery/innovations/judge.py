@@ -25,6 +25,8 @@ ADEQUATE = 1.5
 """Standard deviation of an innovation, in those of the measurement noise, up to which nothing else is wrong."""
 SMALL = 0.15
 """An effect beside another one, that brings less than this share of the gain, is not told."""
+OWN = 0.8
+"""Share of the gain that is lost without an event beside another effect, at least."""
 SAME_LAG = 0.8
 """Share of the gain from which a lag at another place is not told apart."""
 FOLDS = 5
@@ -81,9 +83,9 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     """Judge the explanations, the best first.
 
     What is certain must be in every explanation about as good, and must predict stretches of rows that did not fit its
-    coefficients better than the rest of the explanation does without it. An event beside another effect, at the times
-    of an input's steps, is none: it takes up what else is wrong with the model there. Where the rest is one of a few,
-    it is a class.
+    coefficients better than the rest of the explanation does without it. An event beside another effect is none at the
+    times of an input's steps, or where the other effect explains much of the same: it takes up what else is wrong with
+    the model there. Where the rest is one of a few, it is a class.
     """
     possible = [e for e in found if not _beyond(search, e)]
     matters = found[0].criterion - base.criterion >= LEAST_GAIN
@@ -95,7 +97,8 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}
-        failed = _at_steps_of_an_input(search, best) or _contradicted(search, best, without)
+        failed = _at_steps_of_an_input(search, best) or _overlapping(base, best, without)
+        failed = failed or _contradicted(search, best, without)
         if not failed:
             return _told(search, base, found, without)
         given_up.append(failed[0])
@@ -129,6 +132,18 @@ def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hyp
     """
     beside = explanation.hypotheses if len(explanation.hypotheses) > 1 else ()
     return tuple(h for h in beside if h.kind == "switch" and _follows_an_input(search, h))
+
+
+def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Explanation]) -> tuple[Hypothesis, ...]:
+    """An event beside another effect that explains much of the same: it draws what is left of a wrong model.
+
+    Nothing else draws an event that is there. So without it most of the gain is lost (OWN).
+    """
+    total = best.criterion - base.criterion
+    beside = best.hypotheses if len(best.hypotheses) > 1 else ()
+    return tuple(
+        h for h in beside if h.kind == "switch" and best.criterion - without[h.label].criterion < OWN * total
+    )  # fmt: skip
 
 
 def _follows_an_input(search: Search, event: Hypothesis) -> bool:

@@ -182,7 +182,7 @@ AT_STEPS, BETWEEN = ((200.0, 200.0), (600.0, 210.0), (1000.0, 190.0)), ((250.0, 
 def test_an_event_at_the_steps_of_an_input_is_none(times: tuple[tuple[float, float], ...], sites: list[str]) -> None:
     """It follows the input, so it takes up what is wrong with the model there; what is beside it is told."""
     valve, shift = lag("valve"), event("sensor", *times)
-    said = told(Given((valve, shift), 500.0, 0.9), Given((valve,), 300.0, 0.5), Given((shift,), 200.0, 0.3))
+    said = told(Given((valve, shift), 500.0, 0.9), Given((valve,), 80.0, 0.5), Given((shift,), 200.0, 0.3))
     assert said.word == "named"
     assert [h.site for h in said.certain] == sites
 
@@ -256,3 +256,20 @@ def test_a_lag_elsewhere_with_something_more_is_no_other_explanation(monkeypatch
     monkeypatch.setattr(judging, "_at_steps_of_an_input", lambda search, e: ())
     said = told(Given((one,), 500.0, 0.9), Given((two, load), 505.0, 0.9), Given((two,), 490.0, 0.8))
     assert said.word == "class" and [h.site for _, h in said.open] == ["amplifier", "tachometer"]
+
+
+@pytest.mark.parametrize(("without", "sites"), [(20.0, ["loss", "lid"]), (90.0, ["loss", "lid"]), (150.0, ["loss"])])
+def test_an_event_beside_another_effect_explains_what_nothing_else_does(without: float, sites: list[str]) -> None:
+    """A lid of which a store draws a tenth; and a wall's store, of which two long pulses draw the rest."""
+    store, lid = replace(lag("loss"), kind="store", driver="air"), event("lid", (250.0, 200.0))
+    said = told(Given((store, lid), 500.0, 0.9), Given((store,), without, 0.4), Given((lid,), 300.0, 0.3))
+    assert said.word == "named" and [h.site for h in said.certain] == sites
+
+
+def test_a_store_and_a_dependence_are_not_told_by_name() -> None:
+    """An outflow with another exponent was drawn by both."""
+    store = replace(lag("inflow"), kind="store", driver="level")
+    law = replace(lag("outflow"), kind="depends", driver="level")
+    pair = Given((store, law), 500.0, 0.9)
+    said = told(pair, Given((store,), 200.0, 0.4), Given((law,), 150.0, 0.3))
+    assert said.word == "named" and rivals.not_two(said).word == "abstain"

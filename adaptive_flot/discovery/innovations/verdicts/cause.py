@@ -17,7 +17,7 @@ from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.in_words import told_in_words
-from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, usual_over_folds
@@ -63,6 +63,8 @@ def with_cause(
     if unusual and all(c.before <= ABOVE_USUAL * c.noise for c in error):
         return compared
     word: Literal["named", "class"] = "named" if told.word == "named" else "class"
+    if _too_many_parts(compared, told):
+        return compared
     against = contradiction(Judgement(word, None, (), (), 0.0), error, np.array([c.noise for c in error]))
     if against or hardly_explained(error, ABOVE_USUAL, MOST):
         return compared
@@ -80,6 +82,15 @@ def with_cause(
         tested=(*found, *compared.tested),
         judged=judged,
     )
+
+
+def _too_many_parts(compared: Comparison, told: Told) -> bool:
+    """Whether free runs do not tell more parts apart than a class may hold, and one of them is not told.
+
+    What tells that part from the others is then no more than how the filter lets the process wander.
+    """
+    parts = {t.hypothesis.site for t in compared.judged.parts if t.hypothesis is not None}
+    return len(parts) > LARGEST_CLASS and not parts <= {h.site for h in told.effects}
 
 
 def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:

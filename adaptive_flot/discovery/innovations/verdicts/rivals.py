@@ -134,9 +134,10 @@ def not_two(told: Told) -> Told:
     """Nothing where two effects are named and neither is a store, which most models leave out.
 
     Two things that have gone wrong at a time are rarer than a model that is wrong in a third way, which two effects
-    stand in for.
+    stand in for. A store and a dependence are two such effects as well: both say how the process is.
     """
-    if len(told.certain) < 2 or any(h.kind == "store" for h in told.certain):
+    kinds = [h.kind for h in told.certain]
+    if len(kinds) < 2 or ("store" in kinds and "depends" not in kinds):
         return told
     said = " and ".join(h.label for h in told.certain)
     return replace(told, word="abstain", certain=(), why=f"two effects are needed, {said}: more likely another one is")

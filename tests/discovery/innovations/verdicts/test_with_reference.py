@@ -8,7 +8,7 @@ import pytest
 
 from adaptive_flot.discovery.changes import _unless_contradicted, _unless_much_is_left
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
-from adaptive_flot.discovery.innovations.verdicts.cause import MOST
+from adaptive_flot.discovery.innovations.verdicts.cause import MOST, _too_many_parts
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import OutputChange, Verdict
 
@@ -104,3 +104,20 @@ def test_a_name_that_leaves_four_times_the_error_of_the_reference_is_not_told(
         assert verdict.reason.startswith("Something has changed, and it is not told what: ")
         assert "the error of amperes is still 4.3 times" in verdict.reason
         assert "The nearest: charger does not go below 1 A." in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("parts", "told", "many"),
+    [
+        (("analyser", "feed", "pump", "strength"), ("feed", "pump", "strength"), True),  # the right one is left out
+        (("feed", "pump", "strength"), ("pump",), False),  # a class of free runs, narrowed
+        ((), ("pump",), False),  # free runs show nothing
+    ],
+)
+def test_a_part_that_free_runs_do_not_tell_from_three_others_is_not_left_out(
+    parts: tuple[str, ...], told: tuple[str, ...], many: bool
+) -> None:
+    found = [SimpleNamespace(hypothesis=SimpleNamespace(site=s)) for s in parts]
+    compared: Any = SimpleNamespace(judged=SimpleNamespace(parts=found))
+    said: Any = SimpleNamespace(effects=[SimpleNamespace(site=s) for s in told])
+    assert _too_many_parts(compared, said) == many
