@@ -216,10 +216,12 @@ def shape_bounds(problem: Problem, effect: Effect) -> dict[str, tuple[float, flo
     t = problem.record.time
     span = float(t[-1] - t[0])
     margin = 0.02 * span
+    # within a row a ramp must be able to become a step, whose onset lies where it will
+    shortest = min(1.0, problem.record.dt)
     by_role = {
         CoefficientRole.ONSET: (float(t[0]) + margin, float(t[-1]) - margin),
-        CoefficientRole.DURATION: (problem.record.dt, span),
-        CoefficientRole.TIME_CONSTANT: (problem.record.dt, span),
+        CoefficientRole.DURATION: (shortest, span),
+        CoefficientRole.TIME_CONSTANT: (max(0.2 * problem.record.dt, shortest), span),
         CoefficientRole.DEAD_TIME: (2.0 * problem.record.dt, LONGEST_DELAY * span),
     }
     if effect.family.passes:  # what is shorter is an outlier, or noise
