@@ -216,14 +216,17 @@ def shape_bounds(problem: Problem, effect: Effect) -> dict[str, tuple[float, flo
     t = problem.record.time
     span = float(t[-1] - t[0])
     margin = 0.02 * span
-    # within a row a ramp must be able to become a step, whose onset lies where it will
-    shortest = min(1.0, problem.record.dt)
+    dt = problem.record.dt
+    # an event must be able to become a step within a row, whose onset lies where it will; but a lag within a row would
+    # stand for a little of anything, such as constants that are off
+    shortest = min(1.0, dt)
+    is_event = any(c.role is CoefficientRole.ONSET for c in effect.terms)
     by_role = {
         CoefficientRole.ONSET: (float(t[0]) + margin, float(t[-1]) - margin),
         CoefficientRole.DURATION: (shortest, span),
-        CoefficientRole.TIME_CONSTANT: (max(0.2 * problem.record.dt, shortest), span),
-        CoefficientRole.DEAD_TIME: (2.0 * problem.record.dt, LONGEST_DELAY * span),
+        CoefficientRole.TIME_CONSTANT: (max(0.2 * dt, shortest) if is_event else dt, span),
+        CoefficientRole.DEAD_TIME: (2.0 * dt, LONGEST_DELAY * span),
     }
     if effect.family.passes:  # what is shorter is an outlier, or noise
-        by_role[CoefficientRole.DURATION] = LEAST_PULSE_ROWS * problem.record.dt, span
+        by_role[CoefficientRole.DURATION] = LEAST_PULSE_ROWS * dt, span
     return {effect.parameter(c.name): by_role[c.role] for c in effect.terms if c.role in by_role}
