@@ -26,6 +26,10 @@ def sweep(
     compile_: Compile = False,
 ) -> None:
     """Run a study of many runs. Interrupted, the same command goes on where it was."""
+    from adaptive_flot.studies.fork_server import start_fork_server
+
+    if scheduler is None:
+        start_fork_server()  # it imports while this process does
     from adaptive_flot.console_study import print_study
     from adaptive_flot.studies.progress import live
     from adaptive_flot.studies.study_file import load_study

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import logging
-import signal
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 
 import dask
 from distributed import Client, LocalCluster
 
 from adaptive_flot.errors import StudyError
 from adaptive_flot.greybox.stepping.rows import core_count
+from adaptive_flot.studies.fork_server import interrupts_held_back, start_fork_server
 
 SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -45,7 +45,8 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     for name in (*logging.root.manager.loggerDict, "distributed", "asyncio", "tornado"):
         if name.partition(".")[0] in ("distributed", "asyncio", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-    with dask.config.set(SETTINGS):
+    method = start_fork_server() if scheduler is None else "spawn"
+    with dask.config.set(SETTINGS | {"distributed.worker.multiprocessing-method": method}):
         if scheduler is None:
             with _embedded(workers or core_count()) as cluster, Client(cluster) as client:
                 yield client
@@ -57,12 +58,11 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Client]:
 def _embedded(workers: int) -> LocalCluster:
     """Processes on this machine, one thread each.
 
-    Ctrl-C goes to all of them. It is held back in this thread while the cluster starts. In the threads and processes
-    that it starts it is held back for good, since they inherit the mask: this process alone decides how a sweep ends.
+    Ctrl-C goes to all of them. It is held back in this thread while the cluster starts, and in what that starts: this
+    process alone decides how a sweep ends. A worker has the environment of this moment, not that of the process from
+    which it is forked.
     """
-    resource_tracker.ensure_running()  # to start it later would lift the mask
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
+    with interrupts_held_back():
         return LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -70,9 +70,8 @@ def _embedded(workers: int) -> LocalCluster:
             host="127.0.0.1",
             dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL,
+            env=dict(os.environ),
         )
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 @contextmanager

@@ -69,8 +69,10 @@ class Sweep:
             time.sleep(0.02)
 
     def workers(self) -> list[psutil.Process]:
+        """What the process forked that the program keeps for it: both have its command line."""
         children = psutil.Process(self.process.pid).children(recursive=True)
-        return [c for c in children if "spawn_main" in " ".join(c.cmdline())]
+        servers = {c.pid for c in children if "forkserver" in " ".join(c.cmdline())}
+        return [c for c in children if c.ppid() in servers]
 
     def end(self) -> tuple[int, str, str]:
         out, err = self.process.communicate(timeout=PATIENCE_S)

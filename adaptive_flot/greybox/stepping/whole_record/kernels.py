@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 
@@ -85,21 +86,27 @@ def kernels(model: Model, wrt: tuple[str, ...] | None, fixed_step: bool) -> Kern
 
     rates_kernel, rates_entries = kernel("rates", [rates, decay], ca.vertcat(rates, decay))
     ends_kernel, ends_entries = kernel("ends", [y, s], y)
-    h = ca.SX.sym("h")
-    z, again = ca.SX.sym("z"), ca.SX.sym("again")
-
-    def weight_kernel(name: str, phi: Callable[[ca.SX], Phis]) -> ca.Function:
-        values = weights(z, h, phi(z if fixed_step else again))
-        both = ca.vertcat(z, again)
-        derivatives = [ca.jtimes(w, both, ca.SX.ones(2)) for w in values] if wrt is not None else []
-        return ca.Function(name, [z, h, again], [ca.vertcat(*values, *derivatives)], {"cse": True})
-
+    near, far = weight_kernels(fixed_step, wrt is not None)
     return Kernels(
         rates_kernel,
         ends_kernel,
-        weight_kernel("near", series_phi),
-        weight_kernel("far", series_phi if fixed_step else far_phi),
+        near,
+        far,
         rates_entries,
         ends_entries,
         tuple(not decay[i].is_zero() for i in range(x.numel())),
     )
+
+
+@lru_cache(maxsize=4)
+def weight_kernels(fixed_step: bool, derivatives: bool) -> tuple[ca.Function, ca.Function]:
+    """The functions `near` and `far` of `Kernels`, which are the same for every model."""
+    z, again, h = (ca.SX.sym(name) for name in ("z", "again", "h"))
+
+    def kernel(name: str, phi: Callable[[ca.SX], Phis]) -> ca.Function:
+        values = weights(z, h, phi(z if fixed_step else again))
+        both = ca.vertcat(z, again)
+        slopes = [ca.jtimes(w, both, ca.SX.ones(2)) for w in values] if derivatives else []
+        return ca.Function(name, [z, h, again], [ca.vertcat(*values, *slopes)], {"cse": True})
+
+    return kernel("near", series_phi), kernel("far", series_phi if fixed_step else far_phi)

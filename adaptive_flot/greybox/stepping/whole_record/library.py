@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, is_kept, load_library
 from adaptive_flot.greybox.stepping.step_functions import Interval
-from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
+from adaptive_flot.greybox.stepping.whole_record.kernels import kernels, weight_kernels
 from adaptive_flot.greybox.stepping.whole_record.source import RECORD_SOURCE, kernel_source
 from adaptive_flot.greybox.stepping.whole_record.tape import Tape, tape_of
 
@@ -111,7 +111,8 @@ class WholeRecord:
         jacobians = len(rate), sum(row < self._nx for row, _ in rate), len(end)
         self._sizes = self._nx, nu, self._ny, self._ns, self._np, *jacobians
         self._tables = _table([*made.decays, False], np.uint8), *_columns(rate), *_columns(end)
-        self._tapes = {name: tape_of(getattr(made, name), held) for name, held in _HELD.items()}
+        own = {name: tape_of(getattr(made, name), _HELD[name]) for name in ("rates", "ends")}
+        self._tapes = own | _weight_tapes(dt is not None, wrt is not None)
         self._run = _library()
         self._compiled: dict[str, int] | None = None
         self._steps = 0
@@ -196,6 +197,12 @@ class WholeRecord:
                 except CompileError:
                     self._compiled = {}
         return self._compiled or {}
+
+
+@lru_cache(maxsize=4)
+def _weight_tapes(fixed_step: bool, derivatives: bool) -> dict[str, Tape]:
+    near, far = weight_kernels(fixed_step, derivatives)
+    return {"near": tape_of(near, _HELD["near"]), "far": tape_of(far, _HELD["far"])}
 
 
 def whole_record(model: Model, interval: Interval, wrt: tuple[str, ...] | None) -> WholeRecord | None:
