@@ -16,7 +16,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
@@ -151,7 +151,7 @@ def _with_process_noise(
     where = extended.indices("parameters", constants.names)
     known = Constants(constants.names, extended.parameter_values[list(where)], constants.root)
     progress("events in the new record")
-    search = Search(extended, record, columns, floor, constants.names, known, processes)
+    search = Search(extended, record, columns, floor, constants.names, known, processes, ramps=True)
     base = search.base(extended.parameter_values)
     found = search.run(base, progress)
     before = replace(before, model=extended)
@@ -164,7 +164,7 @@ def _changed(told: Told, search: Search, before: Search, start: Explanation) -> 
     """What is told, without what explains the reference as well: that has not changed."""
 
     def there(explanation: Explanation, h: Hypothesis) -> bool:
-        if h.kind == "switch":
+        if h.kind in EVENTS:
             return False
         model = search.model_of(explanation)
         extended = model_with(before.model, h)
@@ -180,4 +180,4 @@ def _changed(told: Told, search: Search, before: Search, start: Explanation) -> 
 
 def _has_event(told: Told) -> bool:
     """Whether what is told is an event, and not a thing of the whole record."""
-    return told.word in ("named", "class") and bool(told.effects) and all(h.kind == "switch" for h in told.effects)
+    return told.word in ("named", "class") and bool(told.effects) and all(h.kind in EVENTS for h in told.effects)

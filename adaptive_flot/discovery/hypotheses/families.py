@@ -13,11 +13,13 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
 Kind = Literal[
-    "switch", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis", "dead zone",
-    "depends", "store", "alternative",
+    "switch", "ramp", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis",
+    "dead zone", "depends", "store", "alternative",
 ]  # fmt: skip
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""
+EVENTS = ("switch", "ramp")
+"""What begins at some time."""
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Levels at which a part may be stuck or leak, as shares of the range that its signal has been seen in."""
 GAINS = (-2.0, -0.7, -0.2, 0.2, 0.7)
@@ -93,7 +95,9 @@ class Hypothesis:
 
     @property
     def pulses(self) -> tuple[tuple[float, float], ...]:
-        """When a switch is on and for how long [s], FOREVER where it stays; none of anything else."""
+        """When an event is there and for how long [s], FOREVER where it stays; none of anything else."""
+        if self.kind == "ramp":
+            return ((self.effect.coefficients["onset"], FOREVER),)
         told = self.effect.coefficients if self.kind == "switch" else {}
         return tuple((told[c], told[c.replace("on_", "for_")]) for c in told if c.startswith("on_"))
 

@@ -51,6 +51,8 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         return f"{name} does not go above {first:.3g}{unit}"
     if h.kind == "switch":
         return f"{name} {_switched(h.effect, mode, first, unit, site.role == 'sensor')}"
+    if h.kind == "ramp":
+        return f"{name} {_grows(h.effect, mode, first, unit, site.role == 'sensor')}"
     if h.kind == "periodic":
         return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], mode, unit)}"
     if h.kind == "hysteresis":
@@ -113,6 +115,14 @@ def _swings(size: float, period: float, mode: str, unit: str) -> str:
     """How far it goes up and down, and how often: `swings by 0.4 K up and down every 900 s`."""
     swing = f"{size:.3g}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
     return f"swings by {swing} up and down every {period:.3g} s"
+
+
+def _grows(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:
+    """What changes gradually, with its times: `is 27 % smaller in the end, gradually from 1380 to 1900 s`."""
+    onset, duration = effect.coefficients["onset"], effect.coefficients["duration"]
+    begin, end = clock(onset), clock(onset + duration)
+    change = f"{abs(size):.3g}{unit} {'more' if size > 0 else 'less'}" if mode == "offset" else _factor(size)
+    return f"{'shows' if sensor and mode == 'offset' else 'is'} {change} in the end, gradually from {begin} to {end} s"
 
 
 def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, worth
@@ -116,7 +116,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
 
 def _why(search: Search, given_up: Sequence[Hypothesis]) -> str:
     """Why effects were given up."""
-    events = [h for h in given_up if h.kind == "switch" and _follows_an_input(search, h)]
+    events = [h for h in given_up if h.kind in EVENTS and _follows_an_input(search, h)]
     others = [h for h in given_up if h not in events]
     why = [f"{', '.join(h.label for h in events)}: at steps of an input, so it is no event"] if events else []
     if others:
@@ -131,7 +131,7 @@ def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hyp
     One alone may well come with an input: guests when those who are counted go.
     """
     beside = explanation.hypotheses if len(explanation.hypotheses) > 1 else ()
-    return tuple(h for h in beside if h.kind == "switch" and _follows_an_input(search, h))
+    return tuple(h for h in beside if h.kind in EVENTS and _follows_an_input(search, h))
 
 
 def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Explanation]) -> tuple[Hypothesis, ...]:
@@ -142,7 +142,7 @@ def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Exp
     total = best.criterion - base.criterion
     beside = best.hypotheses if len(best.hypotheses) > 1 else ()
     return tuple(
-        h for h in beside if h.kind == "switch" and best.criterion - without[h.label].criterion < OWN * total
+        h for h in beside if h.kind in EVENTS and best.criterion - without[h.label].criterion < OWN * total
     )  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def _told(
     best, alike = found[0], _alike(search, base, found)
     certain = tuple(h for h in best.hypotheses if all(_has(e, h) for e in alike))
     rest = [(e, h) for e in alike for h in e.hypotheses if not any(_same(h, c) for c in certain)]
-    events = [(e, h) for e, h in rest if h.kind == "switch"]
+    events = [(e, h) for e, h in rest if h.kind in EVENTS]
     if {id(e) for e, _ in events} == {id(e) for e in alike}:  # whatever else there is, something is switched
         members = _one_a_site(events)
         if 2 <= len(members) <= LARGEST_CLASS:

@@ -10,6 +10,7 @@ from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
 from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -21,6 +22,8 @@ BALANCE = ("process", "flow", "feed")
 """Roles of sites whose value enters a balance."""
 SHARP = 6.0
 """Gain of log-likelihood by which edges within a row must be better than slow ones."""
+RAMP_ENDS, NEARER, ZOOMS = 21, 5, 2
+"""Times between which ramps begin and end, those about either of them in a finer grid, and how often it is refined."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,8 @@ class Screening:
         self._count = int(np.count_nonzero(response.innovations))
         self._values, self._drivers = response.seen()
 
-    def all(self, *, events: bool) -> list[Screened]:
-        """Every suspect, the best first; with changes in time or without."""
+    def all(self, *, events: bool, ramps: bool = False) -> list[Screened]:
+        """Every suspect, the best first; with changes in time or without, and with gradual ones or without."""
         record = self._response.record
         by_site: dict[str, list[Suspect]] = {}
         for s in suspects(self.model, self._values, self._drivers, record.dt):
@@ -72,6 +75,8 @@ class Screening:
         if events:
             found += [x for site in self.model.sites if (x := self.switch(site)) is not None]
             found += [x for site in self.model.sites for x in self._swings(site)]
+        if ramps:
+            found += [x for site in self.model.sites if (x := self.ramp(site)) is not None]
         return sorted(found, key=lambda x: -x.gain)
 
     def switch(self, site: Site) -> Screened | None:
@@ -104,6 +109,26 @@ class Screening:
         hypothesis = Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))
         suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
+
+    def ramp(self, site: Site) -> Screened | None:
+        """The best gradual change at a site, after which it stays; None where the record says nothing of the site."""
+        record, count = self._response.record, len(self._response.record) - 1
+        by = self._values[site.name] if site.mode == "factor" else np.ones(count)
+        if not np.isfinite(by).all() or not np.abs(by).max() > 0:
+            return None
+        grid = np.unique(np.linspace(0, count, RAMP_ENDS).astype(int))
+        pairs = [(a, b) for a in grid[:-1] for b in grid[1:] if b > a]
+        best: Screened | None = None
+        for zoom in range(ZOOMS + 1):
+            group = [_ramp(site, by, record, a, b) for a, b in pairs]
+            best = max(self._regressions(site.name, group), key=lambda x: x.gain, default=None)
+            if best is None:
+                return None
+            at = next(pair for pair, suspect in zip(pairs, group, strict=True) if suspect is best.suspect)
+            reach = count / (RAMP_ENDS - 1) / NEARER**zoom
+            begins, ends = ((k + np.linspace(-reach, reach, 2 * NEARER - 1)).astype(int) for k in at)
+            pairs = [(a, b) for a in np.unique(begins) for b in np.unique(ends) if 0 <= a < b - 1 and b <= count]
+        return best
 
     def _is_sharp(self, site: str, by: FloatArray, switch: Switch) -> bool:
         """Whether the record tells the switch from a slow course: what wanders is not switched."""
@@ -163,6 +188,16 @@ def _span(X: FloatArray) -> FloatArray:
     U, s, _ = np.linalg.svd(X[:, length > 0] / length[length > 0], full_matrices=False)
     found: FloatArray = U[:, s > NOTHING * s.max()] if len(s) else U
     return found
+
+
+def _ramp(site: Site, by: FloatArray, record: Dataset, begin: int, end: int) -> Suspect:
+    """A change that grows from one interval to another and stays, of a course (N - 1,)."""
+    count = len(by)
+    share = np.clip((np.arange(count) + 0.5 - begin) / (end - begin), 0.0, 1.0)
+    times = {"onset": float(record.time[begin]), "duration": float((end - begin) * record.dt)}
+    effect = Effect(site.name, "time", "ramp", {"amplitude": 0.0, **times}, {}, mode=site.mode)
+    hypothesis = Hypothesis(site.name, "time", "ramp", effect, ("amplitude",), ({},))
+    return Suspect(hypothesis, (by * share)[:, None], ("amplitude",), 2)
 
 
 def _switch_effect(site: Site, mode: Mode, switch: Switch, time: FloatArray, dt: float) -> Effect:

@@ -13,7 +13,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
@@ -30,6 +30,8 @@ BEAM = 3
 MOST_EFFECTS = 2
 LEAST_GAIN = 12.0
 """Gain of the criterion that another effect must bring."""
+SLOW = ("lag", "store")
+"""Kinds of effects that the fit of the model as it is hides in its constants: its stores have become larger."""
 FURTHEST = 4.0
 """Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
 
@@ -91,6 +93,10 @@ class Search:
         Fits that run at once.
     kinds
         Kinds of effects that may be found; None for all.
+    as_given
+        The free constants as the model came, from which what is slow is fitted once more; none where they are known.
+    ramps
+        Whether gradual changes are looked for. What wanders is full of them, so a reference must say how much does.
     """
 
     model: Model
@@ -101,6 +107,8 @@ class Search:
     known: Constants | None = None
     processes: int = 1
     kinds: tuple[str, ...] | None = None
+    as_given: tuple[float, ...] = ()
+    ramps: bool = False
 
     def model_of(self, explanation: Explanation) -> Model:
         """The model with the effects of an explanation and its fitted parameters."""
@@ -151,7 +159,7 @@ class Search:
         screening = self.screening(start, [s.name for s in self.model.sites])
         # one course in time at most: a second one would draw whatever is left
         events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
-        screened = screening.all(events=events)
+        screened = screening.all(events=events, ramps=events and self.ramps)
         chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
         refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
@@ -215,7 +223,7 @@ class Search:
                 continue
             moved = Hypothesis(site, "lag", late.kind, effect, late.free, ({},), {}, late.scales)
             p = model_with(self.model_of(rest), moved).parameter_values
-            again = self.added(rest, moved, p)
+            again = self._better_start(rest, moved, p)
             found += [again] if np.isfinite(again.fit.log_likelihood) else []
         return found
 
@@ -265,8 +273,20 @@ class Search:
             q = model.parameters[model.index("parameters", h.effect.parameter(name))]
             first = np.log(np.clip(1 + value, 1 / FURTHEST, FURTHEST)) if h.effect.mode == "factor" else value
             p[model.index("parameters", q.name)] = np.clip(first, q.lower, q.upper)
-        again = self.added(start, h, p)
+        again = self._better_start(start, h, p) if h.kind in SLOW and not start.hypotheses else self.added(start, h, p)
         return again if np.isfinite(again.fit.log_likelihood) else None
+
+    def _better_start(self, start: Explanation, h: Hypothesis, p: FloatArray) -> Explanation:
+        """An effect more that is slow, fitted from parameters (np,), and with the constants as the model came.
+
+        The fit of the model as it is has made a store larger for a lag that it lacks: from there the lag stays short.
+        """
+        starts = [p]
+        if self.as_given:
+            starts.append(p.copy())
+            starts[1][list(model_with(self.model_of(start), h).indices("parameters", self.free))] = self.as_given
+        refits = [self.added(start, h, each) for each in starts]
+        return max(refits, key=lambda e: (bool(np.isfinite(e.fit.log_likelihood)), e.criterion))
 
 
 def worth(explanation: Explanation) -> float:
@@ -279,7 +299,8 @@ def worth(explanation: Explanation) -> float:
 
 def numbers_of(h: Hypothesis) -> int:
     """How many numbers a hypothesis was fitted by, those taken from a grid and the times of a switch too."""
-    times = [c for c, v in h.effect.coefficients.items() if c.startswith(("on_", "for_")) and v < FOREVER]
+    told = h.effect.coefficients.items() if h.kind in EVENTS else ()
+    times = [c for c, v in told if c.startswith(("on_", "for_", "onset", "duration")) and v < FOREVER]
     return len(h.free) + len(times)
 
 

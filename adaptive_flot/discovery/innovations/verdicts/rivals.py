@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
+from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
@@ -149,7 +150,7 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     An event is there or not. What wanders goes up and down all the time, and the largest of its swings looks like one:
     beside that, a further switch at the site gains about as much (WANDERS).
     """
-    event = next((h for h in told.best.hypotheses if h.kind == "switch" and h in told.effects), None)
+    event = next((h for h in told.best.hypotheses if h.kind in EVENTS and h in told.effects), None)
     if told.word not in ("named", "class") or event is None:
         return told
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)

@@ -14,6 +14,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
@@ -56,16 +57,22 @@ def second_opinion(state: State) -> State:
     `errors_over_stretches`). A curve in time follows what wanders, so that no other cause has a smaller error.
     """
     problem, (before, _) = state.known_problem, state.refitted
-    silent = (state.judged.word == "abstain" and not state.contradiction) or state.judged.word == "unnamed"
+    silent = state.judged.word == "abstain" or state.judged.word == "unnamed"
     asked = silent or follows_time(state) or unexpected_drift(state) or unconfirmed(state) or leaves_too_much(state)
     record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
     if record is None or time.monotonic() > state.ends:  # a budget that is spent has no time for it
         return state
     state.progress("ask the innovations form")
+    given = {q.name: q.value for q in state.model.parameters}
     search = Search(
-        before.model, record, problem.columns, noise_floor([problem.record], problem.columns), problem.adapted, None,
-        state.processes,
-    )  # fmt: skip
+        before.model,
+        record,
+        problem.columns,
+        noise_floor([problem.record], problem.columns),
+        problem.adapted,
+        processes=state.processes,
+        as_given=tuple(given[name] for name in problem.adapted),
+    )
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
         told = judge(search, base, search.run(base, state.progress))
@@ -181,7 +188,7 @@ def _over_stretches(state: State, search: Search, base: Explanation, best: Expla
     problem = state.known_problem
     held_out = np.isin(search.record.time, problem.record.time[problem.rows("report")])
     report = state.report_record
-    on = is_on(best, search.record.time) if any(h.kind == "switch" for h in best.hypotheses) else held_out
+    on = is_on(best, search.record.time) if any(h.kind in EVENTS for h in best.hypotheses) else held_out
     if on.any() and not (on & held_out).any():
         return errors_over_folds(search, base, best)
     report = searchable(report, search.model) if report is not None else None
