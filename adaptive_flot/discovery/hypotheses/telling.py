@@ -18,6 +18,8 @@ from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
+FAR_ABOVE = 2.0
+"""An error so many times its usual one is far above it."""
 FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
 MOVED = 1.0
@@ -139,8 +141,14 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
     if judged.word == "insufficient":
         return f"The records do not say enough: {judged.why}."
     if judged.word == "abstain":
-        near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis)
-        return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near or 'nothing'}."
+        near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis) or "nothing"
+        most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
+        if reference and most <= FAR_ABOVE:
+            first = (
+                f"Errors are up to {max(most, 1.0):.2g} times those of the reference, and the records do not say why"
+            )
+            return f"{first}: {judged.why}. What wanders in the process may do that. Nearest: {near}."
+        return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near}."
     said = [_part_in_words(model, judged, t) for t in judged.parts]
     first = f"{said[0][0].upper()}{said[0][1:]}." if judged.word == "named" else _one_of(said)
     helped = ", ".join(c.words for c in error)

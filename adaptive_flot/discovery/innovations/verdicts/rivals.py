@@ -9,6 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS
+from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
@@ -22,8 +23,6 @@ WANDERS = 0.25
 """Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
 MUCH = 100.0
 """Fall of the Bayesian information criterion by which an alternative explains much."""
-FAR_ABOVE = 2.0
-"""An error so many times its usual one is far above it."""
 TELLS = ("named", "class", "unnamed")
 """Words of the free run that tell something."""
 
