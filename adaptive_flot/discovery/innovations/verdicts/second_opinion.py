@@ -48,8 +48,8 @@ from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_fro
 def second_opinion(state: State) -> State:
     """Ask the innovations form where the free run leaves too much, and keep only what both allow.
 
-    It is asked where nothing has a name, where a free curve in time has one, where what is fitted drifts, where much
-    was found and not confirmed, and where too much is left. What it names takes the place of the free run's verdict,
+    It is asked where nothing has a name, where held-out rows contradict what had one, where a free curve in time has
+    one, where what is fitted drifts, where much was found and not confirmed, and where too much is left. What it names takes the place of the free run's verdict,
     where the report rows do not contradict it. A name of the free run that it does not know is taken back.
 
     Two errors on the report rows may contradict it. That of a free run over the record must not surely grow. Where it
@@ -57,13 +57,12 @@ def second_opinion(state: State) -> State:
     `errors_over_stretches`). A curve in time follows what wanders, so that no other cause has a smaller error.
     """
     problem, (before, _) = state.known_problem, state.refitted
-    silent = state.judged.word == "abstain" or state.judged.word == "unnamed"
-    asked = silent or follows_time(state) or unexpected_drift(state) or unconfirmed(state) or leaves_too_much(state)
-    record = searchable(replace(problem.record, initial_state=before.initial_state), before.model) if asked else None
+    given = replace(problem.record, initial_state=before.initial_state)
+    record = searchable(given, before.model) if is_asked(state) else None
     if record is None or time.monotonic() > state.ends:  # a budget that is spent has no time for it
         return state
     state.progress("ask the innovations form")
-    given = {q.name: q.value for q in state.model.parameters}
+    start = {q.name: q.value for q in state.model.parameters}
     search = Search(
         before.model,
         record,
@@ -71,7 +70,7 @@ def second_opinion(state: State) -> State:
         noise_floor([problem.record], problem.columns),
         problem.adapted,
         processes=state.processes,
-        as_given=tuple(given[name] for name in problem.adapted),
+        as_given=tuple(start[name] for name in problem.adapted),
     )
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
@@ -81,6 +80,12 @@ def second_opinion(state: State) -> State:
     if told.word in ("named", "class"):
         return _told(state, search, base, told)
     return _kept(state, told)
+
+
+def is_asked(state: State) -> bool:
+    """Whether the free run leaves something open (see `second_opinion`)."""
+    silent = state.judged.word in ("abstain", "unnamed")
+    return silent or follows_time(state) or unexpected_drift(state) or unconfirmed(state) or leaves_too_much(state)
 
 
 def _kept(state: State, told: Told) -> State:

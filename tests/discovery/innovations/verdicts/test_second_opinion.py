@@ -35,6 +35,11 @@ def test_a_free_curve_in_time_that_is_told_asks_for_a_second_opinion(word: str, 
     assert rivals.follows_time(state(word, effect)) == asked
 
 
+@pytest.mark.parametrize("contradiction", ["", "on held-out rows it makes the error larger"])
+def test_what_is_not_told_is_asked_contradicted_or_not(contradiction: str) -> None:
+    assert asking.is_asked(state("abstain", LAW, contradiction)) and asking.is_asked(state("unnamed", LAW))
+
+
 @pytest.mark.parametrize(
     ("given", "competes"),
     [
