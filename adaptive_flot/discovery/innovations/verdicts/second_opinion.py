@@ -49,8 +49,9 @@ def second_opinion(state: State) -> State:
     """Ask the innovations form where the free run leaves too much, and keep only what both allow.
 
     It is asked where nothing has a name, where held-out rows contradict what had one, where a free curve in time has
-    one, where what is fitted drifts, where much was found and not confirmed, and where too much is left. What it names takes the place of the free run's verdict,
-    where the report rows do not contradict it. A name of the free run that it does not know is taken back.
+    one, where what is fitted drifts, where much was found and not confirmed, and where too much is left. What it names
+    takes the place of the free run's verdict, where the report rows do not contradict it. A name of the free run that
+    it does not know is taken back.
 
     Two errors on the report rows may contradict it. That of a free run over the record must not surely grow. Where it
     does not surely fall, or the free run has a free curve in time for a rival, that over stretches must (see
