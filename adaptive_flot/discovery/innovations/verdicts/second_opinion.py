@@ -51,7 +51,7 @@ def second_opinion(state: State) -> State:
     It is asked where nothing has a name, where held-out rows contradict what had one, where a free curve in time has
     one, where what is fitted drifts, where much was found and not confirmed, and where too much is left. What it names
     takes the place of the free run's verdict, where the report rows do not contradict it. A name of the free run that
-    it does not know is taken back.
+    it does not know is taken back, and so is a curve without a name.
 
     Two errors on the report rows may contradict it. That of a free run over the record must not surely grow. Where it
     does not surely fall, or the free run has a free curve in time for a rival, that over stretches must (see
@@ -90,11 +90,10 @@ def is_asked(state: State) -> bool:
 
 
 def _kept(state: State, told: Told) -> State:
-    """The verdict of the free run where the innovations form tells nothing: less sure of a name, and of `none`."""
+    """The verdict where the innovations form tells nothing: less sure of a name, of a curve without one, of `none`."""
     judgement = state.judged
-    named = {site for site, _ in judgement.best.names} if judgement.best and judgement.word == "named" else set()
-    if named and not named <= told.sites:
-        return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other sites explain more'}")
+    if not _knows(told, judgement):
+        return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other effects explain more'}")
     if judgement.word in ("named", "class") and follows_time(state):
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
@@ -108,6 +107,16 @@ def _kept(state: State, told: Told) -> State:
             f"row to row, and {why}.",
         )
     return state
+
+
+def _knows(told: Told, judgement: Judgement) -> bool:
+    """Whether a name is at sites of the best explanations; a curve without a name must be one of their effects."""
+    if judgement.best is None:
+        return True
+    if judgement.word == "unnamed":
+        found = {(h.site, h.driver) for e in told.alike for h in e.hypotheses}
+        return set(judgement.best.names) <= found
+    return judgement.word != "named" or {site for site, _ in judgement.best.names} <= told.sites
 
 
 def names_one_of(judgement: Judgement, told: Told) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
@@ -51,6 +52,25 @@ def test_what_is_not_told_is_asked_contradicted_or_not(contradiction: str) -> No
 )
 def test_the_best_of_an_abstention_must_leave_the_larger_error_too(given: Any, competes: bool) -> None:
     assert rivals.competes(given) == competes
+
+
+@pytest.mark.parametrize(
+    ("word", "there", "known"),
+    [
+        ("unnamed", ("gains", "sun"), True),
+        ("unnamed", ("gains", "lag"), False),
+        ("named", ("gains", "lag"), True),
+        ("named", ("loss", "sun"), False),
+        ("class", ("loss", "sun"), True),
+    ],
+)
+def test_a_name_stays_at_its_site_and_a_curve_without_one_only_as_that_curve(
+    word: Any, there: tuple[str, str], known: bool
+) -> None:
+    """With process noise nothing is told for sure, and the best explanation has one effect."""
+    explanation = SimpleNamespace(hypotheses=(SimpleNamespace(site=there[0], driver=there[1]),))
+    told = Told("abstain", explanation, (), (), (explanation,), "")  # type: ignore[arg-type]
+    assert asking._knows(told, state(word, LAW).judged) == known
 
 
 def test_only_a_fault_at_the_place_of_an_unnamed_curve_may_leave_a_little_more() -> None:
