@@ -26,6 +26,7 @@ from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, 
 from adaptive_flot.discovery.innovations.thinning import is_short
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
+from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -62,6 +63,7 @@ def find_changes(
     with np.errstate(all="ignore"):
         search, base, told, sole, before = _with_process_noise(compared, records[0], reference, processes, progress)
         seconds = time.perf_counter() - began
+        told = unless_a_trend(base, told)
         with_it = compared
         if _has_event(told):
             with_it = with_event(compared, search, told, seconds)

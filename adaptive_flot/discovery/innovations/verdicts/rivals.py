@@ -8,7 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
-from adaptive_flot.discovery.hypotheses.families import EVENTS
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -23,6 +23,8 @@ WANDERS = 0.25
 """Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
 MUCH = 100.0
 """Fall of the Bayesian information criterion by which an alternative explains much."""
+TREND = 100.0
+"""Gain of log-likelihood below which a change that lasts to the end of a record may be slow wandering."""
 TELLS = ("named", "class", "unnamed")
 """Words of the free run that tell something."""
 
@@ -156,6 +158,19 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     if search.switched_again(told.best, event) < WANDERS * (told.best.criterion - rest.criterion):
         return told
     why = f"{event.site} changes about as much at other times, so that it wanders"
+    return replace(told, word="abstain", certain=(), open=(), why=why)
+
+
+def unless_a_trend(base: Explanation, told: Told) -> Told:
+    """Nothing where an event is told that lasts to the end, and it gains little (TREND): what wanders slowly does that.
+
+    What wanders over about as long as a record is long goes one way in it. A reference of that length shows one such
+    course, and not how large the next one is.
+    """
+    lasting = any(len(h.pulses) == 1 and h.pulses[0][1] >= FOREVER for h in told.effects)
+    if told.word not in ("named", "class") or not lasting or told.best.criterion - base.criterion >= TREND:
+        return told
+    why = "a change that lasts to the end, and is so small, may be what wanders in the process"
     return replace(told, word="abstain", certain=(), open=(), why=why)
 
 

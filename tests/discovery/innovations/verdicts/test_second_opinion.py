@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from adaptive_flot.discovery.hypotheses.families import FOREVER
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
@@ -52,6 +53,24 @@ def test_what_is_not_told_is_asked_contradicted_or_not(contradiction: str) -> No
 )
 def test_the_best_of_an_abstention_must_leave_the_larger_error_too(given: Any, competes: bool) -> None:
     assert rivals.competes(given) == competes
+
+
+@pytest.mark.parametrize(
+    ("gain", "pulses", "told"),
+    [
+        (99.0, ((2000.0, FOREVER),), False),
+        (101.0, ((2000.0, FOREVER),), True),
+        (50.0, ((2000.0, 300.0),), True),
+        (50.0, ((2000.0, 300.0), (4000.0, FOREVER)), True),
+    ],
+)
+def test_a_small_change_that_lasts_to_the_end_may_be_what_wanders(
+    gain: float, pulses: tuple[tuple[float, float], ...], told: bool
+) -> None:
+    """What ends again, or comes several times, is no trend."""
+    base, best = SimpleNamespace(criterion=10.0), SimpleNamespace(criterion=10.0 + gain)
+    given = Told("named", best, (SimpleNamespace(pulses=pulses),), (), (), "")  # type: ignore[arg-type]
+    assert (rivals.unless_a_trend(base, given).word == "named") == told  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
