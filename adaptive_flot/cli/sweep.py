@@ -27,13 +27,7 @@ def sweep(
 ) -> None:
     """Run a study of many runs. Interrupted, the same command goes on where it was."""
     from adaptive_flot.studies.fork_server import start_fork_server
-
-    if scheduler is None:
-        start_fork_server()  # it imports while this process does
-    from adaptive_flot.console_study import print_study
-    from adaptive_flot.studies.progress import live
     from adaptive_flot.studies.study_file import load_study
-    from adaptive_flot.studies.sweep import sweep as run_study
 
     loaded = load_study(study)
     folder = results_folder(out, loaded.name, "sweep")
@@ -41,6 +35,12 @@ def sweep(
     check_targets(
         [loaded.path, *inputs], in_folder(folder, "study.json", "runs.parquet", "timings.parquet", "report.html")
     )
+    if scheduler is None:
+        start_fork_server()  # it imports while this process does
+    from adaptive_flot.console_study import print_study
+    from adaptive_flot.studies.progress import live
+    from adaptive_flot.studies.sweep import sweep as run_study
+
     compiled = can_compile(compile_)
     try:
         with live(loaded.name) as progress:
