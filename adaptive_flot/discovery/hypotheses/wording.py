@@ -118,11 +118,13 @@ def _swings(size: float, period: float, mode: str, unit: str) -> str:
 
 
 def _grows(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:
-    """What changes gradually, with its times: `is 27 % smaller in the end, gradually from 1380 to 1900 s`."""
+    """What changes gradually, with its times: `becomes 27 % smaller, gradually from 1380 to 1900 s`."""
     onset, duration = effect.coefficients["onset"], effect.coefficients["duration"]
-    begin, end = clock(onset), clock(onset + duration)
-    change = f"{abs(size):.3g}{unit} {'more' if size > 0 else 'less'}" if mode == "offset" else _factor(size)
-    return f"{'shows' if sensor and mode == 'offset' else 'is'} {change} in the end, gradually from {begin} to {end} s"
+    if mode == "offset":
+        change = f"comes to {'show' if sensor else 'be'} {abs(size):.3g}{unit} {'more' if size > 0 else 'less'}"
+    else:
+        change = f"becomes {_factor(size)}"
+    return f"{change}, gradually from {clock(onset)} to {clock(onset + duration)} s"
 
 
 def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:

@@ -1,4 +1,4 @@
-"""Protects the sentence that compares a quantity at two places."""
+"""Protects the sentences that compare a quantity at two places, and at two times."""
 
 from __future__ import annotations
 
@@ -28,3 +28,17 @@ def test_a_dependence_is_compared_as_one_would_say_it(factor: float, said: str) 
     found = Hypothesis(site, "flow", "depends", effect, ("value_1", "value_2"), ())
     value = dict(zip(found.parameters, (0.0, float(np.log(factor))), strict=True))
     assert words_of(model, found, value.__getitem__).endswith(f" depends on flow: {said}")
+
+
+@pytest.mark.parametrize(
+    ("site", "size", "said"),
+    [
+        ("heat_loss", float(np.log(0.7)), "heat loss becomes 30 % smaller, gradually from 90 to 900 s"),
+        ("heat_loss", float(np.log(3.0)), "heat loss becomes 3 times as large, gradually from 90 to 900 s"),
+        ("thermometer", -2.5, "thermometer comes to show 2.5 K less, gradually from 90 to 900 s"),
+    ],
+)
+def test_a_gradual_change_is_told_with_its_begin_and_end(site: str, size: float, said: str) -> None:
+    effect = Effect(site, "time", "ramp", {"amplitude": 0.0, "onset": 90.0, "duration": 810.0}, {})
+    found = Hypothesis(site, "time", "ramp", effect, ("amplitude",), ({},))
+    assert words_of(tank(), found, lambda name: size) == said
