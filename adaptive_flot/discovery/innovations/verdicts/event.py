@@ -58,10 +58,11 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, seconds)
     if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or hardly_explained(verdict.error, ABOVE_USUAL):
         return compared
-    over_all = f"Over the whole record: {compared.verdict.reason}"
+    said = compared.verdict.word in ("named", "class")  # what is not told over the whole record says nothing beside it
+    over_all = (f"Over the whole record: {compared.verdict.reason}",) if said else ()
     return replace(
         compared,
-        verdict=replace(verdict, notes=(*verdict.notes, over_all)),
+        verdict=replace(verdict, notes=(*verdict.notes, *over_all)),
         model=model_with(model, found[0].hypothesis).with_parameters(found[0].fit.values),
         calibration=calibration,
         blocks=blocks,
