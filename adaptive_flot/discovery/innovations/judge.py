@@ -174,9 +174,6 @@ def _told(
         members = _one_a_site(events)
         if 2 <= len(members) <= LARGEST_CLASS:
             return _certain_alone(search, base, Told("class", best, certain, members, alike, ""), without)
-    alone = next((e for e in alike if len(e.hypotheses) == 1 and _is_in_all(e, alike)), None)
-    if alone is not None and not certain and not _contradicted(search, alone, {alone.hypotheses[0].label: base}):
-        return late_anywhere(search, base, Told("named", alone, alone.hypotheses, (), alike, ""))
     members = _one_a_site(rest)
     if len(certain) == len(best.hypotheses):
         named = _without_small_ones(base, Told("named", best, certain, (), alike, ""), without)
@@ -267,11 +264,6 @@ def _only_adds(explanation: Explanation, other: Explanation) -> bool:
         for e in (explanation, other)
     )
     return bool(two) and two < one
-
-
-def _is_in_all(one: Explanation, alike: Sequence[Explanation]) -> bool:
-    """Whether every other explanation has the effect of this one and more, a lag at whatever place."""
-    return len(alike) > 1 and all(e is one or _only_adds(e, one) for e in alike)
 
 
 def _one_a_site(pairs: Sequence[tuple[Explanation, Hypothesis]]) -> tuple[tuple[Explanation, Hypothesis], ...]:

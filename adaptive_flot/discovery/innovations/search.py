@@ -319,7 +319,9 @@ def _spread(ranked: Sequence[Screened]) -> list[Screened]:
             break
     stores = [s for s in ranked if s.suspect.hypothesis.kind == "store" and s.gain >= LEAST_GAIN]
     further = [] if any(s in chosen for s in stores) else stores[:1]
-    by_site = {s.suspect.hypothesis.site: s for s in reversed(ranked) if s.suspect.hypothesis.kind == "lag"}
+    by_site = {
+        s.suspect.hypothesis.site: s for s in reversed(ranked) if s.suspect.hypothesis.kind == "lag" and s.gain > 0
+    }
     lags = sorted((s for s in by_site.values() if s not in chosen), key=lambda s: -s.gain)
     return [*chosen, *further, *lags[:LAGS_ELSEWHERE]]
 
