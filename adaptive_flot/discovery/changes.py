@@ -63,7 +63,7 @@ def find_changes(
     with np.errstate(all="ignore"):
         search, base, told, sole, before = _with_process_noise(compared, records[0], reference, processes, progress)
         seconds = time.perf_counter() - began
-        told = unless_a_trend(base, told)
+        told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         with_it = compared
         if _has_event(told):
             with_it = with_event(compared, search, told, seconds)

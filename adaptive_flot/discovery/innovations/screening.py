@@ -91,10 +91,15 @@ class Screening:
             found.append(self._switch(site, "offset"))
         return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
 
+    def _course(self, site: Site, mode: Mode) -> FloatArray | None:
+        """Change of a site's value by an event of size 1 (N - 1,); None where the record says nothing of the site."""
+        by = self._values[site.name] if mode == "factor" else np.ones(len(self._response.record) - 1)
+        return by if np.isfinite(by).all() and np.abs(by).max() > 0 else None
+
     def _switch(self, site: Site, mode: Mode) -> Screened | None:
         record, count = self._response.record, len(self._response.record) - 1
-        by = self._values[site.name] if mode == "factor" else np.ones(count)
-        if not np.isfinite(by).all() or not np.abs(by).max() > 0:
+        by = self._course(site, mode)
+        if by is None:
             return None
         apart = max(1, -(-count // MOST_EDGES))
         switch = self._best_switch(site.name, by, np.arange(1, count - 1, apart))
@@ -113,8 +118,8 @@ class Screening:
     def ramp(self, site: Site) -> Screened | None:
         """The best gradual change at a site, after which it stays; None where the record says nothing of the site."""
         record, count = self._response.record, len(self._response.record) - 1
-        by = self._values[site.name] if site.mode == "factor" else np.ones(count)
-        if not np.isfinite(by).all() or not np.abs(by).max() > 0:
+        by = self._course(site, site.mode)
+        if by is None:
             return None
         grid = np.unique(np.linspace(0, count, RAMP_ENDS).astype(int))
         pairs = [(a, b) for a in grid[:-1] for b in grid[1:] if b > a]

@@ -1,4 +1,4 @@
-"""A water heater: the user's model, and an independent simulation that fouls, or whose thermometer sits in a well."""
+"""A water heater of the benchmark's model, simulated apart from it: it fouls, or its thermometer sits in a well."""
 
 from __future__ import annotations
 
@@ -6,39 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
+from adaptive_flot.greybox import Dataset
+from benchmarks.other_processes.plants.heat_exchanger import DT
 from tests.discovery.heated import moves
 
-DT, UA, HOLDUP, INLET = 5.0, 2.6, 45.0, 15.0
+UA, HOLDUP, INLET = 2.6, 45.0, 15.0
 FOULED, BEGINS, ENDS, LATE = 0.3, 1500.0, 2400.0, 60.0
 Wrong = Literal["nothing", "fouls", "late"]
-
-
-def model() -> Model:
-    """4.19 holdup dT/dt = ua (steam - T) - 4.19 flow (T - inlet); ua and holdup are to be fitted."""
-
-    def equations(m: Scope) -> None:
-        outlet = m.state("outlet")
-        flow = m.site("flow_meter", m.input("flow"), "sensor", unit="kg/s")
-        steam = m.site("steam", m.input("steam"), "actuator", "offset", unit="K")
-        heat = m.site("transfer", m.parameter("ua") * (steam - outlet), unit="kW")
-        m.derivative("outlet", (heat - 4.19 * flow * (outlet - INLET)) / (4.19 * m.parameter("holdup")))
-        m.output("outlet", m.site("thermometer", outlet, "sensor", "offset", unit="K"))
-
-    def constant(name: str, value: float, unit: str) -> Parameter:
-        return Parameter(name, value, unit, "", lower=value / 30, upper=30 * value, scale=value / 3, role="estimated")
-
-    return Model(
-        name="exchanger",
-        states=(Quantity("outlet", "degC", "", 0.0, 200.0, scale=5.0),),
-        inputs=(Quantity("flow", "kg/s", "", 0.0, 20.0), Quantity("steam", "degC", "", 50.0, 200.0, scale=10.0)),
-        parameters=(constant("ua", 3.0, "kW/K"), constant("holdup", 40.0, "kg")),
-        outputs=(Quantity("outlet", "degC", "", scale=5.0),),
-        equations=equations,
-        max_step_s=DT,
-        starts_steady=False,
-        initial_guess={"outlet": 60.0},
-    )
 
 
 def record(wrong: Wrong, rows: int = 600, seed: int = 0) -> Dataset:
@@ -56,4 +30,5 @@ def record(wrong: Wrong, rows: int = 600, seed: int = 0) -> Dataset:
             water += DT / 5 * (heat - 4.19 * flow * (water - INLET)) / (4.19 * HOLDUP)
             shown += DT / 5 * (water - shown) / LATE
         y[k] = (shown if wrong == "late" else water) + 0.1 * rng.normal()
+    inputs = np.column_stack([inputs, np.full(rows, INLET)])
     return Dataset("exchanger", DT * np.arange(1.0, rows + 1), DT, inputs, y[:, None])

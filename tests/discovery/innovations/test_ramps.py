@@ -6,7 +6,8 @@ import pytest
 from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.search import Search, numbers_of
-from tests.discovery.innovations.exchanger import BEGINS, ENDS, FOULED, model, record
+from benchmarks.other_processes.plants.heat_exchanger import make_model as model
+from tests.discovery.innovations.exchanger import BEGINS, ENDS, FOULED, record
 
 
 @pytest.mark.parametrize("seed", range(2))
