@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.candidates.dynamics import late, limited
@@ -66,7 +67,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
                 either = [v for v in variants if v.effect.family.is_constant or v.effect.family.is_curve]
                 variants += tuple(_otherwise(v, site) for v in either)
             if variants:
-                nameable = (site.name, driver) in known or _nameable(site, driver, bool(known))
+                nameable = (site.name, driver) in known or _nameable(model, site, driver)
                 candidates.append(Candidate(site, driver, nameable, variants))
     return candidates
 
@@ -79,16 +80,27 @@ def _makes_sense(site: Site, driver: str) -> bool:
     return True
 
 
-def _nameable(site: Site, driver: str, table: bool) -> bool:
+def _nameable(model: Model, site: Site, driver: str) -> bool:
     """Whether a pair that no table lists may be named all the same.
 
     A quantity of the process may depend on anything in it. A sensor, an actuator or a feed has no reason to depend on
     the state of the cell; such a dependence is reported as a curve without a name. So is that of a flow, whose law is
-    a matter of its own store, where the model has a table.
+    a matter of its own store, where the model has a table. Without a table, a valve may be no straight line of its own
+    command, and a sensor none of what it measures.
     """
-    if driver in STATELESS_DRIVERS:
+    if driver in STATELESS_DRIVERS or site.role == "process":
         return True
-    return site.role == "process" or (site.role == "flow" and not table)
+    if model.known_effects:
+        return False
+    return site.role == "flow" or model.derived(_passed_on).get(site.name) == driver
+
+
+def _passed_on(model: Model) -> dict[str, str]:
+    """The input or state that the value at a site is a function of, where it is one of no other."""
+    names = (*model.names("states"), *model.names("inputs"), *model.names("algebraic"))
+    on = np.hstack([np.array(ca.DM(model.site_values.jac_sparsity(0, k), 1)) for k in (1, 2, 4)]) != 0
+    alone = {site.name: row for site, row in zip(model.sites, on, strict=True) if row.sum() == 1}
+    return {site: names[int(np.argmax(row))] for site, row in alone.items()}
 
 
 def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -> Iterator[Variant]:

@@ -17,6 +17,7 @@ LEAST_MARGIN = 10.0
 MUCH = 0.1
 """Share of the error removed on fresh rows from which something is missing, though it may not be what was found."""
 LARGEST_CLASS = 3
+LATE = ("lag", "delay")
 MOST_RIVALS = 5
 
 Name = tuple[str, str]
@@ -65,9 +66,18 @@ def judge(result: SearchResult) -> Judgement:
     members = tuple(dict.fromkeys(n for group in names for n in group))
     if any(a.delta_bic > -LEAST_MARGIN for a in named):  # one that explains nothing comes close: so does the best
         return Judgement("abstain", best, (), rivals, margin)
+    if len(members) > LARGEST_CLASS * len(best.names):
+        members = _late_once(members)
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
+
+
+def _late_once(members: Sequence[Name]) -> tuple[Name, ...]:
+    """The members, the best first, without a second way in which one part may be late: lag and dead time look alike."""
+    late = [n for n in members if n[1] in LATE]
+    again = {n for k, n in enumerate(late) if any(n[0] == site for site, _ in late[:k])}
+    return tuple(n for n in members if n not in again)
 
 
 def same_site(names: Sequence[Name]) -> tuple[Name, ...]:

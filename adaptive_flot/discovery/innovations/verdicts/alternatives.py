@@ -45,6 +45,8 @@ def beside_alternatives(
     compared = result.alternatives[:1] if wanders else result.alternatives[:COMPARED]
     found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
     fitted = [e for e in found if e is not None]
+    if wanders and fitted and not told_apart(search, base, fitted[0], told.best):
+        return told  # its curves in time explain no more than the process noise does
     alike = [e for e in fitted if not told_apart(search, base, told.best, e)]
     own = [h for h in told.effects if h.kind != "store"]  # a store beside a fault is what the model leaves out anyway
     better = [e for e in alike if told_apart(search, base, e, told.best)]

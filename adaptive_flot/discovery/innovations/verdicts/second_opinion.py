@@ -21,6 +21,7 @@ from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.alternatives import beside_alternatives
+from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near, one_that_all_have
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
     TELLS,
@@ -43,6 +44,7 @@ from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_f
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
+from adaptive_flot.discovery.verdict.wording import beside_a_part
 
 
 def second_opinion(state: State) -> State:
@@ -75,7 +77,8 @@ def second_opinion(state: State) -> State:
     )
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
-        told = judge(search, base, search.run(base, state.progress))
+        found = search.run(base, state.progress)
+        told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
         told = unless_it_wanders(search, base, told)
     if told.word in ("named", "class"):
@@ -160,7 +163,8 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     if (against and not stands) or hardly_explained(over if stands else error) or _another_drift(state, told):
         return _kept(state, told)
     less = smaller(error, state.error, allowed_ratio(state, names))
-    if competes(state) and not (stands and (follows or wanders)) and not less:
+    beside = in_all_that_is_near(state, names)  # what has more beside it leaves less, and is no other cause
+    if competes(state) and not beside and not (stands and (follows or wanders)) and not less:
         both = beside_alternatives(state, search, base, told, names)
         if both is None:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
@@ -177,7 +181,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         sizes=after.with_sizes(*search.sizes(told.best)),
         error=error,
         contradiction="",
-        certain="",
+        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside else "",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
 
