@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -77,6 +78,9 @@ def test_what_the_table_does_not_list_is_not_named_beside_something_nameless_as_
         ([(BY_FAN, True, 0.0), (("heat_loss", "constant"), True, 2.0)], 0.0, "named"),
         ([(("heat_loss", "constant"), True, 0.0), (BY_FAN, True, 8.6), (BY_HEATER, True, 9.0)], 0.0, "class"),
         ([((s, "fan_speed"), True, 1.0 * k) for k, s in enumerate("abcd")], 0.0, "abstain"),  # too many to be a class
+        # a lag and a dead time of one part are one way to be late
+        ([((s, d), True, 1.0 * k) for k, (s, d) in enumerate(product("ab", ("lag", "delay")))], 0.0, "class"),
+        ([((s, d), True, 1.0 * k) for k, (s, d) in enumerate(product("abcd", ("lag", "delay")))], 0.0, "abstain"),
     ],
 )
 def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, float]], left: float, word: str) -> None:

@@ -6,6 +6,8 @@ from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.results import NamedEffect
+from adaptive_flot.discovery.verdict.sizes import words_of_effect
 
 
 def told_in_words(search: Search, told: Told) -> str:
@@ -28,4 +30,7 @@ def _open_one(search: Search, told: Told, explanation: Explanation, h: Hypothesi
 def words_at(search: Search, explanation: Explanation, h: Hypothesis) -> str:
     """One effect of an explanation, with its fitted size."""
     model = search.model_of(explanation)
+    if h.kind == "alternative":  # of the free run, in its words
+        effect = next(e for e in model.fitted_effects() if e.label == h.effect.label)
+        return words_of_effect(model, NamedEffect(effect, "", {}, ()))
     return words_of(model, h, lambda name: model.parameters[model.index("parameters", name)].value)

@@ -20,6 +20,7 @@ from adaptive_flot.discovery.record.problem import BoolArray, Problem, make_prob
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.static import spline_basis
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.quantities import KnownEffect
 from adaptive_flot.greybox.stepping.nodes import place_nodes
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from tests.discovery.heated import DT, EXPONENT, Truth, heated_tank, tank_record
@@ -187,6 +188,11 @@ def test_the_catalogue_offers_what_makes_sense_once(weak: tuple[Problem, Fit, Sc
     assert {s for s, d in names if d in ("lag", "delay")} == {"heating", "thermometer"}
     assert {d for s, d in names if s == "heat_loss"} == {"constant", "time", "power", "fan_speed", "temperature"}
     assert {c.name for c in scorer.candidates if not c.known} >= {("thermometer", "power"), ("heating", "fan_speed")}
+    # a part may be no straight line of what it passes on; a table of known effects would say so
+    own = {("heating", "power"), ("thermometer", "temperature")}
+    assert {c.name for c in scorer.candidates if c.known} >= own
+    table = replace(fit, model=replace(fit.model, known_effects=(KnownEffect("heat_loss", "fan_speed", "a draught"),)))
+    assert not {c.name for c in catalogue(table.model, Responses(problem, table)) if c.known} & own
     extended = fit.model.with_effects([Effect("heat_loss", "fan_speed", "power", settings={"reference": 10.0})])
     responses = Responses(problem, Fitter(problem).fit(extended, like=fit) or fit)
     assert ("heat_loss", "fan_speed") not in [c.name for c in catalogue(extended, responses)]

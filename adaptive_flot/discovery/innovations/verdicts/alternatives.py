@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, told_apart
+from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, judge, told_apart
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import but_for_what_wanders
 from adaptive_flot.discovery.results import State
@@ -45,8 +45,8 @@ def beside_alternatives(
     compared = result.alternatives[:1] if wanders else result.alternatives[:COMPARED]
     found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
     fitted = [e for e in found if e is not None]
-    if wanders and fitted and not told_apart(search, base, fitted[0], told.best):
-        return told  # its curves in time explain no more than the process noise does
+    if wanders and fitted:  # it has what is told, and the rest follows anything
+        return told
     alike = [e for e in fitted if not told_apart(search, base, told.best, e)]
     own = [h for h in told.effects if h.kind != "store"]  # a store beside a fault is what the model leaves out anyway
     better = [e for e in alike if told_apart(search, base, e, told.best)]
@@ -66,6 +66,43 @@ def beside_alternatives(
     members = {h.site: (e, h) for e, h in reversed(others)}
     opened = ((told.best, own[0]), *sorted(members.values(), key=lambda m: -m[0].criterion))
     return replace(told, word="class", certain=(), open=opened, alike=(told.best, *alike))
+
+
+def among_alternatives(
+    state: State, search: Search, base: Explanation, found: Sequence[Explanation]
+) -> Told | None:  # fmt: skip
+    """What is told with the effects of the free run among the explanations, where one of those is the best.
+
+    The free run does not tell them apart, and process noise may: it knows what else moves the outputs.
+
+    Parameters
+    ----------
+    state
+        Its judgement tells nothing.
+    search, base, found
+        The innovations form, and its own explanations.
+
+    Returns
+    -------
+    Told or None
+        None where an alternative has several effects or can not be fitted, where one that explains about as much as the
+        best is a free curve in time, and where nothing is told.
+    """
+    _, result = state.searched
+    compared = result.alternatives[:COMPARED]
+    if state.judged.word != "abstain" or state.contradiction or any(len(a.names) > 1 for a in compared):
+        return None
+    fitted = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
+    best_of = {_name(e): e for e in sorted([*found, *(e for e in fitted if e is not None)], key=lambda e: e.criterion)}
+    told = judge(search, base, sorted(best_of.values(), key=lambda e: -e.criterion))
+    alike = [h.effect for e in told.alike for h in e.hypotheses]
+    if None in fitted or told.best not in fitted or any(e.driver == "time" and e.family.is_curve for e in alike):
+        return None
+    return told if told.word in ("named", "class") else None
+
+
+def _name(explanation: Explanation) -> tuple[tuple[str, str], ...]:
+    return tuple(sorted((h.site, h.driver) for h in explanation.hypotheses))
 
 
 def _alone_at(explanation: Explanation, own: Sequence[Hypothesis]) -> bool:

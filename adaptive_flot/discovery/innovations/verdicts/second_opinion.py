@@ -20,9 +20,10 @@ from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
-from adaptive_flot.discovery.innovations.verdicts.alternatives import beside_alternatives
+from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives, beside_alternatives
 from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near, one_that_all_have
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
+from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
     TELLS,
     allowed_ratio,
@@ -81,9 +82,14 @@ def second_opinion(state: State) -> State:
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
         told = unless_it_wanders(search, base, told)
-    if told.word in ("named", "class"):
-        return _told(state, search, base, told)
-    return _kept(state, told)
+    if told.word not in ("named", "class"):
+        return _kept(state, told)
+    told_anew = _told(state, search, base, told)
+    if told_anew.judged.word not in ("named", "class"):
+        with np.errstate(all="ignore"):
+            among = among_alternatives(state, search, base, found)
+        told_anew = _told(state, search, base, among, among=True) if among is not None else told_anew
+    return told_anew
 
 
 def is_asked(state: State) -> bool:
@@ -143,8 +149,11 @@ def _taken_back(state: State, why: str) -> State:
     return replace(state, judgement=judgement, contradiction=why)
 
 
-def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
-    """The verdict of the innovations form, with a free run of the extended model beside that of the plain one."""
+def _told(state: State, search: Search, base: Explanation, told: Told, among: bool = False) -> State:
+    """The verdict of the innovations form, with a free run of the extended model beside that of the plain one.
+
+    Where alternatives of the free run were `among` what it has judged, none of these competes with it.
+    """
     problem, (before, _) = state.known_problem, state.refitted
     after = _free_run(state, search, told.best, before)
     if after is None:
@@ -160,11 +169,13 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
     asked = bool(against or follows) and not surely_worse(error, noise)
     over = _over_stretches(state, search, base, told.best) if asked else ()
     stands = bool(over) and not contradiction(judgement, over, noise)
-    if (against and not stands) or hardly_explained(over if stands else error) or _another_drift(state, told):
+    reached = outputs_in_reach(before.model, search.model_of(told.best))  # a sensor stands in for nothing elsewhere
+    shown = tuple(c for c in (over if stands else error) if c.output in reached)
+    if (against and not stands) or hardly_explained(shown) or _another_drift(state, told):
         return _kept(state, told)
     less = smaller(error, state.error, allowed_ratio(state, names))
     beside = in_all_that_is_near(state, names)  # what has more beside it leaves less, and is no other cause
-    if competes(state) and not beside and not (stands and (follows or wanders)) and not less:
+    if competes(state) and not (among or beside) and not (stands and (follows or wanders)) and not less:
         both = beside_alternatives(state, search, base, told, names)
         if both is None:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
@@ -181,7 +192,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told) -> State:
         sizes=after.with_sizes(*search.sizes(told.best)),
         error=error,
         contradiction="",
-        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside else "",
+        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside or wanders else "",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
 
