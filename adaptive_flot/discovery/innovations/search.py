@@ -13,12 +13,13 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect, Mode
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray, Model
 
 REFITTED, SAME_SITE = 6, 2
@@ -246,21 +247,21 @@ class Search:
             Names of its fitted parameters.
         """
         values = {q.name: q.value for q in fitted.parameters}
-        model, own = self.model, list[Hypothesis]()
+        model, own, numbers = self.model, list[Hypothesis](), 0
         for effect in effects:
-            free = tuple(c.name for c in effect.terms if effect.parameter(c.name) in names)
-            told = {c: values[name] for c in free if (name := effect.parameter(c)) in values}
-            own.append(
-                Hypothesis(effect.site, effect.driver, "alternative", effect, free, ({},)).with_scales(
-                    told, self._modes[effect.site]
-                )
-            )
-            model = model_with(model, own[-1])
+            found = [c for c in effect.terms if effect.parameter(c.name) in names]
+            told = {c.name: values[name] for c in found if (name := effect.parameter(c.name)) in values}
+            times = effect.names(CoefficientRole.ONSET, CoefficientRole.DURATION)  # those of an event stay as they are
+            free = tuple(c.name for c in found if c.name not in times)
+            kind: Kind = "ramp" if effect.form == "ramp" else "alternative"
+            h = Hypothesis(effect.site, effect.driver, kind, effect, free, ({},))
+            own.append(h.with_scales(told, self._modes[effect.site]))
+            model, numbers = model_with(model, own[-1]), numbers + len(found)
         p = np.array([values.get(q.name, q.value) for q in model.parameters])
         fit = self.fitter(model, tuple(name for h in own for name in h.parameters)).fit(p)
         if not np.isfinite(fit.log_likelihood):
             return None
-        return Explanation(tuple(own), fit, sum(map(numbers_of, own)))
+        return Explanation(tuple(own), fit, numbers)
 
     def _with(self, start: Explanation, screened: Screened) -> Explanation | None:
         told = dict(zip(screened.suspect.coefficients, map(float, screened.size), strict=True))

@@ -91,7 +91,7 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         likelier = beside_words(state.likelihood, much_better(state.error))
         return " ".join(filter(None, (said, likelier, state.certain, state.background)))
     errors = ", ".join(c.words for c in state.error)
-    return f"{state.sentence} Error of the free run on held-out rows: {errors}."
+    return f"{state.sentence} Error of the free run on held-out rows: {errors}. {state.certain}".rstrip()
 
 
 def _curves(state: State, effects: tuple[NamedEffect, ...]) -> tuple[EffectCurve, ...]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.changes import find_changes
+from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.search import Search, numbers_of
 from benchmarks.other_processes.plants.heat_exchanger import make_model as model
@@ -37,3 +38,14 @@ def test_a_ramp_costs_its_size_and_both_of_its_times() -> None:
         found = screening.ramp(next(s for s in plain.sites if s.name == "transfer"))
     assert found is not None and found.suspect.cost == numbers_of(found.suspect.hypothesis) == 3
     assert found.suspect.hypothesis.pulses[0][0] == found.suspect.hypothesis.effect.coefficients["onset"]
+
+
+def test_without_a_reference_process_noise_tells_what_the_free_run_does_not() -> None:
+    """For a free run the thermometer, the steam and the meter drift about as well: it tells nothing."""
+    found = discover(model(), record("fouls"))
+    verdict = found.verdict
+    assert verdict.word == "named", verdict.reason
+    (told,) = verdict.effects
+    assert (told.effect.site, told.effect.form) == ("transfer", "ramp")
+    assert np.exp(told.effect.coefficients["amplitude"]) == pytest.approx(1 - FOULED, abs=0.05)
+    assert told.effect.coefficients["onset"] == pytest.approx(BEGINS, abs=200.0)

@@ -82,14 +82,12 @@ def second_opinion(state: State) -> State:
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
         told = unless_it_wanders(search, base, told)
-    if told.word not in ("named", "class"):
-        return _kept(state, told)
-    told_anew = _told(state, search, base, told)
-    if told_anew.judged.word not in ("named", "class"):
-        with np.errstate(all="ignore"):
-            among = among_alternatives(state, search, base, found)
-        told_anew = _told(state, search, base, among, among=True) if among is not None else told_anew
-    return told_anew
+    asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
+    if asked.judged.word in TELLS:
+        return asked
+    with np.errstate(all="ignore"):
+        among = among_alternatives(state, search, base, found)
+    return asked if among is None else _told(state, search, base, among, among=True)
 
 
 def is_asked(state: State) -> bool:

@@ -152,3 +152,53 @@ def test_a_curve_that_explains_more_with_something_else_leaves_nothing() -> None
 def test_a_curve_in_time_beside_what_is_told_is_no_other_cause(criterion: float) -> None:
     said, others = told(LIMIT), (LIMIT, hypothesis("gains", driver="time"))
     assert beside(said, Given(criterion, others), word="class", curve=True) is said
+
+
+def among(
+    monkeypatch: pytest.MonkeyPatch, *others: Given | None, sets: int = 1, contradiction: str = ""
+) -> Told | None:
+    """The answer where the best explanation is named: LIMIT, by 50, is what the innovations form has found."""
+
+    def judged(search: Any, base: Any, found: Any) -> Told:
+        best = found[0]
+        return Told("named", best, best.hypotheses, (), (best,), "")
+
+    monkeypatch.setattr(asking, "judge", judged)
+    named = [
+        SimpleNamespace(names=(("any", "time"),) * sets, effects=str(k), fit=SimpleNamespace(model=None, names=()))
+        for k in range(len(others))
+    ]
+    state: Any = SimpleNamespace(
+        judged=SimpleNamespace(word="abstain"),
+        contradiction=contradiction,
+        searched=(None, SimpleNamespace(alternatives=named)),
+    )
+    search: Any = Stand({str(k): e for k, e in enumerate(others)})
+    base, found = Given(0.0, ()), Given(50.0, (LIMIT,))
+    return asking.among_alternatives(state, search, base, [found])  # type: ignore[arg-type, list-item]
+
+
+RAMP = Hypothesis("demand", "time", "alternative", Effect("demand", "time", "ramp"), (), ({},))
+FREE = Hypothesis("demand", "time", "alternative", CURVE, (), ({},))
+
+
+def test_an_effect_of_the_free_run_that_explains_more_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = among(monkeypatch, Given(90.0, (RAMP,)), Given(20.0, (hypothesis("decay"),)))
+    assert said is not None and said.effects == (RAMP,)
+
+
+@pytest.mark.parametrize(
+    ("others", "settings"),
+    [
+        ((Given(40.0, (RAMP,)),), {}),
+        ((Given(90.0, (FREE,)),), {}),
+        ((Given(90.0, (RAMP,)), None), {}),
+        ((Given(90.0, (RAMP, hypothesis("decay"))),), {"sets": 2}),
+        ((Given(90.0, (RAMP,)),), {"contradiction": "the error grows"}),
+    ],
+    ids=["explains less", "free curve in time", "one can not be fitted", "several effects", "contradicted"],
+)
+def test_nothing_comes_of_effects_of_the_free_run_that(
+    others: Any, settings: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert among(monkeypatch, *others, **settings) is None

@@ -17,7 +17,7 @@ class Near(SimpleNamespace):
     """An alternative of the free run that is near the best one, or not."""
 
     def near(self, best: Any, margin: float) -> bool:
-        return self.worse < margin
+        return bool(self.worse < margin)
 
 
 def free_run(*others: tuple[tuple[tuple[str, str], ...], float], word: str = "abstain", contradiction: str = "") -> Any:
