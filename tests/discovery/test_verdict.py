@@ -16,7 +16,13 @@ from adaptive_flot.discovery.hypotheses.families import hypotheses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
 from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.judge import but_for_what_has_no_reason, first_that_stands, held_up, judge
+from adaptive_flot.discovery.verdict.judge import (
+    _one_way_each,
+    but_for_what_has_no_reason,
+    first_that_stands,
+    held_up,
+    judge,
+)
 from adaptive_flot.discovery.verdict.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.quantities import KnownEffect
@@ -78,9 +84,11 @@ def test_what_the_table_does_not_list_is_not_named_beside_something_nameless_as_
         ([(BY_FAN, True, 0.0), (("heat_loss", "constant"), True, 2.0)], 0.0, "named"),
         ([(("heat_loss", "constant"), True, 0.0), (BY_FAN, True, 8.6), (BY_HEATER, True, 9.0)], 0.0, "class"),
         ([((s, "fan_speed"), True, 1.0 * k) for k, s in enumerate("abcd")], 0.0, "abstain"),  # too many to be a class
-        # a lag and a dead time of one part are one way to be late
+        # a lag and a dead time of one part are one way to be late, a limit and a bent dependence one way to be short
         ([((s, d), True, 1.0 * k) for k, (s, d) in enumerate(product("ab", ("lag", "delay")))], 0.0, "class"),
         ([((s, d), True, 1.0 * k) for k, (s, d) in enumerate(product("abcd", ("lag", "delay")))], 0.0, "abstain"),
+        ([((s, d), True, 1.0 * k) for k, (s, d) in enumerate(product("ab", ("saturation", "u")))], 0.0, "class"),
+        ([((s, d), True, 1.0 * k) for k, (s, d) in enumerate(product("ab", ("time", "u")))], 0.0, "abstain"),
     ],
 )
 def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, float]], left: float, word: str) -> None:
@@ -282,3 +290,15 @@ def test_what_fresh_rows_contradict_gives_way_to_a_name_that_is_as_good_and_stan
         stands = first_that_stands(draught.problem, found)
         assert stands.alternatives[0].names == (front,) and len(stands.alternatives) == 2
         assert judge(stands).word == ("named" if front == BY_FAN else "abstain")
+
+
+def test_a_class_counts_each_part_once_for_each_way_and_keeps_the_likelier_one() -> None:
+    members = (
+        ("valve", "delay"),
+        ("gauge", "lag"),
+        ("valve", "lag"),
+        ("valve", "u"),
+        ("gauge", "saturation"),
+        ("gauge", "u"),
+    )
+    assert _one_way_each(members) == (("valve", "delay"), ("gauge", "lag"), ("valve", "u"), ("gauge", "saturation"))

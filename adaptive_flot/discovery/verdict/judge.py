@@ -67,17 +67,28 @@ def judge(result: SearchResult) -> Judgement:
     if any(a.delta_bic > -LEAST_MARGIN for a in named):  # one that explains nothing comes close: so does the best
         return Judgement("abstain", best, (), rivals, margin)
     if len(members) > LARGEST_CLASS * len(best.names):
-        members = _late_once(members)
+        members = _one_way_each(members)
     if len(members) <= LARGEST_CLASS * len(best.names):
         return Judgement("class", best, members, rivals, margin)
     return Judgement("abstain", best, (), rivals, margin)
 
 
-def _late_once(members: Sequence[Name]) -> tuple[Name, ...]:
-    """The members, the best first, without a second way in which one part may be late: lag and dead time look alike."""
-    late = [n for n in members if n[1] in LATE]
-    again = {n for k, n in enumerate(late) if any(n[0] == site for site, _ in late[:k])}
-    return tuple(n for n in members if n not in again)
+def _one_way_each(members: Sequence[Name]) -> tuple[Name, ...]:
+    """The members, the best first, each part once for each way in which it may be wrong.
+
+    A lag and a dead time look alike, and so do a limit and a bent dependence.
+    """
+    limited = {site for site, driver in members if driver == "saturation"}
+
+    def way(name: Name) -> Name:
+        site, driver = name
+        if driver in LATE:
+            return site, "late"
+        bent = driver == "saturation" or (site in limited and driver not in STATELESS_DRIVERS)
+        return site, "limited" if bent else driver
+
+    likeliest = {way(n): n for n in reversed(members)}.values()
+    return tuple(n for n in members if n in likeliest)
 
 
 def same_site(names: Sequence[Name]) -> tuple[Name, ...]:

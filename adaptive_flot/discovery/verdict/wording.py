@@ -8,7 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
-from adaptive_flot.discovery.verdict.judge import LATE, same_site
+from adaptive_flot.discovery.verdict.judge import same_site
 from adaptive_flot.discovery.verdict.sizes import words_alone
 
 
@@ -109,8 +109,8 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         alone = {a.names[0]: words_alone(a) for a in reversed(sets) if len(a.names) == 1}
         members = "; or ".join(alone.get(name, " by ".join(name)) for name in judgement.members)
         said = f"The model lacks one of these, which this record can not tell apart: {members}."
-        if any(name not in judgement.members and name[1] in LATE for name in alone):
-            said += " A lag and a dead time of one part look alike here."
+        if alike := ", ".join(" by ".join(name) for name in alone if name not in judgement.members):
+            said += f" At the same places it may as well be: {alike}."
         return f"{said} {beside_a_part(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
     either = [n for n in same_site(judgement.best.names) if n in shared]
