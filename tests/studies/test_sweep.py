@@ -157,16 +157,16 @@ def test_changed_content_is_refused_with_what_changed(write_study: WriteStudy) -
 
 
 def test_compiled_runs_have_the_fits_of_plain_ones_and_do_not_mix_with_them(
-    write_study: WriteStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    write_study: WriteStudy, tmp_path: Path, libraries: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What agrees to rounding only is another result, and the folder says so."""
-    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: libraries)
     problem = machine_code.compiler_problem()
     if problem is not None:
         pytest.skip(problem)
     study = load_study(write_study({"seeds.count": 2}))
     quick, plain = sweep(study, tmp_path / "quick", compiled=True).table, sweep(study, tmp_path / "plain").table
-    assert list((tmp_path / "cache").glob("rpem_update-*.so"))
+    assert list(libraries.glob("rpem_update-*.so"))
     fits = [c for c in map(str, plain.columns) if c.startswith("fit_")]
     np.testing.assert_allclose(quick[fits], plain[fits], rtol=1e-9)
     assert not set(quick["run"]) & set(plain["run"])

@@ -228,6 +228,8 @@ def test_an_event_at_a_site_that_changes_as_much_at_other_times_is_none(again: f
     search: Any = SimpleNamespace(switched_again=lambda explanation, h: again)
     asked = rivals.unless_it_wanders(search, Given((), 0.0, 0.0), said)  # type: ignore[arg-type]
     assert asked.word == word and (word == "named" or "it wanders" in asked.why)
+    small = replace(said, best=Given((lid,), 40.0, 0.9))  # type: ignore[arg-type]
+    assert rivals.unless_it_wanders(search, Given((), 0.0, 0.0), small).word == "abstain"  # type: ignore[arg-type]
     lasting = told(Given((lag("valve"),), 300.0, 0.9))
     assert rivals.unless_it_wanders(search, Given((), 0.0, 0.0), lasting) is lasting  # type: ignore[arg-type]
 

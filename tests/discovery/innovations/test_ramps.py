@@ -49,3 +49,9 @@ def test_without_a_reference_process_noise_tells_what_the_free_run_does_not() ->
     assert (told.effect.site, told.effect.form) == ("transfer", "ramp")
     assert np.exp(told.effect.coefficients["amplitude"]) == pytest.approx(1 - FOULED, abs=0.05)
     assert told.effect.coefficients["onset"] == pytest.approx(BEGINS, abs=200.0)
+
+
+def test_a_small_event_is_not_told_from_what_wanders() -> None:
+    """Steam that wanders gave the thermometer of this record two switches of 0.15 K."""
+    verdict = discover(model(), record("nothing", seed=1)).verdict
+    assert verdict.word in ("none", "abstain") and not verdict.effects, verdict.reason

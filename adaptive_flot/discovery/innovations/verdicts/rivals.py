@@ -11,7 +11,7 @@ from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
 from adaptive_flot.greybox.effects import Effect
@@ -149,15 +149,20 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     """Nothing where an event is told, and at its site about as much happens at other times.
 
     An event is there or not. What wanders goes up and down all the time, and the largest of its swings looks like one:
-    beside that, a further switch at the site gains about as much (WANDERS).
+    beside that, a further switch at the site gains about as much (WANDERS). A switch is found where it gains
+    LEAST_GAIN, so an event that gains less than LEAST_GAIN / WANDERS can not be told from what wanders.
     """
     event = next((h for h in told.best.hypotheses if h.kind in EVENTS and h in told.effects), None)
     if told.word not in ("named", "class") or event is None:
         return told
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)
-    if search.switched_again(told.best, event) < WANDERS * (told.best.criterion - rest.criterion):
+    gain = told.best.criterion - rest.criterion
+    if WANDERS * gain < LEAST_GAIN:
+        why = f"{event.site} changes so little that what wanders may do it: no search would find a further such change"
+    elif search.switched_again(told.best, event) >= WANDERS * gain:
+        why = f"{event.site} changes about as much at other times, so that it wanders"
+    else:
         return told
-    why = f"{event.site} changes about as much at other times, so that it wanders"
     return replace(told, word="abstain", certain=(), open=(), why=why)
 
 
