@@ -167,7 +167,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
     asked = bool(against or follows) and not surely_worse(error, noise)
     over = _over_stretches(state, search, base, told.best) if asked else ()
     stands = bool(over) and not contradiction(judgement, over, noise)
-    reached = outputs_in_reach(before.model, search.model_of(told.best))  # a sensor stands in for nothing elsewhere
+    reached = outputs_in_reach(before.model, after.model)  # a sensor stands in for nothing elsewhere
     shown = tuple(c for c in (over if stands else error) if c.output in reached)
     if (against and not stands) or hardly_explained(shown) or _another_drift(state, told):
         return _kept(state, told)

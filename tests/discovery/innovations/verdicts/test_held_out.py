@@ -32,6 +32,8 @@ def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over
     monkeypatch.setattr(asking, "report_errors", lambda *a: (free,))
     monkeypatch.setattr(asking, "noise_from_row_to_row", lambda *a: np.array([NOISE]))
     monkeypatch.setattr(asking, "_over_stretches", lambda *a: (over,))
+    monkeypatch.setattr(asking, "outputs_in_reach", lambda *a: ("level",))
+    monkeypatch.setattr(asking, "in_all_that_is_near", lambda *a: False)
     monkeypatch.setattr(asking, "told_in_words", lambda *a: "Valve does not go below 0.5.")
     rival: Any = SimpleNamespace(effects=(CURVE,), names=(("supply", "time"),))
     judged = Judgement(word, rival, (("supply", "time"),) if word == "class" else (), (), 0.0)  # type: ignore[arg-type]
