@@ -211,6 +211,17 @@ def test_two_effects_by_name_are_rarer_than_a_third_thing_that_they_stand_in_for
     assert rivals.not_two(told(Given((first,), 500.0, 1.0))).word == "named"
 
 
+@pytest.mark.parametrize(("alone", "word"), [(False, "abstain"), (True, "class")])
+def test_a_class_of_events_that_all_need_a_second_effect_is_not_told(alone: bool, word: str) -> None:
+    """A motor's dry friction was seven pulses of its voltage or its load, with an offset or a dead zone beside them."""
+    one, two, offset = event("amplifier", (25.0, 20.0)), event("load", (25.0, 20.0)), lag("sensor")
+    first = (one,) if alone else (one, offset)
+    best: Any = [Given(first, 500.0, 0.9), Given((two, offset), 498.0, 0.9)]
+    said = judging.Told("class", best[0], (), ((best[0], one), (best[1], two)), tuple(best), "")
+    asked = rivals.not_two(said)
+    assert asked.word == word and (alone or "one of amplifier switch, load switch" in asked.why)
+
+
 def test_an_effect_more_beside_one_of_a_class_is_no_other_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
     """Gains by wind, or the loss by wind, or the loss by wind and something else: one of the first two."""
     monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)

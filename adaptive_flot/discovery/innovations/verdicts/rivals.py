@@ -133,16 +133,25 @@ def hardly_explained(changes: tuple[OutputChange, ...], above: float = FAR_ABOVE
 
 
 def not_two(told: Told) -> Told:
-    """Nothing where two effects are named and neither is a store, which most models leave out.
+    """Nothing where two effects are needed, named or of a class, and neither is a store, which most models leave out.
 
     Two things that have gone wrong at a time are rarer than a model that is wrong in a third way, which two effects
-    stand in for. A store and a dependence are two such effects as well: both say how the process is.
+    stand in for. A store and a dependence are two such effects as well: both say how the process is. Of a class, one
+    explanation without a second effect is enough.
     """
     kinds = [h.kind for h in told.certain]
-    if len(kinds) < 2 or ("store" in kinds and "depends" not in kinds):
+    if told.word == "class" and not told.certain and all(_of_two(e) for e in told.alike):
+        said = f"one of {', '.join(h.label for h in told.effects)}, and a further one"
+    elif len(kinds) < 2 or ("store" in kinds and "depends" not in kinds):
         return told
-    said = " and ".join(h.label for h in told.certain)
-    return replace(told, word="abstain", certain=(), why=f"two effects are needed, {said}: more likely another one is")
+    else:
+        said = " and ".join(h.label for h in told.certain)
+    why = f"two effects are needed, {said}: more likely another one is"
+    return replace(told, word="abstain", certain=(), open=(), why=why)
+
+
+def _of_two(explanation: Explanation) -> bool:
+    return len(explanation.hypotheses) > 1 and all(h.kind != "store" for h in explanation.hypotheses)
 
 
 def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
