@@ -86,8 +86,9 @@ def _leaves_more(verdict: Verdict) -> bool:
 def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     """The comparison, its name taken back where the innovations form does not know it.
 
-    That is where it leaves more than the reference and another part is named there, or where the errors are not far
-    above those of the reference: so little may be what wanders.
+    That is where it leaves more than the reference and another part is named there, or far more and no explanation
+    there has that part. And it is where the errors are not far above those of the reference: so little may be what
+    wanders.
     """
     verdict, found = compared.verdict, told.effects
     sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
@@ -96,6 +97,8 @@ def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     if told.word == "named" and found and _leaves_more(verdict):
         said = " and ".join(h.label for h in found)
         why = f"it leaves more than the reference, and with process noise {said} explains more"
+    elif not sites & told.sites and any(c.after > FAR_ABOVE * c.noise for c in verdict.error):
+        why = "it leaves far more than the reference, and with process noise nothing speaks for it"
     elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
         why = "errors are not far above those of the reference, and with process noise it is not confirmed"
     else:
