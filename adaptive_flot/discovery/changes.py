@@ -87,7 +87,7 @@ def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     """The comparison, its name taken back where the innovations form does not know it.
 
     That is where it leaves more than the reference and another part is named there, or far more and no explanation
-    there has that part. And it is where the errors are not far above those of the reference: so little may be what
+    there has that effect. And it is where the errors are not far above those of the reference: so little may be what
     wanders.
     """
     verdict, found = compared.verdict, told.effects
@@ -97,13 +97,19 @@ def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     if told.word == "named" and found and _leaves_more(verdict):
         said = " and ".join(h.label for h in found)
         why = f"it leaves more than the reference, and with process noise {said} explains more"
-    elif not sites & told.sites and any(c.after > FAR_ABOVE * c.noise for c in verdict.error):
+    elif not _known_by(told, verdict) and any(c.after > FAR_ABOVE * c.noise for c in verdict.error):
         why = "it leaves far more than the reference, and with process noise nothing speaks for it"
     elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
         why = "errors are not far above those of the reference, and with process noise it is not confirmed"
     else:
         return compared
     return _taken_back(compared, why)
+
+
+def _known_by(told: Told, verdict: Verdict) -> bool:
+    """Whether an explanation of the innovations form has one of the effects that are told."""
+    said = {(e.effect.site, e.effect.driver) for e in verdict.effects} | set(verdict.members)
+    return bool(said & {(h.site, h.driver) for e in told.alike for h in e.hypotheses})
 
 
 def _unless_much_is_left(compared: Comparison) -> Comparison:
