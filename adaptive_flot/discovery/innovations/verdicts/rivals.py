@@ -179,7 +179,7 @@ def unless_a_trend(base: Explanation, told: Told) -> Told:
     """Nothing where an event is told that lasts to the end, and it gains little (TREND): what wanders slowly does that.
 
     What wanders over about as long as a record is long goes one way in it. A reference of that length shows one such
-    course, and not how large the next one is.
+    course, and not how large the next one is; without a reference none is known.
     """
     lasting = any(len(h.pulses) == 1 and h.pulses[0][1] >= FOREVER for h in told.effects)
     if told.word not in ("named", "class") or not lasting or told.best.criterion - base.criterion >= TREND:

@@ -39,6 +39,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     surely_worse,
     unconfirmed,
     unexpected_drift,
+    unless_a_trend,
     unless_it_wanders,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
@@ -81,7 +82,7 @@ def second_opinion(state: State) -> State:
         found = search.run(base, state.progress)
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
-        told = unless_it_wanders(search, base, told)
+        told = unless_a_trend(base, unless_it_wanders(search, base, told))
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
     if asked.judged.word in TELLS:
         return asked

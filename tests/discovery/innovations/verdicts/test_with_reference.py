@@ -65,6 +65,8 @@ class Compared:
         (1.2, 0.9, (), "abstain"),  # hardly above the reference, and not confirmed
         (1.2, 0.9, ("gauge",), "named"),  # confirmed
         (5.0, 1.1, (), "named"),  # far above the reference, and brought down to it
+        (5.0, 2.2, (), "abstain"),  # far more is left than the reference has, and nothing else speaks for it
+        (5.0, 2.2, ("gauge",), "named"),
         (5.0, 3.0, ("pump",), "abstain"),  # much is left, and another part explains more
         (5.0, 1.1, ("pump",), "named"),  # another part is named, but nothing is left
     ],
@@ -72,13 +74,14 @@ class Compared:
 def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_not_know_it(
     before: float, after: float, sites: tuple[str, ...], word: str
 ) -> None:
-    effect: Any = SimpleNamespace(effect=SimpleNamespace(site="gauge"))
+    effect: Any = SimpleNamespace(effect=SimpleNamespace(site="gauge", driver="time"))
     error = (OutputChange("level", "m", before, after, 1.0, (0.1, 0.3)),)
     compared: Any = Compared(
         Verdict(word="named", reason="Gauge shows more.", effects=(effect,), members=(), error=error, split="fresh")
     )
+    found = tuple(SimpleNamespace(site=s, label=s, driver="time") for s in sites)
     told: Any = SimpleNamespace(
-        word="named" if sites else "none", effects=tuple(SimpleNamespace(site=s, label=s) for s in sites)
+        word="named" if sites else "none", effects=found, alike=(SimpleNamespace(hypotheses=found),)
     )
     assert _unless_contradicted(compared, told).verdict.word == word
 
