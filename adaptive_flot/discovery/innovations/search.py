@@ -253,7 +253,7 @@ class Search:
             told = {c.name: values[name] for c in found if (name := effect.parameter(c.name)) in values}
             times = effect.names(CoefficientRole.ONSET, CoefficientRole.DURATION)  # those of an event stay as they are
             free = tuple(c.name for c in found if c.name not in times)
-            kind: Kind = "ramp" if effect.form == "ramp" else "alternative"
+            kind: Kind = "ramp" if effect.form == "ramp" else "lag" if _is_lag(effect, free) else "alternative"
             h = Hypothesis(effect.site, effect.driver, kind, effect, free, ({},))
             own.append(h.with_scales(told, self._modes[effect.site]))
             model, numbers = model_with(model, own[-1]), numbers + len(found)
@@ -303,6 +303,11 @@ def numbers_of(h: Hypothesis) -> int:
     told = h.effect.coefficients.items() if h.kind in EVENTS else ()
     times = [c for c, v in told if c.startswith(("on_", "for_", "onset", "duration")) and v < FOREVER]
     return len(h.free) + len(times)
+
+
+def _is_lag(effect: Effect, free: Sequence[str]) -> bool:
+    """Whether a free run has fitted what the search calls a lag: a time constant, and nothing else."""
+    return effect.form == "lag" and len(free) == 1 and free == effect.names(CoefficientRole.TIME_CONSTANT)
 
 
 def _spread(ranked: Sequence[Screened]) -> list[Screened]:

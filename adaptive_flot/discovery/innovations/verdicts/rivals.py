@@ -8,13 +8,14 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
-from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import NEAR, Told
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 
 FAR = 3.0
@@ -161,7 +162,7 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     beside that, a further switch at the site gains about as much (WANDERS). A switch is found where it gains
     LEAST_GAIN, so an event that gains less than LEAST_GAIN / WANDERS can not be told from what wanders.
     """
-    event = next((h for h in told.best.hypotheses if h.kind in EVENTS and h in told.effects), None)
+    event = next((h for h in told.best.hypotheses if _begins(h) and h in told.effects), None)
     if told.word not in ("named", "class") or event is None:
         return told
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)
@@ -181,11 +182,21 @@ def unless_a_trend(base: Explanation, told: Told) -> Told:
     What wanders over about as long as a record is long goes one way in it. A reference of that length shows one such
     course, and not how large the next one is; without a reference none is known.
     """
-    lasting = any(len(h.pulses) == 1 and h.pulses[0][1] >= FOREVER for h in told.effects)
+    lasting = any(_lasts(h) for h in told.effects)
     if told.word not in ("named", "class") or not lasting or told.best.criterion - base.criterion >= TREND:
         return told
     why = "a change that lasts to the end, and is so small, may be what wanders in the process"
     return replace(told, word="abstain", certain=(), open=(), why=why)
+
+
+def _begins(h: Hypothesis) -> bool:
+    """Whether it is an event, of the search or of a free run."""
+    return h.kind in EVENTS or bool(h.effect.names(CoefficientRole.ONSET))
+
+
+def _lasts(h: Hypothesis) -> bool:
+    """Whether it is an event that lasts to the end; of a free run any, whose forms tell that in several ways."""
+    return len(h.pulses) == 1 and h.pulses[0][1] >= FOREVER if h.kind in EVENTS else _begins(h)
 
 
 def late_as_well(state: State, told: Told, site: str) -> bool:

@@ -81,14 +81,22 @@ def second_opinion(state: State) -> State:
         base = search.base(before.model.parameter_values)
         found = search.run(base, state.progress)
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
-        told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
-        told = unless_a_trend(base, unless_it_wanders(search, base, told))
+        told = _by_the_rules(state, search, base, told)
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
     if asked.judged.word in TELLS:
         return asked
     with np.errstate(all="ignore"):
         among = among_alternatives(state, search, base, found)
-    return asked if among is None else _told(state, search, base, among, among=True)
+        among = _by_the_rules(state, search, base, among) if among is not None else None
+    if among is None or among.word not in TELLS:
+        return asked
+    return _told(state, search, base, among, among=True)
+
+
+def _by_the_rules(state: State, search: Search, base: Explanation, told: Told) -> Told:
+    """What is told, without what stands in for something else more often than not (see `rivals`)."""
+    told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
+    return unless_a_trend(base, unless_it_wanders(search, base, told))
 
 
 def is_asked(state: State) -> bool:
