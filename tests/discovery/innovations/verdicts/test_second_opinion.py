@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.hypotheses.families import FOREVER
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
@@ -69,7 +69,19 @@ def test_a_small_change_that_lasts_to_the_end_may_be_what_wanders(
 ) -> None:
     """What ends again, or comes several times, is no trend."""
     base, best = SimpleNamespace(criterion=10.0), SimpleNamespace(criterion=10.0 + gain)
-    given = Told("named", best, (SimpleNamespace(pulses=pulses),), (), (), "")  # type: ignore[arg-type]
+    given = Told("named", best, (SimpleNamespace(kind="switch", pulses=pulses),), (), (), "")  # type: ignore[arg-type]
+    assert (rivals.unless_a_trend(base, given).word == "named") == told  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("form", "gain", "told"),
+    [("step", 99.0, False), ("step", 101.0, True), ("washout", 99.0, False), ("shift", 50.0, True)],
+)
+def test_an_event_of_the_free_run_is_asked_the_same(form: str, gain: float, told: bool) -> None:
+    """Reduction: the rule on trends, for an event that is an alternative of the free run; a constant is none."""
+    effect = Effect("gains", "time" if form != "shift" else "constant", form)
+    base, best = SimpleNamespace(criterion=10.0), SimpleNamespace(criterion=10.0 + gain)
+    given = Told("named", best, (Hypothesis("gains", effect.driver, "alternative", effect, (), ({},)),), (), (), "")  # type: ignore[arg-type]
     assert (rivals.unless_a_trend(base, given).word == "named") == told  # type: ignore[arg-type]
 
 
