@@ -60,13 +60,19 @@ def part_alone(problem: Problem, result: SearchResult, judged: Judgement) -> tup
     part, margin = singles[0], LEAST_MARGIN * result.rows_per_effective_sample
     sds = loglik_difference_sds(problem, part.fit, [a.fit for a in singles])
     rivals = [replace(a, loglik_difference_sd=sd) for a, sd in zip(singles[1:], sds[1:], strict=True)]
-    near = [best, *(a for a in result.alternatives if a is not best and a.near(best, margin))]
+    near = near_by_least_margin(result, best)
     if not all(part.known) or part.names[0] not in _in_all(near) or any(a.near(part, margin) for a in rivals):
         return None
     checked = verify(problem, result.base, part.fit, part.problem)
     if not checked.confirmed:
         return None
     return Judgement("named", part, (), tuple(rivals[:MOST_RIVALS]), margin), checked
+
+
+def near_by_least_margin(result: SearchResult, best: Alternative) -> list[Alternative]:
+    """The best set of effects and those near it, by LEAST_MARGIN and SURE alone, where what else is off stays open."""
+    margin = LEAST_MARGIN * result.rows_per_effective_sample
+    return [best, *(a for a in result.alternatives if a is not best and a.near(best, margin))]
 
 
 def _in_all(near: Sequence[Alternative]) -> list[Name]:

@@ -12,24 +12,21 @@ from dataclasses import replace
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, judge, told_apart
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.verdicts.rivals import but_for_what_wanders
 from adaptive_flot.discovery.results import State
 
 COMPARED = 6
 """Alternatives of the free run that are fitted, the best ones."""
 
 
-def beside_alternatives(
-    state: State, search: Search, base: Explanation, told: Told, names: tuple[tuple[str, str], ...]
-) -> Told | None:
+def beside_alternatives(state: State, search: Search, base: Explanation, told: Told) -> Told | None:
     """What is told, as a class with each alternative of the free run that explains about as much.
 
     Parameters
     ----------
     state
-        Its judgement tells nothing, or the same and free curves in time beside it.
-    search, base, told, names
-        The innovations form, and what it tells by (site, driver).
+        Its judgement tells nothing.
+    search, base, told
+        The innovations form, and what it tells.
 
     Returns
     -------
@@ -38,15 +35,11 @@ def beside_alternatives(
         much has several effects, and where more sites are left than a class may hold. Where one at the same site
         explains more, a curve that bends after what else is wrong, both are a class.
     """
-    wanders = but_for_what_wanders(state, names)
-    if not wanders and (state.judged.word != "abstain" or state.contradiction):
+    if state.judged.word != "abstain" or state.contradiction:
         return None
     _, result = state.searched
-    compared = result.alternatives[:1] if wanders else result.alternatives[:COMPARED]
-    found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
+    found = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in result.alternatives[:COMPARED]]
     fitted = [e for e in found if e is not None]
-    if wanders and fitted:  # it has what is told, and the rest follows anything
-        return told
     alike = [e for e in fitted if not told_apart(search, base, told.best, e)]
     own = [h for h in told.effects if h.kind != "store"]  # a store beside a fault is what the model leaves out anyway
     better = [e for e in alike if told_apart(search, base, e, told.best)]

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.innovations.judge import Told, told_apart
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.results import Alternative, State
-from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
+from adaptive_flot.discovery.results import State
+from adaptive_flot.discovery.verdict.certain_part import near_by_least_margin
 
 Names = Sequence[tuple[str, str]]
 
@@ -16,19 +16,13 @@ Names = Sequence[tuple[str, str]]
 def in_all_that_is_near(state: State, names: Names) -> bool:
     """Whether the free run tells nothing, and each set of effects near its best has these, and more.
 
-    What else there is stays open, so a set is near by the least margin, not by what the best one leaves (see `judge`
-    of the free run).
+    What else there is stays open: see `near_by_least_margin`.
     """
     best = state.judged.best
     if state.judged.word != "abstain" or state.contradiction or best is None:
         return False
-    return all(set(names) < set(a.names) for a in _near(state, best))
-
-
-def _near(state: State, best: Alternative) -> list[Alternative]:
     _, result = state.searched
-    margin = LEAST_MARGIN * result.rows_per_effective_sample
-    return [best, *(a for a in result.alternatives if a is not best and a.near(best, margin))]
+    return all(set(names) < set(a.names) for a in near_by_least_margin(result, best))
 
 
 def one_that_all_have(

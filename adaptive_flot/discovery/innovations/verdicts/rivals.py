@@ -97,8 +97,8 @@ def allowed_ratio(state: State, names: tuple[tuple[str, str], ...]) -> float:
     """Ratio of errors up to which what is told is as good.
 
     Above 1 beside what has more coefficients, and says less: a curve without a name at the place of a fault, or a set
-    of more effects that the free run does not tell, or that are free curves in time. And beside the same effects, which
-    the free run does not tell: fitted twice, they leave the same but for the search.
+    of more effects that the free run does not tell. And beside the same effects, which the free run does not tell:
+    fitted twice, they leave the same but for the search.
     """
     best, word = state.judged.best, state.judged.word
     if best is None:
@@ -106,7 +106,7 @@ def allowed_ratio(state: State, names: tuple[tuple[str, str], ...]) -> float:
     curve = word == "unnamed" and {site for site, _ in best.names} == {site for site, _ in names}
     larger = word == "abstain" and len(best.names) > len(names)
     same = word == "abstain" and set(best.names) == set(names)
-    return 1 + MUCH_WORSE if curve or larger or same or but_for_what_wanders(state, names) else 1.0
+    return 1 + MUCH_WORSE if curve or larger or same else 1.0
 
 
 def smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], allowed: float) -> bool:

@@ -83,7 +83,7 @@ def second_opinion(state: State) -> State:
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = _by_the_rules(state, search, base, told)
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
-    if asked.judged.word in TELLS:
+    if asked.judged.word in TELLS or time.monotonic() > state.ends:
         return asked
     with np.errstate(all="ignore"):
         among = among_alternatives(state, search, base, found)
@@ -181,9 +181,9 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
     if (against and not stands) or hardly_explained(shown) or _another_drift(state, told):
         return _kept(state, told)
     less = smaller(error, state.error, allowed_ratio(state, names))
-    beside = in_all_that_is_near(state, names)  # what has more beside it leaves less, and is no other cause
-    if competes(state) and not (among or beside) and not (stands and (follows or wanders)) and not less:
-        both = beside_alternatives(state, search, base, told, names)
+    beside = wanders or in_all_that_is_near(state, names)  # what has more beside it leaves less, and is no other cause
+    if competes(state) and not (among or beside) and not (stands and follows) and not less:
+        both = beside_alternatives(state, search, base, told)
         if both is None:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
         told, judgement = both, _judgement(both, best)
@@ -199,7 +199,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         sizes=after.with_sizes(*search.sizes(told.best)),
         error=error,
         contradiction="",
-        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside or wanders else "",
+        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside else "",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
 

@@ -48,23 +48,17 @@ def told(*hypotheses: Hypothesis, criterion: float = 100.0) -> Any:
     return Told("named", best, hypotheses, (), (best,), "")
 
 
-def beside(
-    said: Told, *others: Given | None, word: str = "abstain", contradiction: str = "", curve: bool = False
-) -> Told | None:
-    """The answer where alternatives within 10 are not told apart; the first is what is told with a curve in time."""
+def beside(said: Told, *others: Given | None, word: str = "abstain", contradiction: str = "") -> Told | None:
+    """The answer where alternatives within 10 are not told apart."""
     named = [SimpleNamespace(effects=str(k), fit=SimpleNamespace(model=None, names=())) for k in range(len(others))]
-    best = SimpleNamespace(names=(("demand", "dose"),), effects=())
-    if curve:
-        best = SimpleNamespace(names=(("doser", "saturation"), ("gains", "time")), effects=(LIMIT.effect, CURVE))
     state: Any = SimpleNamespace(
-        judged=SimpleNamespace(word=word, best=best),
+        judged=SimpleNamespace(word=word),
         contradiction=contradiction,
         searched=(None, SimpleNamespace(alternatives=named)),
     )
     search: Any = Stand({str(k): e for k, e in enumerate(others)})
-    names = tuple((h.site, h.driver) for h in said.effects)
     base: Any = Given(0.0, ())
-    return asking.beside_alternatives(state, search, base, said, names)
+    return asking.beside_alternatives(state, search, base, said)
 
 
 @pytest.fixture(autouse=True)
@@ -146,12 +140,6 @@ def test_a_curve_that_explains_more_at_the_same_site_leaves_the_site(site: str, 
 
 def test_a_curve_that_explains_more_with_something_else_leaves_nothing() -> None:
     assert beside(told(LIMIT), Given(150.0, (hypothesis("doser"), hypothesis("decay")))) is None
-
-
-@pytest.mark.parametrize("criterion", [60.0, 105.0, 150.0])
-def test_a_curve_in_time_beside_what_is_told_is_no_other_cause(criterion: float) -> None:
-    said, others = told(LIMIT), (LIMIT, hypothesis("gains", driver="time"))
-    assert beside(said, Given(criterion, others), word="class", curve=True) is said
 
 
 def among(

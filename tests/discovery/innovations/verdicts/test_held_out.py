@@ -11,6 +11,7 @@ from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.greybox.effects import Effect
 
 CURVE = Effect("supply", "time", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
+LEAK = Effect("valve", "own_value", "leak")
 NOISE = 0.01
 SURELY_LESS, UNSURE, SURELY_MORE = (0.2, 0.6), (-0.7, 0.5), (-0.9, -0.1)
 
@@ -19,8 +20,13 @@ def change(interval: tuple[float, float], after: float) -> OutputChange:
     return OutputChange("level", "m", 0.2, after, NOISE, interval)
 
 
-def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over: OutputChange) -> Judgement:
-    """What is told beside a free run that has a curve in time for its best, told or not, with an error of 0.02."""
+def verdict(
+    monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over: OutputChange, *, both: bool = False
+) -> Judgement:
+    """What is told beside a free run that has a curve in time for its best, told or not, with an error of 0.02.
+
+    Or that has `both`, the leaking valve and the curve.
+    """
     fit: Any = SimpleNamespace(loss=0.0, bic=0.0, model=None)
     fit.with_sizes = lambda values, covariance: fit
     h = SimpleNamespace(site="valve", driver="own_value", label="valve leaks")
@@ -36,6 +42,8 @@ def verdict(monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over
     monkeypatch.setattr(asking, "in_all_that_is_near", lambda *a: False)
     monkeypatch.setattr(asking, "told_in_words", lambda *a: "Valve does not go below 0.5.")
     rival: Any = SimpleNamespace(effects=(CURVE,), names=(("supply", "time"),))
+    if both:
+        rival = SimpleNamespace(effects=(LEAK, CURVE), names=(("valve", "own_value"), ("supply", "time")))
     judged = Judgement(word, rival, (("supply", "time"),) if word == "class" else (), (), 0.0)  # type: ignore[arg-type]
     monkeypatch.setattr(asking, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
     state: Any = SimpleNamespace(
@@ -62,3 +70,10 @@ def test_stretches_decide_where_a_free_run_does_not(
     monkeypatch: pytest.MonkeyPatch, word: str, free: OutputChange, over: OutputChange, told: str
 ) -> None:
     assert verdict(monkeypatch, word, free, over).word == told
+
+
+def test_a_curve_in_time_beside_what_is_told_is_no_other_cause(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It leaves the smaller error, since it follows whatever is off besides; alone it would silence the name."""
+    free, over = change(SURELY_LESS, 0.1), change(UNSURE, 0.199)
+    assert verdict(monkeypatch, "class", free, over, both=True).word == "named"
+    assert verdict(monkeypatch, "class", free, over).word == "abstain"
