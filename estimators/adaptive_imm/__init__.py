@@ -11,6 +11,7 @@ modes.py         The modes, and how the process goes from one to another.
 interval.py      Prediction over an interval, linearised at a lagged estimate of the parameters.
 bank.py          Mixing, correction and combination of the filters, as expressions over all modes.
 step.py          One interval of it all as one compiled function.
+region.py        How wide the covariance of the parameters is shown.
 noise.py         The noise level, from what the corrected estimate leaves.
 """
 

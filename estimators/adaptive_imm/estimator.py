@@ -14,12 +14,13 @@ from estimators.adaptive_imm.disturbances import extended, with_disturbances
 from estimators.adaptive_imm.modes import KINDS, Changes, Modes, transitions
 from estimators.adaptive_imm.noise import NoiseLevel
 from estimators.adaptive_imm.options import check_modes, check_numbers, check_shares
+from estimators.adaptive_imm.region import LongRun
 from estimators.adaptive_imm.state import AdaptiveImmState
 from estimators.adaptive_imm.step import Step, combination
 from estimators.adaptive_imm.trust import Trust
 from estimators.imm.modes import stationary
 from estimators.shared.coordinates import Coordinates
-from estimators.shared.joint_filter import first_estimate, layout, parameters_of
+from estimators.shared.joint_filter import first_estimate, layout
 from estimators.shared.measured import driving_outputs
 
 LAST, MORE_LIKELY = 10.0, 0.5
@@ -36,8 +37,8 @@ class AdaptiveImm:
     `interval.py` for why the point of linearisation lags behind the estimate.
 
     The covariance is wider than that of these modes. Each kind of change claims to know the direction in which the
-    parameters compensate, and is wrong where the process does something else. The *reference*, a fast walk that no
-    likelihood can rule out, has a share in the covariance, not in the estimate.
+    parameters compensate, and is wrong where the process does something else. So it is no narrower than a share of that
+    of the *reference*, a fast walk, and grows where the innovations stay on one side; see `region.py`.
 
     Where the first record's fit left errors that are not white, the model is wrong from the start; see `trust.py`.
 
@@ -55,7 +56,10 @@ class AdaptiveImm:
     background_per_hour, reference_per_hour, state_noise
         How far parameters and disturbances move, see `Changes`.
     reference_share
-        Share of the reference in the covariance.
+        Share of the reference's covariance below which the covariance does not go, along any direction.
+    average_s, long_run_s
+        Time constants of the average of the innovations, and of its variance [s]; a `long_run_s` of 0 leaves the
+        covariance as it is.
     change_s, jump_s, walk_s
         Mean duration of rest and of a drift, of a jump, and of a random walk [s].
     shares
@@ -95,7 +99,9 @@ class AdaptiveImm:
         walk_per_hour: float = 0.1,
         background_per_hour: float = 0.003,
         reference_per_hour: float = 0.3,
-        reference_share: float = 0.25,
+        reference_share: float = 0.18,
+        average_s: float = 30.0,
+        long_run_s: float = 600.0,
         state_noise: float = 0.0,
         change_s: float = 450.0,
         jump_s: float = 3.0,
@@ -116,9 +122,10 @@ class AdaptiveImm:
         changes = Changes(*rates, jump, disturbance_jump, *walks, state_noise)
         check_modes(modes)
         check_numbers(
-            {**vars(changes), "lag_s": lag_s, "noise_memory": noise_memory},
-            {"change_s": change_s, "jump_s": jump_s, "walk_s": walk_s, "outlier_scale": outlier_scale}
-            | {"discrepancy_s": discrepancy_s, "right_s": right_s, "wrong_s": wrong_s, "plausible": plausible}
+            {**vars(changes), "lag_s": lag_s, "noise_memory": noise_memory, "long_run_s": long_run_s},
+            {"change_s": change_s, "jump_s": jump_s, "walk_s": walk_s, "average_s": average_s}
+            | {"outlier_scale": outlier_scale, "discrepancy_s": discrepancy_s}
+            | {"right_s": right_s, "wrong_s": wrong_s, "plausible": plausible}
             | {f"discrepancies[{i}]": level for i, level in enumerate(discrepancies)},
         )
         check_shares(outlier_share, reference_share, shares)
@@ -141,7 +148,15 @@ class AdaptiveImm:
         mixing = Mixing(matrix, self.modes.entry, slice(nx + q, n), self._b, off)
         fading, follow = np.exp(-setup.dt / discrepancy_s), 1.0 if lag_s == 0 else -np.expm1(-setup.dt / lag_s)
         contamination = Contamination(outlier_share, outlier_scale)
-        parts = Step(self.modes, mixing, contamination, float(fading), float(follow), reference_share)
+        parts = Step(
+            self.modes,
+            mixing,
+            contamination,
+            float(fading),
+            float(follow),
+            reference_share,
+            LongRun(setup.dt, average_s, long_run_s),
+        )
         self._described = parts.described
         self.transitions, self.noise_memory, self.plausible = matrix, noise_memory, plausible
         self._off = off
@@ -150,7 +165,7 @@ class AdaptiveImm:
         nominal = setup.model.parameter_values[setup.model.indices("parameters", whole.parameters)]
         self._nominal = self.coordinates.from_parameters(nominal)
         self._plausible_std = plausible * self.coordinates.scale
-        names = ("z", "P", "z_next", "P_next", "covariance")
+        names = ("z", "P", "slow", "z_next", "P_next", "slowly", "covariance")
         code, mixture = setup.model.compiled, combination(*self.modes.entry.T.shape)
         self._combined = FastCall(mixture, matrices=("z", "P", "covariance"), as_machine_code=code)
         self._step = FastCall(parts.function(whole, self.layout), matrices=names, as_machine_code=code)
@@ -176,7 +191,9 @@ class AdaptiveImm:
         known = self._described > 0
         probability = np.ones(count)
         probability[known] = stationary(self.transitions[np.ix_(known, known)])
-        return AdaptiveImmState(prior.time, z, triangles, probability, lagged, noise, trust, trust.doubt)
+        return AdaptiveImmState(
+            prior.time, z, triangles, probability, lagged, noise, LongRun.first(len(scale)), trust, trust.doubt
+        )
 
     def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
         """Mix, predict, compare, correct, weigh; see `Estimator.update`."""
@@ -186,13 +203,14 @@ class AdaptiveImm:
         if self.noise_memory:
             count = np.minimum(noise.count + present, self.noise_memory)
         p = self._p if sample.parameters is None else sample.parameters
-        z, P, probability, lagged, level, prediction, std, mean, covariance, projected = self._step(
+        z, P, probability, lagged, level, slow, prediction, std, mean, covariance, projected = self._step(
             state.z,
             state.P,
             state.probability,
             state.lagged,
             noise.variance,
             count,
+            state.slow,
             state.time,
             sample.inputs,
             p,
@@ -202,16 +220,17 @@ class AdaptiveImm:
         )
         status = Status.OK if present.any() else Status.MISSING
         if not (np.isfinite(covariance).all() and np.isfinite(z).all() and np.isfinite(P).all()):
-            z, P, probability, lagged = state.z, state.P, state.probability, state.lagged
-            (mean, covariance), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
+            z, P, probability, lagged, slow = state.z, state.P, state.probability, state.lagged, state.slow
+            (mean, whole), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
+            covariance = whole[shape.coordinates, shape.coordinates]
         else:
             if self.noise_memory:
                 noise = NoiseLevel(np.maximum(level, noise.least), count, noise.least)
             if projected[0] > 0:
                 status = Status.PROJECTED
-        theta, theta_covariance = parameters_of(mean, covariance, self.coordinates, shape)
-        q = len(self.setup.parameters)
-        theta_covariance = state.trust.shown(theta_covariance[:q, :q])
+        c, q = mean[shape.coordinates], len(self.setup.parameters)
+        slopes, theta = self.coordinates.slopes(c), self.coordinates.to_parameters(c)
+        theta_covariance = state.trust.shown((covariance * np.outer(slopes, slopes))[:q, :q])
         wrong = state.wrong + (float(probability @ self._off) - state.wrong) / LAST
         if status is Status.OK and (wrong > MORE_LIKELY or self._is_far(mean, covariance)):
             status = Status.MODEL_ERROR
@@ -229,9 +248,9 @@ class AdaptiveImm:
             discrepancy=off,
             disturbances=dict(zip(self.setup.unmeasured, theta[q:].tolist(), strict=True)),
         )
-        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, state.trust, wrong), estimate
+        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, slow, state.trust, wrong), estimate
 
     def _is_far(self, mean: FloatArray, covariance: FloatArray) -> bool:
         where = self.layout.coordinates
         far = (np.abs(mean[where] - self._nominal) - self._plausible_std)[: len(self.setup.parameters)]
-        return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[where][: far.size])).any())
+        return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[: far.size])).any())

@@ -25,6 +25,8 @@ class AdaptiveImmState:
         Parameter coordinates at which the model is linearised (q,).
     noise
         Noise of the driving outputs.
+    slow
+        What the long-run variance of their innovations rests on (m, 4), see `LongRun`.
     trust
         What the first record said of the model.
     wrong
@@ -37,5 +39,6 @@ class AdaptiveImmState:
     probability: FloatArray
     lagged: FloatArray
     noise: NoiseLevel
+    slow: FloatArray
     trust: Trust
     wrong: float

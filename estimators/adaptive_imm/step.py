@@ -13,6 +13,7 @@ from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles, carri
 from estimators.adaptive_imm.interval import lagged_interval
 from estimators.adaptive_imm.modes import Modes
 from estimators.adaptive_imm.noise import matched
+from estimators.adaptive_imm.region import LongRun, no_narrower
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import Layout
 
@@ -30,7 +31,9 @@ class Step:
     follow
         Share of the way to the estimate that the point of linearisation goes in an interval.
     reference_share
-        Share of the reference in the covariance, where there is one: the last mode.
+        Share of the covariance of the reference, the last mode, below which that of the parameters does not go.
+    long_run
+        What innovations that stay on one side add to it.
     """
 
     modes: Modes
@@ -39,6 +42,7 @@ class Step:
     fading: float
     follow: float
     reference_share: float
+    long_run: LongRun
 
     @property
     def described(self) -> FloatArray:
@@ -53,10 +57,11 @@ class Step:
         Returns
         -------
         casadi.Function
-            `(z (n, M), P (n (n + 1) / 2, M), probability (M,), lagged (q,), variance (m,), count (m,), t, u (nu,),
-            p (np,), driving (m,), present (m,), doubt) -> (z, P, probability, lagged, variance, prediction (ny,),
-            std (m,), mean (n,), covariance (n, n), projected)`; `projected` counts the parameters that were set onto
-            their bounds in the most likely mode. The probability of the reference is 1, beside those of the others.
+            `(z (n, M), P (n (n + 1) / 2, M), probability (M,), lagged (q,), variance (m,), count (m,), slow (m, 4), t,
+            u (nu,), p (np,), driving (m,), present (m,), doubt) -> (z, P, probability, lagged, variance, slow,
+            prediction (ny,), std (m,), mean (n,), covariance (q, q), projected)`; the covariance is that of the
+            coordinates, `slow` is that of `LongRun`. `projected` counts the parameters that were set onto their bounds
+            in the most likely mode. The probability of the reference is 1, beside those of the others.
         """
         coordinates, columns = (
             Coordinates.of(setup.model, setup.parameters),
@@ -68,6 +73,7 @@ class Step:
         z, P = ca.MX.sym("z", n, modes), ca.MX.sym("P", len(triangles.rows), modes)
         probability, lagged = ca.MX.sym("probability", modes), ca.MX.sym("lagged", shape.q)
         variance, count = ca.MX.sym("variance", m), ca.MX.sym("count", m)
+        slow = ca.MX.sym("slow", m, LongRun.COLUMNS)
         t, u, p = (ca.MX.sym(name, interval.size1_in(name)) for name in ("t", "u", "p"))
         driving, present, doubt = ca.MX.sym("driving", m), ca.MX.sym("present", m), ca.MX.sym("doubt")
 
@@ -95,18 +101,48 @@ class Step:
         ends = ca.vertcat(ends[: shape.nx, :], inside, ends[shape.nx + shape.q :, :])
         projected = ca.sum1(inside != c) @ (found >= ca.mmax(found))
         covariances = carried(after.P, F, modes)
-        share = self.reference_share * (1 - doubt)
-        shown = (1 - share) * found + share * ca.DM(1 - self.described)
-        mean, covariance = combined(ends, covariances, found, shown)
+        mean, covariance = combined(ends, covariances, found, found)
         prediction = ca.MX(outputs)
         prediction[columns] = base
-        results = [ends, covariances, kept, followed, level, prediction, ca.sqrt(expects @ expected + variance)]
+        std = ca.sqrt(expects @ expected + variance)
+        slowly, factor = self.long_run.expressions(slow, driving - base, std, present)
+        shown = covariance[where, where]
+        if self.reference_share > 0:
+            _, reference = combined(ends, covariances, found, ca.MX(1 - self.described))
+            shown = no_narrower(shape.q)(shown, reference[where, where], self.reference_share * (1 - doubt))
+        results = [ends, covariances, kept, followed, level, slowly, prediction, std]
         return ca.Function(
             "adaptive_imm_step",
-            [z, P, probability, lagged, variance, count, t, u, p, driving, present, doubt],
-            [ca.densify(x) for x in (*results, mean, covariance, projected)],
-            ["z", "P", "probability", "lagged", "variance", "count", "t", "u", "p", "driving", "present", "doubt"],
-            ["z_next", "P_next", "found", "followed", "level", "prediction", "std", "mean", "covariance", "projected"],
+            [z, P, probability, lagged, variance, count, slow, t, u, p, driving, present, doubt],
+            [ca.densify(x) for x in (*results, mean, factor * shown, projected)],
+            [
+                "z",
+                "P",
+                "probability",
+                "lagged",
+                "variance",
+                "count",
+                "slow",
+                "t",
+                "u",
+                "p",
+                "driving",
+                "present",
+                "doubt",
+            ],
+            [
+                "z_next",
+                "P_next",
+                "found",
+                "followed",
+                "level",
+                "slowly",
+                "prediction",
+                "std",
+                "mean",
+                "covariance",
+                "projected",
+            ],
             {"cse": True},
         )
 

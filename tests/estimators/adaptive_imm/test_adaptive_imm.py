@@ -24,6 +24,7 @@ ONE_MODE: dict[str, Any] = {
     "discrepancies": (),
     "background_per_hour": 0.0,
     "reference_share": 0.0,
+    "long_run_s": 0.0,
     "outlier_share": 0.0,
     "noise_memory": 0,
     "lag_s": 0.0,
