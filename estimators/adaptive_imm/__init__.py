@@ -9,10 +9,10 @@ trust.py         What the first record's fit says of the model, and where the fi
 disturbances.py  Disturbances that nobody measures, as further parameters.
 modes.py         The modes, and how the process goes from one to another.
 interval.py      Prediction over an interval, linearised at a lagged estimate of the parameters.
-bank.py          Mixing, correction and combination of the filters, as expressions over all modes.
+bank.py          Mixing, correction, combination and noise level of the filters, as expressions over all modes.
+ensemble.py      Records of many members at once.
 step.py          One interval of it all as one compiled function.
 region.py        How wide the covariance of the parameters is shown.
-noise.py         The noise level, from what the corrected estimate leaves.
 """
 
 from estimators.adaptive_imm.estimator import AdaptiveImm

@@ -215,3 +215,18 @@ def combined(z: ca.MX, P: ca.MX, probability: ca.MX, shown: ca.MX) -> tuple[ca.M
     mean = z @ probability
     away = z - ca.repmat(mean, 1, z.shape[1])
     return mean, shape.whole((P + shape.products(away, away)) @ shown)
+
+
+def matched(
+    variance: ca.MX, count: ca.MX, corrected: Corrected, probability: ca.MX, H: ca.MX, residual: ca.MX, present: ca.MX
+) -> ca.MX:
+    """Variance of the noise of each output (m,), one sample later: ``r^2 += (e^2 + H P H' - r^2) / count``.
+
+    e and P are those after the correction. The mean over the modes, each value weighed by how far it is believed.
+    Source: covariance matching on residuals, Mohamed & Schwarz, Journal of Geodesy 73 (1999) 193, equation 24.
+    """
+    modes = probability.shape[0]
+    left = ca.repmat(residual, 1, modes) - H @ corrected.away
+    seen = (left**2 + output_variance(H, corrected.P, modes)) * corrected.believed
+    good = corrected.believed @ probability
+    return variance + present * (seen @ probability - good * variance) / count

@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
+from adaptive_flot.contracts.ensemble_record import EnsembleRecord
+from adaptive_flot.contracts.track import Track
+from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles
 from estimators.adaptive_imm.disturbances import extended, with_disturbances
+from estimators.adaptive_imm.ensemble import track_members
 from estimators.adaptive_imm.modes import KINDS, Changes, Modes, transitions
-from estimators.adaptive_imm.noise import NoiseLevel
 from estimators.adaptive_imm.options import check_modes, check_numbers, check_shares
 from estimators.adaptive_imm.region import LongRun
-from estimators.adaptive_imm.state import AdaptiveImmState
-from estimators.adaptive_imm.step import Step, combination
+from estimators.adaptive_imm.state import LAST, MORE_LIKELY, AdaptiveImmState, NoiseLevel
+from estimators.adaptive_imm.step import CARRIED, MATRICES, Step, combination
 from estimators.adaptive_imm.trust import Trust
 from estimators.imm.modes import stationary
 from estimators.shared.coordinates import Coordinates
+from estimators.shared.ensemble import Flags
 from estimators.shared.joint_filter import first_estimate, layout
 from estimators.shared.measured import driving_outputs
-
-LAST, MORE_LIKELY = 10.0, 0.5
-"""Samples over which the modes with a discrepancy must be the likely ones: outliers beside each other are none."""
 
 
 class AdaptiveImm:
@@ -156,29 +158,30 @@ class AdaptiveImm:
             float(follow),
             reference_share,
             LongRun(setup.dt, average_s, long_run_s),
+            noise_memory,
         )
         self._described = parts.described
-        self.transitions, self.noise_memory, self.plausible = matrix, noise_memory, plausible
-        self._off = off
-        self._columns = setup.model.indices("outputs", setup.outputs)
+        self.transitions, self.plausible = matrix, plausible
+        self.off = off
+        self.columns = setup.model.indices("outputs", setup.outputs)
         self._p = setup.model.parameter_values
         nominal = setup.model.parameter_values[setup.model.indices("parameters", whole.parameters)]
         self._nominal = self.coordinates.from_parameters(nominal)
         self._plausible_std = plausible * self.coordinates.scale
-        names = ("z", "P", "slow", "z_next", "P_next", "slowly", "covariance")
         code, mixture = setup.model.compiled, combination(*self.modes.entry.T.shape)
         self._combined = FastCall(mixture, matrices=("z", "P", "covariance"), as_machine_code=code)
-        self._step = FastCall(parts.function(whole, self.layout), matrices=names, as_machine_code=code)
+        self._made = parts.function(whole, self.layout)
+        self._step = FastCall(self._made, matrices=MATRICES, as_machine_code=code)
 
     def init(self, prior: Prior) -> AdaptiveImmState:
         """Start from a prior, every mode alike and with the share of time that the process spends in it."""
         first, first_P = first_estimate(extended(prior, self.setup), self.coordinates, self.layout)
-        trust = Trust.of(prior.colour, doubts=bool(self._off.any()))
+        trust = Trust.of(prior.colour, doubts=bool(self.off.any()))
         if prior.ongoing:
             first_P = trust.undone(first_P)
         else:
             first, first_P = trust.start(first, first_P, self.layout.coordinates, self._nominal, self._plausible_std)
-        scale = np.array([self.setup.model.outputs[j].scale for j in self._columns])
+        scale = np.array([self.setup.model.outputs[j].scale for j in self.columns])
         noise = NoiseLevel.first(prior.core_noise, scale)
         size, n, count = self._b.stop, self.layout.size, len(self.modes.kinds)
         z, P = np.zeros((size, count)), np.zeros((size, size))
@@ -197,45 +200,44 @@ class AdaptiveImm:
 
     def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
         """Mix, predict, compare, correct, weigh; see `Estimator.update`."""
-        measured, driving, present = driving_outputs(sample, self._columns, len(self.setup.model.outputs))
+        measured, driving, present = driving_outputs(sample, self.columns, len(self.setup.model.outputs))
         noise, shape = state.noise, self.layout
-        count = noise.count
-        if self.noise_memory:
-            count = np.minimum(noise.count + present, self.noise_memory)
         p = self._p if sample.parameters is None else sample.parameters
-        z, P, probability, lagged, level, slow, prediction, std, mean, covariance, projected = self._step(
-            state.z,
-            state.P,
-            state.probability,
-            state.lagged,
-            noise.variance,
-            count,
-            state.slow,
-            state.time,
-            sample.inputs,
-            p,
-            driving,
-            present,
-            state.trust.doubt,
+        z, P, probability, lagged, level, count, slow, prediction, std, mean, covariance, projected, finite = (
+            self._step(
+                state.z,
+                state.P,
+                state.probability,
+                state.lagged,
+                noise.variance,
+                noise.count,
+                state.slow,
+                noise.least,
+                state.time,
+                sample.inputs,
+                p,
+                driving,
+                present,
+                state.trust.doubt,
+            )
         )
         status = Status.OK if present.any() else Status.MISSING
-        if not (np.isfinite(covariance).all() and np.isfinite(z).all() and np.isfinite(P).all()):
+        if not np.isfinite(finite[0]):
             z, P, probability, lagged, slow = state.z, state.P, state.probability, state.lagged, state.slow
             (mean, whole), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
             covariance = whole[shape.coordinates, shape.coordinates]
         else:
-            if self.noise_memory:
-                noise = NoiseLevel(np.maximum(level, noise.least), count, noise.least)
+            noise = NoiseLevel(level, count, noise.least)
             if projected[0] > 0:
                 status = Status.PROJECTED
         c, q = mean[shape.coordinates], len(self.setup.parameters)
         slopes, theta = self.coordinates.slopes(c), self.coordinates.to_parameters(c)
         theta_covariance = state.trust.shown((covariance * np.outer(slopes, slopes))[:q, :q])
-        wrong = state.wrong + (float(probability @ self._off) - state.wrong) / LAST
-        if status is Status.OK and (wrong > MORE_LIKELY or self._is_far(mean, covariance)):
+        wrong = state.wrong + (float(probability @ self.off) - state.wrong) / LAST
+        if status is Status.OK and (wrong > MORE_LIKELY or self.is_far(mean[None], covariance[None])[0]):
             status = Status.MODEL_ERROR
         off = np.zeros(len(prediction))
-        off[self._columns] = mean[self._b]
+        off[self.columns] = mean[self._b]
         estimate = Estimate(
             time=sample.time,
             prediction=prediction,
@@ -250,7 +252,29 @@ class AdaptiveImm:
         )
         return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, slow, state.trust, wrong), estimate
 
-    def _is_far(self, mean: FloatArray, covariance: FloatArray) -> bool:
-        where = self.layout.coordinates
-        far = (np.abs(mean[where] - self._nominal) - self._plausible_std)[: len(self.setup.parameters)]
-        return bool((far > 0).any() and (far > 2 * np.sqrt(np.diag(covariance)[: far.size])).any())
+    def track_ensemble(
+        self, states: Sequence[AdaptiveImmState], record: EnsembleRecord
+    ) -> list[tuple[AdaptiveImmState, Track]]:
+        """Take the records of many members at once; see `TracksEnsembles`.
+
+        Parameters
+        ----------
+        states
+            Of each member before its first sample.
+        record
+            Their samples.
+        """
+        return track_members(self, states, record)
+
+    @cached_property
+    def lanes(self) -> Lanes:
+        """The step for many members; made when first asked for. In vector registers it would compile for minutes."""
+        return Lanes(self._made, CARRIED, MATRICES, as_machine_code=self.setup.model.compiled, one_by_one=True)
+
+    def is_far(self, mean: FloatArray, covariance: FloatArray) -> Flags:
+        """Whether a parameter is beyond `plausible` (N,), from z (N, n) and covariances of coordinates (N, q, q)."""
+        own = slice(0, len(self.setup.parameters))
+        away = np.abs(mean[:, self.layout.coordinates] - self._nominal) - self._plausible_std
+        spread = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        far: Flags = (away[:, own] > np.maximum(0.0, 2 * spread[:, own])).any(axis=1)
+        return far

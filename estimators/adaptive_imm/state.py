@@ -4,9 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adaptive_flot.greybox.model import FloatArray
-from estimators.adaptive_imm.noise import NoiseLevel
 from estimators.adaptive_imm.trust import Trust
+
+LAST, MORE_LIKELY = 10.0, 0.5
+"""Samples over which the modes with a discrepancy must be the likely ones: outliers beside each other are none."""
+LEAST = 0.1
+"""Smallest standard deviation, as a share of the first one."""
+FIRST = 100.0
+"""Samples that the first noise level counts for."""
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """Variance of the noise of each output (m,), how many samples it rests on (m,), and the least it may be (m,)."""
+
+    variance: FloatArray
+    count: FloatArray
+    least: FloatArray
+
+    @classmethod
+    def first(cls, std: FloatArray, scale: FloatArray) -> NoiseLevel:
+        """From a prior's standard deviations (m,)."""
+        variance = np.maximum(std, 1e-9 * scale) ** 2
+        return cls(variance, np.full(len(std), FIRST), LEAST**2 * variance)
 
 
 @dataclass(frozen=True)

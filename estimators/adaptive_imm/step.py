@@ -9,13 +9,36 @@ import numpy as np
 
 from adaptive_flot.contracts import Setup
 from adaptive_flot.greybox.model import FloatArray
-from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles, carried, combined, output_variance, widened
+from estimators.adaptive_imm.bank import (
+    Contamination,
+    Mixing,
+    Triangles,
+    carried,
+    combined,
+    matched,
+    output_variance,
+    widened,
+)
 from estimators.adaptive_imm.interval import lagged_interval
 from estimators.adaptive_imm.modes import Modes
-from estimators.adaptive_imm.noise import matched
 from estimators.adaptive_imm.region import LongRun, no_narrower
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import Layout
+
+CARRIED = {
+    "z": "z_next",
+    "P": "P_next",
+    "probability": "found",
+    "lagged": "followed",
+    "variance": "level",
+    "count": "counted",
+    "slow": "slowly",
+}
+"""Result that takes the place of each argument in the next interval."""
+ARGUMENTS = [*CARRIED, "least", "t", "u", "p", "driving", "present", "doubt"]
+RESULTS = [*CARRIED.values(), "prediction", "std", "mean", "covariance", "projected", "finite"]
+MATRICES = ("z", "P", "slow", "z_next", "P_next", "slowly", "covariance")
+"""Arguments and results that are matrices also where they have one column."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +57,8 @@ class Step:
         Share of the covariance of the reference, the last mode, below which that of the parameters does not go.
     long_run
         What innovations that stay on one side add to it.
+    noise_memory
+        Samples over which the noise level is estimated; 0 takes that of the prior.
     """
 
     modes: Modes
@@ -43,6 +68,7 @@ class Step:
     follow: float
     reference_share: float
     long_run: LongRun
+    noise_memory: int
 
     @property
     def described(self) -> FloatArray:
@@ -57,11 +83,12 @@ class Step:
         Returns
         -------
         casadi.Function
-            `(z (n, M), P (n (n + 1) / 2, M), probability (M,), lagged (q,), variance (m,), count (m,), slow (m, 4), t,
-            u (nu,), p (np,), driving (m,), present (m,), doubt) -> (z, P, probability, lagged, variance, slow,
-            prediction (ny,), std (m,), mean (n,), covariance (q, q), projected)`; the covariance is that of the
-            coordinates, `slow` is that of `LongRun`. `projected` counts the parameters that were set onto their bounds
-            in the most likely mode. The probability of the reference is 1, beside those of the others.
+            `(z (n, M), P (n (n + 1) / 2, M), probability (M,), lagged (q,), variance (m,), count (m,), slow (m, 4),
+            least (m,), t, u (nu,), p (np,), driving (m,), present (m,), doubt) -> (z, P, probability, lagged, variance,
+            count, slow, prediction (ny,), std (m,), mean (n,), covariance (q, q), projected, finite)`. The covariance
+            is that of the coordinates, `slow` is of `LongRun`, `least` is the least variance of the noise. `projected`
+            counts the parameters that were set onto their bounds in the most likely mode, and `finite` is finite where
+            everything is. The probability of the reference is 1, beside those of the others.
         """
         coordinates, columns = (
             Coordinates.of(setup.model, setup.parameters),
@@ -73,7 +100,7 @@ class Step:
         z, P = ca.MX.sym("z", n, modes), ca.MX.sym("P", len(triangles.rows), modes)
         probability, lagged = ca.MX.sym("probability", modes), ca.MX.sym("lagged", shape.q)
         variance, count = ca.MX.sym("variance", m), ca.MX.sym("count", m)
-        slow = ca.MX.sym("slow", m, LongRun.COLUMNS)
+        slow, least = ca.MX.sym("slow", m, LongRun.COLUMNS), ca.MX.sym("least", m)
         t, u, p = (ca.MX.sym(name, interval.size1_in(name)) for name in ("t", "u", "p"))
         driving, present, doubt = ca.MX.sym("driving", m), ca.MX.sym("present", m), ca.MX.sym("doubt")
 
@@ -93,7 +120,10 @@ class Step:
         weights = expected * ca.exp(after.log_likelihood.T - ca.mmax(after.log_likelihood))
         found = weights / ca.sum1(weights)
         kept = found + ca.DM(1 - self.described)
-        level = matched(variance, count, after, found, H, driving - base, present)
+        level, counted = variance, count
+        if self.noise_memory:
+            counted = ca.fmin(count + present, self.noise_memory)
+            level = ca.fmax(matched(variance, counted, after, found, H, driving - base, present), least)
         ends = ca.repmat(ca.vertcat(end, self.fading * point[nz:]), 1, modes) + F @ after.away
         c = ends[where, :]
         low, high = (ca.repmat(ca.DM(bound), 1, modes) for bound in (coordinates.lower, coordinates.upper))
@@ -110,39 +140,15 @@ class Step:
         if self.reference_share > 0:
             _, reference = combined(ends, covariances, found, ca.MX(1 - self.described))
             shown = no_narrower(shape.q)(shown, reference[where, where], self.reference_share * (1 - doubt))
-        results = [ends, covariances, kept, followed, level, slowly, prediction, std]
+        shown *= factor
+        whole = [ends, covariances, kept, level, slowly, shown]
+        results = [ends, covariances, kept, followed, level, counted, slowly, prediction, std, mean, shown, projected]
         return ca.Function(
             "adaptive_imm_step",
-            [z, P, probability, lagged, variance, count, slow, t, u, p, driving, present, doubt],
-            [ca.densify(x) for x in (*results, mean, factor * shown, projected)],
-            [
-                "z",
-                "P",
-                "probability",
-                "lagged",
-                "variance",
-                "count",
-                "slow",
-                "t",
-                "u",
-                "p",
-                "driving",
-                "present",
-                "doubt",
-            ],
-            [
-                "z_next",
-                "P_next",
-                "found",
-                "followed",
-                "level",
-                "slowly",
-                "prediction",
-                "std",
-                "mean",
-                "covariance",
-                "projected",
-            ],
+            [z, P, probability, lagged, variance, count, slow, least, t, u, p, driving, present, doubt],
+            [ca.densify(x) for x in (*results, sum(ca.sum1(ca.vec(x)) for x in whole))],
+            ARGUMENTS,
+            RESULTS,
             {"cse": True},
         )
 

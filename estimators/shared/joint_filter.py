@@ -241,8 +241,14 @@ def parameters_of_rows(
     z: FloatArray, P: FloatArray, coordinates: Coordinates, shape: Layout
 ) -> tuple[FloatArray, FloatArray]:
     """The same for many rows: parameters (N, q) and covariances (N, q, q) from z (N, n) and P (N, n, n)."""
-    c, log = z[:, shape.coordinates], np.array(coordinates.log)
+    where = shape.coordinates
+    return of_coordinates(z[:, where], P[:, where, where], coordinates)
+
+
+def of_coordinates(c: FloatArray, P: FloatArray, coordinates: Coordinates) -> tuple[FloatArray, FloatArray]:
+    """Parameters (N, q) and their covariances (N, q, q) from coordinates (N, q) and theirs (N, q, q)."""
+    log = np.array(coordinates.log)
     powers = np.exp(np.where(log, c, 0.0))
     slopes = np.where(log, powers, 1.0)
     values = np.clip(np.where(log, powers, c), coordinates.range[:, 0], coordinates.range[:, 1])
-    return values, P[:, shape.coordinates, shape.coordinates] * slopes[:, :, None] * slopes[:, None, :]
+    return values, P * slopes[:, :, None] * slopes[:, None, :]

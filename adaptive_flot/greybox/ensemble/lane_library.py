@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -80,16 +79,19 @@ def _load(function: ca.Function, carried: Sequence[int], wanted: InstructionSet 
     for instructions in supported() if wanted is None else (wanted,):
         source = lane_source(function, carried, instructions.lanes)
         try:
-            return instructions, load_library(function.name() + "_lanes", source, instructions.flags, _open)
+            name = function.name() + "_lanes"
+            return instructions, load_library(
+                name, source, instructions.flags, lambda p: opened(ctypes.CDLL(str(p)), 4)
+            )
         except CompileError as error:  # a compiler that knows no OpenMP, a system without a vector library
             failure = error
     raise failure
 
 
-def _open(library: Path) -> Any:
-    run = ctypes.CDLL(str(library)).run
-    pointer = ctypes.c_void_p
-    run.argtypes, run.restype = [pointer] * 4 + [ctypes.c_int64] * 4, None
+def opened(library: ctypes.CDLL, pointers: int) -> Any:
+    """Its function `run`, which takes so many pointers, and then the numbers of `LaneLibrary.__call__`."""
+    run = library.run
+    run.argtypes, run.restype = [ctypes.c_void_p] * pointers + [ctypes.c_int64] * 4, None
     return run
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.ensemble.instruction_sets import InstructionSet
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
+from adaptive_flot.greybox.ensemble.loop_library import LoopLibrary
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiled import CompileError, CompileWarning
@@ -27,7 +28,7 @@ class Lanes:
     Parameters
     ----------
     function
-        An SX function with dense arguments.
+        An SX function with dense arguments; with `one_by_one` any function with dense arguments.
     carried
         Result that takes the place of each carried argument in the next row, by the argument's name.
     matrices
@@ -36,6 +37,8 @@ class Lanes:
         Compile it; where that can not be done a `CompileWarning` says why.
     instructions
         Instruction set of the machine code; default the widest of this machine.
+    one_by_one
+        The machine code takes one member after the other, in threads: for a function that is too large for lanes.
 
     Raises
     ------
@@ -51,14 +54,17 @@ class Lanes:
         *,
         as_machine_code: bool = False,
         instructions: InstructionSet | None = None,
+        one_by_one: bool = False,
     ) -> None:
         arguments, results = function.name_in(), function.name_out()
         unknown = [*(set(carried) - set(arguments)), *(set(carried.values()) - set(results))]
         if unknown:
             raise ModelError(f"{function.name()}: has no {unknown[0]!r} to carry")
-        symbols = function.sx_in()
-        values = [ca.densify(value) for value in function.call(symbols)]
-        self.function = ca.Function(function.name(), symbols, values, arguments, results, {"cse": True})
+        self.function = function
+        if not one_by_one:
+            symbols = function.sx_in()
+            values = [ca.densify(value) for value in function.call(symbols)]
+            self.function = ca.Function(function.name(), symbols, values, arguments, results, {"cse": True})
         self._carried = [results.index(carried[name]) if name in carried else -1 for name in arguments]
         f, keep = self.function, set(matrices)
         self._in = {n: _shape(f.size_in(i), n in keep) for i, n in enumerate(arguments)}
@@ -67,7 +73,11 @@ class Lanes:
         self.library: LaneLibrary | None = None
         if as_machine_code:
             try:
-                self.library = LaneLibrary(self.function, self._carried, instructions)
+                self.library = (
+                    LoopLibrary(function, self._carried)
+                    if one_by_one
+                    else LaneLibrary(self.function, self._carried, instructions)
+                )
             except CompileError as failure:
                 warnings.warn(f"{function.name()} is not compiled: {failure}", CompileWarning, stacklevel=2)
 

@@ -9,6 +9,7 @@ at once. A library is loaded only where nobody else can have put it (`safe_folde
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
 import platform
@@ -80,8 +81,19 @@ def compile_function(function: ca.Function) -> ca.Function:
     CompileError
         No compiler, it fails, or its result can not be kept or loaded.
     """
-    source = _source(function)
-    return load_library(function.name(), source, FLAGS, lambda library: ca.external(function.name(), str(library)))
+    name = function.name()
+    return load_library(name, _source(function), FLAGS, lambda library: ca.external(name, str(library)))
+
+
+def library_of(function: ca.Function) -> ctypes.CDLL:
+    """The library of a function that is compiled, or was: the one that `compile_function` loads.
+
+    Raises
+    ------
+    CompileError
+        No compiler, it fails, or its result can not be kept or loaded.
+    """
+    return load_library(function.name(), _source(function), FLAGS, lambda library: ctypes.CDLL(str(library)))
 
 
 def load_library(name: str, source: str, flags: Sequence[str], load: Callable[[Path], Loaded]) -> Loaded:

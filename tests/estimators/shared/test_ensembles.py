@@ -18,6 +18,7 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping import compiled
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from estimators.adaptive_imm import AdaptiveImm
 from estimators.ekf import Ekf
 from estimators.fixed import Fixed
 from estimators.mhe import Mhe
@@ -38,6 +39,7 @@ ESTIMATORS: dict[str, Make] = {
     "rpem_full": rpem_full,
     "rpem_full, correcting": lambda s: rpem_full(s, correct_state={"y": 0.02}),
     "ekf": Ekf,
+    "adaptive_imm": AdaptiveImm,
     "fixed": Fixed,
     "ekf, integrated": lambda s: Ekf(s, walk="integrated", state_noise=1e-3),
 }
@@ -107,7 +109,7 @@ def test_estimates_are_those_of_each_member_alone(name: str, machine_code: bool)
     assert {s for track in tracks for s in track.statuses} >= {Status.OK, Status.MISSING}
 
 
-@pytest.mark.parametrize("name", ["rpem", "rpem_full", "ekf", "fixed"])
+@pytest.mark.parametrize("name", ["rpem", "rpem_full", "ekf", "adaptive_imm", "fixed"])
 def test_a_sample_that_is_no_number_is_skipped_by_its_own_member_alone(name: str) -> None:
     priors, record = members()
     record.inputs[2, 30] = np.nan
@@ -116,12 +118,18 @@ def test_a_sample_that_is_no_number_is_skipped_by_its_own_member_alone(name: str
     assert np.isfinite(tracks[2].parameters).all()
 
 
-@pytest.mark.parametrize("name", ["rpem", "ekf", "fixed"])
+@pytest.mark.parametrize("name", ["rpem", "ekf", "adaptive_imm", "fixed"])
 def test_what_is_known_of_parameters_is_used(name: str) -> None:
     priors, record = members()
     p = decay().parameter_values * np.linspace(0.9, 1.1, MEMBERS)[:, None, None]
     known = replace(record, parameters=np.broadcast_to(p, (MEMBERS, ROWS, p.shape[-1])))
     same_as_alone(ESTIMATORS[name](Setup(decay(), 0.5, ("a",), ("y",))), [_first(prior) for prior in priors], known)
+
+
+def test_a_disturbance_that_nobody_measures_is_estimated_beside() -> None:
+    priors, record = members()
+    setup = Setup(decay(), 0.5, ("a",), ("y",), unmeasured=("b",))
+    same_as_alone(AdaptiveImm(setup), [_first(prior) for prior in priors], record)
 
 
 def _first(prior: Prior) -> Prior:
@@ -146,7 +154,7 @@ def test_an_update_of_its_own_is_not_passed_over() -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["rpem", "rpem_full"])
+@pytest.mark.parametrize("name", ["rpem", "rpem_full", "adaptive_imm"])
 def test_groups_of_members_give_the_same_bits(name: str) -> None:
     """A study may take its seeds in groups of any size."""
     priors, record = members()
