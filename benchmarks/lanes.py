@@ -170,19 +170,22 @@ def rpem(case: _Case) -> list[tuple[Way, float]]:
     )
 
 
-def study() -> list[tuple[Way, float]]:
-    """Processor time a run of `paper_1000`, with its batch fit and its summary; a step is a run."""
+def study(estimator: str) -> list[tuple[Way, float]]:
+    """Processor time a run of `paper_1000` with an estimator, its batch fit and its summary; a step is a run."""
     scenario = load_scenario("paper_scenario_1").compiled()
-    prepared, seeds = Prepared.of(scenario, ["rpem"]), range(1, AT_ONCE + 1)
+    prepared, seeds = Prepared.of(scenario, [estimator]), range(1, AT_ONCE + 1)
 
     def together() -> object:
         drawn = [Realisation(scenario, seed) for seed in seeds]
-        return run_side_by_side(prepared, "rpem", "schedule", drawn, [{} for _ in drawn])
+        return run_side_by_side(prepared, estimator, "schedule", drawn, [{} for _ in drawn])
+
+    def alone() -> object:
+        return run_one(prepared, estimator, "schedule", Realisation(scenario, 1), {})
 
     return _timed(
         [
-            Way(f"{AT_ONCE} seeds side by side", together, AT_ONCE),
-            Way("one seed alone", lambda: run_one(prepared, "rpem", "schedule", Realisation(scenario, 1), {}), 1),
+            Way(f"{estimator}: {AT_ONCE} seeds side by side", together, AT_ONCE),
+            Way(f"{estimator}: one seed alone", alone, 1),
         ]
     )
 
@@ -236,9 +239,10 @@ def main() -> None:
             table.add_row(way.what, f"{1e9 * taken:.0f}", rate, f"{taken / found[0][1]:.1f}")
         console.print(table)
     runs = Table("way", "ms a run", "times as long", title="A run of the study paper_1000")
-    found = study()
-    for way, taken in found:
-        runs.add_row(way.what, f"{1e3 * taken:.1f}", f"{taken / found[0][1]:.1f}")
+    for estimator in ("rpem", "adaptive_imm"):
+        found = study(estimator)
+        for way, taken in found:
+            runs.add_row(way.what, f"{1e3 * taken:.1f}", f"{taken / found[0][1]:.1f}")
     console.print(runs)
     console.print(_threads(case))
 
