@@ -45,7 +45,8 @@ def no_narrower(q: int) -> ca.Function:
                 turn = _rotation(M, q, i, j)
                 M, axes = turn.T @ M @ turn, axes @ turn
     axes = L @ axes
-    return ca.Function("no_narrower", [C, R, share], [axes @ ca.diag(ca.fmax(ca.diag(M), 1)) @ axes.T], {"cse": True})
+    found = axes @ ca.diag(ca.fmax(ca.diag(M), 1)) @ axes.T
+    return ca.Function("no_narrower", [C, R, share], [(found + found.T) / 2], {"cse": True})  # symmetric to the bit
 
 
 def _rotation(M: ca.SX, q: int, i: int, j: int) -> ca.SX:
