@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -25,7 +26,7 @@ END = "END"
 TEMPLATES = {**UNARY, **BINARY}
 OPERATIONS = (*TEMPLATES, END)
 """Kinds of operations; the place of each is its number on a tape."""
-STRUCTURAL = frozenset({0.0, 1.0, -1.0, 2.0, 0.5})
+STRUCTURAL = (0.0, 1.0, -1.0, 2.0, 0.5)
 """Numbers that are part of the form of an equation."""
 MOST_PLACES = 2**16
 """Places that a number of two bytes can tell apart."""
@@ -63,31 +64,43 @@ class Tape:
         Numbers stand in the memory, so that two models of the same structure have the same code; but those that are
         part of the form of an equation.
         """
-        return "\n".join([self._c_function(f"{name}_held", self.held), self._c_function(name, self.code)])
-
-    def _c_function(self, name: str, code: NDArray[np.uint16]) -> str:
         first, beyond = self.numbers
-        made = {to for _, to, _, _ in code[:-1].tolist() if to >= beyond}
-        declared, body = dict[int, None](), list[str]()
+        numbers = self.memory[first:beyond]
+        form = np.where(np.isin(numbers, STRUCTURAL), numbers, np.nan).tobytes()
+        parts = (f"{name}_held", self.held, True), (name, self.code, False)
+        return "\n".join(_c_function(title, code.tobytes(), form, first, holds) for title, code, holds in parts)
 
-        def read(place: int) -> str:
-            if place in made:
-                return f"a{place}"
-            value = float(self.memory[place])
-            return repr(value) if first <= place < beyond and value in STRUCTURAL else f"i[{place}]"
 
-        for kind, to, one, other in code[:-1].tolist():
-            value = TEMPLATES[OPERATIONS[kind]].format(read(one), read(other))
-            if to < beyond:
-                body.append(f"o[{to}]={value};")
-                continue
-            declared[to] = None
-            body.append(f"a{to}={value};")
-            if code is self.held:
-                body.append(f"o[{to}]=a{to};")
-        places = ", ".join(f"a{place}" for place in declared)
-        lines = [f"double {places};" if places else "", *body, "}"]
-        return "\n".join([f"void {name}(const double *restrict i, double *restrict o) {{", *lines])
+@lru_cache(maxsize=512)
+def _c_function(name: str, code: bytes, form: bytes, first: int, holds: bool) -> str:
+    """One of them, from the bytes of its operations and of its numbers; NaN where a number is not part of the form.
+
+    Many variants of a model have the same operations, and each asks whether its code was compiled before.
+    """
+    operations = np.frombuffer(code, dtype=np.uint16).reshape(-1, 4)[:-1].tolist()
+    numbers = np.frombuffer(form).tolist()
+    beyond = first + len(numbers)
+    made = {to for _, to, _, _ in operations if to >= beyond}
+    declared, body = dict[int, None](), list[str]()
+
+    def read(place: int) -> str:
+        if place in made:
+            return f"a{place}"
+        value = numbers[place - first] if first <= place < beyond else np.nan
+        return f"i[{place}]" if value != value else repr(value)
+
+    for kind, to, one, other in operations:
+        value = TEMPLATES[OPERATIONS[kind]].format(read(one), read(other))
+        if to < beyond:
+            body.append(f"o[{to}]={value};")
+            continue
+        declared[to] = None
+        body.append(f"a{to}={value};")
+        if holds:
+            body.append(f"o[{to}]=a{to};")
+    places = ", ".join(f"a{place}" for place in declared)
+    lines = [f"double {places};" if places else "", *body, "}"]
+    return "\n".join([f"void {name}(const double *restrict i, double *restrict o) {{", *lines])
 
 
 def tape_of(function: ca.Function, held: Sequence[int] = ()) -> Tape:
