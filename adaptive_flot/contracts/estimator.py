@@ -78,6 +78,8 @@ class Prior:
         of all noise.
     ongoing
         Whether this is the estimate of an estimator that ran, and no fit: its covariance allows for the colour already.
+    disturbances
+        Value and standard deviation of unmeasured disturbances that are known, by parameter name, each in its unit.
     """
 
     time: float
@@ -89,6 +91,7 @@ class Prior:
     colour: FloatArray | None = None
     core_noise_std: FloatArray | None = None
     ongoing: bool = False
+    disturbances: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def at(self, estimate: Estimate) -> Prior:
         """Where an estimator that began here starts again: at its estimate, with what was known of the errors."""
@@ -100,6 +103,9 @@ class Prior:
             covariance=estimate.covariance,
             joint_covariance=None,
             ongoing=True,
+            disturbances={
+                name: (v, estimate.disturbance_std.get(name, 0.0)) for name, v in estimate.disturbances.items()
+            },
         )
 
     @property
@@ -135,6 +141,8 @@ class Estimate:
         None where the prediction is the model's alone.
     disturbances
         Values of the unmeasured disturbances that the estimator has found, by parameter name, each in its unit.
+    disturbance_std
+        Their standard deviations in the same way.
     delayed
         Innovations of the delayed values that were used: output, time taken, measured minus predicted then.
     """
@@ -150,6 +158,7 @@ class Estimate:
     delayed: tuple[DelayedValue, ...] = ()
     discrepancy: FloatArray | None = None
     disturbances: Mapping[str, float] = field(default_factory=dict)
+    disturbance_std: Mapping[str, float] = field(default_factory=dict)
 
     def shown_with(self, sample: Sample, model: Model) -> Sample:
         """The sample for a controller, with the disturbances found among its parameters."""

@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
@@ -28,7 +29,9 @@ from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
+from adaptive_flot.discovery.record.screening import clean_outputs
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
@@ -51,8 +54,23 @@ def find_changes(
     """Find what has changed since a reference, or what a model lacks in several records of one process.
 
     Arguments and errors are those of `compare`. Events, and causes beside what wanders, are looked for where there are
-    one record and a reference.
+    one record and a reference. What is wrong with the data is among the notes.
     """
+    compared = _found(model, records, references, adapted, processes, progress)
+    if not references and len(records) > 1:
+        compared = unless_an_event(compared, model, records, adapted, processes, progress)
+    return _with_words_on_data(compared, model, records, bool(references))
+
+
+def _found(
+    model: Model,
+    records: Sequence[Dataset],
+    references: Sequence[Dataset],
+    adapted: Sequence[str],
+    processes: int,
+    progress: Callable[[str], None],
+) -> Comparison:
+    """What has changed, without a word on the data."""
     began = time.perf_counter()
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
     if not references or compared.verdict.word == "insufficient":
@@ -75,6 +93,42 @@ def find_changes(
             if with_it is compared and sole is not None:
                 with_it = with_cause(compared, search, base, sole, before, seconds)
     return _unless_much_is_left(with_it if with_it is not compared else _unless_contradicted(compared, told))
+
+
+def unless_an_event(
+    compared: Comparison,
+    model: Model,
+    records: Sequence[Dataset],
+    adapted: Sequence[str],
+    processes: int,
+    progress: Callable[[str], None],
+) -> Comparison:
+    """The comparison, its name taken back where the longest record alone is explained by what happened at some time.
+
+    What begins at a time is no hypothesis for several records. A slow part or a dependence then stands in for it.
+    """
+    if compared.verdict.word not in ("named", "class"):
+        return compared
+    longest = max(records, key=len)
+    alone = discover(model, longest, adapted=adapted, processes=processes, progress=progress).verdict
+    if alone.word != "named" or not alone.effects or any(e.effect.driver != "time" for e in alone.effects):
+        return compared
+    said = alone.reason.partition(". ")[0]
+    return _taken_back(compared, f"{longest.name} alone says: {said}. Judge each record by itself", "is missing")
+
+
+def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Dataset], referred: bool) -> Comparison:
+    """The comparison with a word on holes, sensors that say nothing, and events that seem to begin there."""
+    verdict, said = compared.verdict, list[str]()
+    for record in records:
+        _, found, suspects = clean_outputs(record, model)
+        ranges = [note for note in found if "outside the range" in note]
+        said += [f"{record.name}: {note}" for note in (*record.notes, *ranges, *suspects)]
+        if len(records) == 1:
+            said += suspect_notes([e.effect for e in verdict.effects], suspects, record.dt)
+    if referred and len(records) > 1:
+        said.append("Events in time were not looked for: that takes one record without a gap, and a reference")
+    return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, *said))) if said else compared
 
 
 def _leaves_more(verdict: Verdict) -> bool:
@@ -128,12 +182,12 @@ def _unless_much_is_left(compared: Comparison) -> Comparison:
     return _taken_back(compared, f"{why}, so it may stand in for something else")
 
 
-def _taken_back(compared: Comparison, why: str) -> Comparison:
+def _taken_back(compared: Comparison, why: str, changed: str = "has changed") -> Comparison:
     """The comparison without its name, and why."""
     word: Literal["abstain"] = "abstain"
     verdict = compared.verdict
     nearest = verdict.reason[:1].lower() + verdict.reason[1:]
-    reason = f"Something has changed, and it is not told what: {why}. The nearest: {nearest}"
+    reason = f"Something {changed}, and it is not told what: {why}. The nearest: {nearest}"
     return replace(
         compared,
         verdict=replace(verdict, word=word, reason=reason, effects=(), members=()),

@@ -3,28 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-from adaptive_flot.contracts import Status
+from adaptive_flot.contracts import Estimate, Sample, Setup, Status
 from adaptive_flot.contracts.ensemble_record import EnsembleRecord
 from adaptive_flot.contracts.track import Track
+from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
 from estimators.adaptive_imm.state import LAST, MORE_LIKELY, AdaptiveImmState, NoiseLevel
 from estimators.adaptive_imm.step import CARRIED
+from estimators.shared.coordinates import Coordinates
 from estimators.shared.ensemble import Flags, driving, known_parameters, samples_of, statuses
-from estimators.shared.joint_filter import of_coordinates
-
-if TYPE_CHECKING:
-    from estimators.adaptive_imm.estimator import AdaptiveImm
+from estimators.shared.joint_filter import Layout, of_coordinates
 
 EVERY = ("found", "prediction", "std", "mean", "covariance", "projected", "finite")
 """Results that are wanted at every sample."""
 
 
+class OneByOne(Protocol):
+    """What is asked of the estimator: its parts, and how it takes a sample alone."""
+
+    setup: Setup
+    coordinates: Coordinates
+    layout: Layout
+    columns: list[int]
+    off: FloatArray
+
+    @property
+    def lanes(self) -> Lanes:
+        """The step for many members."""
+
+    def is_far(self, mean: FloatArray, covariance: FloatArray) -> Flags:
+        """Whether a parameter is beyond what is plausible (N,)."""
+
+    def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
+        """See `Estimator.update`."""
+
+
 def track_members(
-    estimator: AdaptiveImm, states: Sequence[AdaptiveImmState], record: EnsembleRecord
+    estimator: OneByOne, states: Sequence[AdaptiveImmState], record: EnsembleRecord
 ) -> list[tuple[AdaptiveImmState, Track]]:
     """State after the last sample, and the estimates, of each member; see `TracksEnsembles`."""
     parameters = known_parameters(record, estimator.setup.model.parameter_values)
@@ -54,7 +73,7 @@ _CARRIED_ON = tuple(result for result in CARRIED.values() if result not in EVERY
 
 
 def _member(
-    estimator: AdaptiveImm,
+    estimator: OneByOne,
     rows: Mapping[str, FloatArray],
     state: AdaptiveImmState,
     record: EnsembleRecord,
@@ -95,6 +114,7 @@ def _member(
         rows["followed"].copy(),
         noise,
         rows["slowly"].copy(),
+        covariance[-1].copy(),
         state.trust,
         wrong,
     )

@@ -191,11 +191,12 @@ class AdaptiveImm:
         shape = Triangles(size)
         triangles = P[shape.rows, shape.columns][:, None] + shape.on_diagonal(variances)
         lagged = first[self.layout.coordinates].copy()
+        region = first_P[self.layout.coordinates, self.layout.coordinates].copy()
         known = self._described > 0
         probability = np.ones(count)
         probability[known] = stationary(self.transitions[np.ix_(known, known)])
         return AdaptiveImmState(
-            prior.time, z, triangles, probability, lagged, noise, LongRun.first(len(scale)), trust, trust.doubt
+            prior.time, z, triangles, probability, lagged, noise, LongRun.first(len(scale)), region, trust, trust.doubt
         )
 
     def update(self, state: AdaptiveImmState, sample: Sample) -> tuple[AdaptiveImmState, Estimate]:
@@ -224,15 +225,15 @@ class AdaptiveImm:
         status = Status.OK if present.any() else Status.MISSING
         if not np.isfinite(finite[0]):
             z, P, probability, lagged, slow = state.z, state.P, state.probability, state.lagged, state.slow
-            (mean, whole), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
-            covariance = whole[shape.coordinates, shape.coordinates]
+            (mean, _), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
+            covariance = state.region
         else:
             noise = NoiseLevel(level, count, noise.least)
             if projected[0] > 0:
                 status = Status.PROJECTED
         c, q = mean[shape.coordinates], len(self.setup.parameters)
         slopes, theta = self.coordinates.slopes(c), self.coordinates.to_parameters(c)
-        theta_covariance = state.trust.shown((covariance * np.outer(slopes, slopes))[:q, :q])
+        theta_covariance = state.trust.shown(covariance * np.outer(slopes, slopes))
         wrong = state.wrong + (float(probability @ self.off) - state.wrong) / LAST
         if status is Status.OK and (wrong > MORE_LIKELY or self.is_far(mean[None], covariance[None])[0]):
             status = Status.MODEL_ERROR
@@ -244,13 +245,18 @@ class AdaptiveImm:
             innovation=measured - prediction,
             innovation_std=std,
             parameters=theta[:q],
-            covariance=theta_covariance,
+            covariance=theta_covariance[:q, :q],
             state=mean[: shape.nx].copy(),
             status=status,
             discrepancy=off,
             disturbances=dict(zip(self.setup.unmeasured, theta[q:].tolist(), strict=True)),
+            disturbance_std=dict(
+                zip(self.setup.unmeasured, np.sqrt(np.diag(theta_covariance)[q:]).tolist(), strict=True)
+            ),
         )
-        return AdaptiveImmState(sample.time, z, P, probability, lagged, noise, slow, state.trust, wrong), estimate
+        return AdaptiveImmState(
+            sample.time, z, P, probability, lagged, noise, slow, covariance, state.trust, wrong
+        ), estimate
 
     def track_ensemble(
         self, states: Sequence[AdaptiveImmState], record: EnsembleRecord

@@ -18,8 +18,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 CLIP = 3.0
 """Standard deviations beyond which an innovation counts as one of that size: an outlier lasts for one sample."""
-TINY = 1e-12
-"""Share of R that is added to C, so that a parameter that is known exactly is no division by zero."""
+TINY, LEAST = 1e-12, 1e-30
+"""Share of C and of R, and a variance, that are added to C: what is known exactly is no division by zero."""
 SWEEPS = 6
 """Sweeps of Jacobi's method for more than two parameters; two need one rotation. It converges quadratically."""
 
@@ -36,7 +36,7 @@ def no_narrower(q: int) -> ca.Function:
         `(C (q, q), R (q, q), share) -> (q, q)`; C positive semidefinite, R positive definite.
     """
     C, R, share = ca.SX.sym("C", q, q), ca.SX.sym("R", q, q), ca.SX.sym("share")
-    L = ca.chol(C + TINY * ca.diag(ca.diag(R))).T
+    L = ca.chol(C + TINY * ca.diag(ca.diag(C) + ca.diag(R)) + LEAST * ca.SX.eye(q)).T
     M = share * ca.solve(L, ca.solve(L, R).T)
     axes = ca.SX.eye(q)
     for _ in range(1 if q == 2 else SWEEPS):

@@ -50,6 +50,8 @@ class AdaptiveImmState:
         Noise of the driving outputs.
     slow
         What the long-run variance of their innovations rests on (m, 4), see `LongRun`.
+    region
+        Covariance of the parameter coordinates as it was shown last (q, q), but for `trust`.
     trust
         What the first record said of the model.
     wrong
@@ -63,5 +65,6 @@ class AdaptiveImmState:
     lagged: FloatArray
     noise: NoiseLevel
     slow: FloatArray
+    region: FloatArray
     trust: Trust
     wrong: float

@@ -92,6 +92,7 @@ def calibrate(
     loose = loose_constants(model, free)
     fits = [_fit_from(model, rows, loose, start) for start in scattered_starts(model, loose)]
     best = min(fits, key=lambda f: f.cost)
+    best = JointFitter(model, rows, loose).fit_from_afar(best.unknowns)
     if not all(np.isfinite(e[c]).any() for e, c in zip(best.errors, rows.counted, strict=True)):
         names = ", ".join(record.name for record in records)
         raise DataError(f"{names}: the model '{model.name}' can not simulate it; check units and first guesses")

@@ -125,7 +125,7 @@ def fit_all_rows(
     initial = [_with_effect_states(extended, x) for x in first_states(model, rows.records)]
     fitter = JointFitter(extended, rows, constants, own, initial)
     fit = (
-        fitter.fit(fitter.unknowns.start())
+        fitter.fit_from_afar(fitter.unknowns.start())
         if hypothesis is None or base is None
         else _first_fit(fitter, hypothesis, base, refresh, elsewhere)
     )

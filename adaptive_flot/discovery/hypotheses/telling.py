@@ -92,7 +92,7 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
     std = np.sqrt(np.sum(constants.root**2, axis=1))
     label = {p.name: p.label for p in model.parameters}
     moved = [
-        f"{label[n]} {after.fit.value(n):.3g} instead of {mean:.3g} +- {s:.2g}"
+        f"{label[n]} {after.fit.value(n):.6g} instead of {mean:.6g} +- {s:.2g}"
         for n, mean, s in zip(constants.names, constants.mean, std, strict=True)
         if abs(after.fit.value(n) - mean) > MOVED * s
     ]

@@ -114,7 +114,7 @@ def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ..
             )
         notes += _clean(outputs[:, j], q.name, q.name in model.edges)
         suspects += [
-            Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} is missing or left out")
+            Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} says nothing")
             for a, b in runs_of(~np.isfinite(outputs[:, j]), FROZEN_ROWS if is_dense(outputs[:, j]) else len(before))
         ]
     for q, u in zip(model.inputs, record.inputs.T, strict=True):

@@ -19,15 +19,18 @@ ROWS_BESIDE = 5
 def event_times(effect: Effect) -> tuple[tuple[float, float], ...]:
     """When an effect of time changes most, first and last time [s] of each; none for other effects.
 
-    An onset is an instant, and so is the end of a pulse. A curve changes most between the two knots whose values differ
-    most.
+    An onset is an instant, and so is the end of a pulse. A gradual change takes its duration. A curve changes most
+    between the two knots whose values differ most.
     """
     if effect.driver != "time":
         return ()
     if effect.family.passes:
         return tuple((t, t) for t in edges(effect))
+    lasting = sum(effect.coefficients.get(n, 0.0) for n in effect.names(CoefficientRole.DURATION))
     onsets = tuple(
-        (effect.coefficients[n],) * 2 for n in effect.names(CoefficientRole.ONSET) if n in effect.coefficients
+        (effect.coefficients[n], effect.coefficients[n] + lasting)
+        for n in effect.names(CoefficientRole.ONSET)
+        if n in effect.coefficients
     )
     if onsets or not effect.family.is_curve:
         return onsets

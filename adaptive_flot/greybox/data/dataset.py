@@ -113,7 +113,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     for j, q in enumerate(model.outputs):
         if q.column in columns:
             outputs[:, j] = numeric_column(table, q.column, file)
-            check_unit(q, outputs[:, j], str(file))
+            check_unit(_with_range(q, model), outputs[:, j], str(file))
         elif q.name in required_outputs or _other_unit(columns, q.name, q.column) is not None:
             _find(columns, q.name, q.column, q.unit, file)
 
@@ -230,6 +230,14 @@ def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
             f"put it on an even grid with 'adaptive-flot import {file} --out even.csv', and the same --model"
         )
     return float((time[-1] - time[0]) / (len(time) - 1))
+
+
+def _with_range(output: Quantity, model: Model) -> Quantity:
+    """An output; where it has no range of its own, with that of the state that it shows: same name, same unit."""
+    if output.usual is not None or np.isfinite([output.lower, output.upper]).any():
+        return output
+    shown = next((s for s in model.states if (s.name, s.unit) == (output.name, output.unit)), output)
+    return replace(output, lower=shown.lower, upper=shown.upper)
 
 
 def _check_steps(model: Model, dt: float, rows: int, file: Path) -> None:

@@ -21,6 +21,8 @@ OTHER_UNITS = {
     "1/s": {"1/min": 1 / 60},
 }
 """Units that plants use instead of a model's, and what one of them is in it."""
+OFFSETS = {"K": {"degC": (1.0, 273.15), "degF": (5 / 9, 273.15 - 32 * 5 / 9)}}
+"""Units whose zero is another one: what one of them is in a model's unit, and where their zero is."""
 FAR = 20.0
 """A median so many times as large as what is usual is of another unit."""
 
@@ -46,6 +48,7 @@ def units_that_fit(quantity: Quantity, value: float) -> dict[str, float]:
     """
     low, high = quantity.usual or (quantity.lower, quantity.upper)
     found = {unit: value * factor for unit, factor in other_units(quantity).items()}
+    found |= {unit: value * factor + offset for unit, (factor, offset) in OFFSETS.get(quantity.unit, {}).items()}
     return {unit: inside for unit, inside in found.items() if low <= inside <= high}
 
 
@@ -74,10 +77,23 @@ def check_unit(quantity: Quantity, values: FloatArray, where: str) -> None:
     middle = float(np.median(values[np.isfinite(values)]))
     fitting = units_that_fit(quantity, middle)
     if fitting:
-        unit, inside = next(iter(fitting.items()))
-        factor = OTHER_UNITS[quantity.unit][unit]
         said = "is a fraction" if quantity.unit == "-" else f"is in {quantity.unit}"
+        ways = [
+            f"in {unit} that would be {inside:g}: {_converted(quantity.unit, unit)}, or import it with "
+            f"'unit: \"{unit}\"'"
+            for unit, inside in fitting.items()
+        ]
+        which = "" if len(ways) == 1 else f". {len(ways)} units would fit, so look up which it is"
         raise RangeError(
-            f"{where}: {quantity.name} {said}, and the median of its values is {middle:g}; in {unit} that would be "
-            f"{inside:g}: multiply the column by {factor:g}, or import it with 'unit: \"{unit}\"'"
+            f"{where}: {quantity.name} {said}, and the median of its values is {middle:g}; {'; '.join(ways)}{which}"
         )
+
+
+def _converted(unit: str, other: str) -> str:
+    """What to do with a column, in words."""
+    if other in OFFSETS.get(unit, {}):
+        factor, offset = OFFSETS[unit][other]
+        return (
+            f"add {offset:g} to the column" if factor == 1 else f"multiply the column by {factor:g} and add {offset:g}"
+        )
+    return f"multiply the column by {OTHER_UNITS[unit][other]:g}"

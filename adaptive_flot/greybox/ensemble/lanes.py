@@ -43,7 +43,7 @@ class Lanes:
     Raises
     ------
     ModelError
-        A carried name is not one of the function's.
+        A carried name is not one of the function's, or the result has another shape than the argument.
     """
 
     def __init__(
@@ -60,6 +60,12 @@ class Lanes:
         unknown = [*(set(carried) - set(arguments)), *(set(carried.values()) - set(results))]
         if unknown:
             raise ModelError(f"{function.name()}: has no {unknown[0]!r} to carry")
+        for taken, given in carried.items():
+            if function.size_in(taken) != function.size_out(given):
+                raise ModelError(
+                    f"{function.name()}: {given!r} {function.size_out(given)} can not take the place of {taken!r} "
+                    f"{function.size_in(taken)}; carry a result of its shape"
+                )
         self.function = function
         if not one_by_one:
             symbols = function.sx_in()

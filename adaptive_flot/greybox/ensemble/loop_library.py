@@ -18,6 +18,7 @@ from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary, opened
 from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, library_of, load_library
 
 _SOURCE = """
+#include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,7 +44,13 @@ void run(const description *f, const double *const *arg, const int64_t *arg_stri
     const double **in = malloc((f->room_arg + 1) * sizeof(double *));
     double **out = malloc((f->room_res + 1) * sizeof(double *));
     double *inputs = numbers, *outputs = numbers + given, *work = outputs + made;
-    for (int64_t member = first; numbers && integers && in && out && member < last; member++)
+    const int no_room = !(numbers && integers && in && out); /* then nothing is a number */
+    for (int64_t i = 0; no_room && i < f->n_res; i++)
+        for (int64_t member = first; res[i] && member < last; member++)
+            for (int64_t row = 0; row < (res_stride[3 * i] ? rows : 1); row++)
+                for (int64_t e = 0; e < f->res_size[i]; e++)
+                    res[i][row * res_stride[3 * i] + e * res_stride[3 * i + 1] + member * res_stride[3 * i + 2]] = NAN;
+    for (int64_t member = first; !no_room && member < last; member++)
         for (int64_t row = 0; row < rows; row++) {
             at = 0;
             for (int64_t i = 0; i < f->n_arg; at += f->arg_size[i++]) {
@@ -62,7 +69,7 @@ void run(const description *f, const double *const *arg, const int64_t *arg_stri
             at = 0;
             for (int64_t i = 0; i < f->n_res; at += f->res_size[i++]) out[i] = outputs + at;
             const int failed = f->call(in, out, integers, work, 0);
-            if (failed) for (int64_t e = 0; e < made; e++) outputs[e] = 0. / 0.;
+            if (failed) for (int64_t e = 0; e < made; e++) outputs[e] = NAN;
             at = 0;
             for (int64_t i = 0; i < f->n_res; at += f->res_size[i++]) {
                 const int64_t *stride = res_stride + 3 * i;

@@ -121,6 +121,7 @@ class Estimation:
         setup = self.estimator.setup
         full = setup.model.parameter_values
         full[setup.model.indices("parameters", setup.parameters)] = prior.parameters
+        full[setup.model.indices("parameters", prior.disturbances)] = [v for v, _ in prior.disturbances.values()]
         return replace(prior, time=begin, state=steady_state(setup.model, sample.inputs, full).state)
 
 

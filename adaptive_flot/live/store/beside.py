@@ -126,6 +126,6 @@ def stored_change(row: RowMapping) -> ModelChange:
         Effect(**{**e, "settings": {k: _setting(v) for k, v in e.get("settings", {}).items()}})
         for e in json.loads(row["effects"])
     )
-    arrays = {name: as_array(known[name]) for name in PRIOR} | known_of_errors(known)
+    arrays: dict[str, Any] = {name: as_array(known[name]) for name in PRIOR} | known_of_errors(known)
     prior = Prior(float(known["time"]), **arrays, ongoing=True)
     return ModelChange(effects, prior, row["person"])

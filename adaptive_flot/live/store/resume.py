@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import Connection, select
 
@@ -91,7 +92,9 @@ def stored_resumed(connection: Connection, session: int, cycle: int) -> Resumed:
     e = schema.estimates.c
     query = select(schema.estimates).where(e.session == session, e.cycle == cycle)
     row = connection.execute(query).mappings().one()
-    arrays = {name: as_array(row[name]) for name in ("state", "parameters", "covariance")} | known_of_errors(row)
+    arrays: dict[str, Any] = {
+        name: as_array(row[name]) for name in ("state", "parameters", "covariance")
+    } | known_of_errors(row)
     prior = Prior(0.0, **arrays, ongoing=True)
     return Resumed(session, cycle, prior, _extensions(connection, session, cycle))
 

@@ -74,5 +74,10 @@ def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None) -> lis
         if len(parts) > 1:
             stem = named(source).stem
             read = [read_measurements(part, model).record for part in parts]
-            return [replace(r, name=f"{stem}, stretch {k}") for k, r in enumerate(read, start=1)]
+            parted = f"{stem} has {len(parts)} stretches with gaps between them, and each is taken as a record"
+            notes = [(parted, *r.notes) if r is read[0] else r.notes for r in read]
+            return [
+                replace(r, name=f"{stem}, stretch {k}", notes=said)
+                for k, (r, said) in enumerate(zip(read, notes, strict=True), start=1)
+            ]
     return [read_measurements(source, model, tag_map=tag_map).record]

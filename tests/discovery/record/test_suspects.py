@@ -12,7 +12,7 @@ from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import Truth, heated_tank, tank_record
 
-FROZEN = Suspect(5000.0, 6000.0, "temperature is missing or left out")
+FROZEN = Suspect(5000.0, 6000.0, "temperature says nothing")
 
 
 def _step(onset: float) -> Effect:
@@ -44,7 +44,7 @@ def test_what_is_frozen_missing_or_stands_still_becomes_a_suspect_part() -> None
     u[:, 1] += 0.1 * np.random.default_rng(0).standard_normal(600)
     u[400:440, 1] = np.median(u[:, 1])
     cleaned, notes, suspects = clean_outputs(replace(record, outputs=y, inputs=u), heated_tank())
-    assert [s.what for s in suspects] == ["temperature is missing or left out"] * 2 + ["fan_speed stands still"]
+    assert [s.what for s in suspects] == ["temperature says nothing"] * 2 + ["fan_speed stands still"]
     assert [round(s.start / 30) - 1 for s in suspects] == [101, 300, 401]
     assert np.isnan(cleaned.outputs[101:160, 0]).all() and any("had stopped?" in n for n in notes)
 

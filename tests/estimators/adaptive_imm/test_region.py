@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
+from adaptive_flot.contracts import Status
 from adaptive_flot.greybox.model import FloatArray
 from estimators.adaptive_imm import AdaptiveImm
 from estimators.adaptive_imm.region import LongRun, no_narrower
@@ -91,3 +93,26 @@ def test_the_region_grows_where_innovations_stay_on_one_side(slow: float) -> Non
     np.testing.assert_array_equal([e.parameters for e in plain], [e.parameters for e in grown])
     factor = grown[-1].covariance[0, 0] / plain[-1].covariance[0, 0]
     assert 1 <= factor < 1.6 if slow == 0 else factor > 10
+
+
+def test_a_sample_that_is_no_number_leaves_the_region_as_it_was() -> None:
+    """The covariance that is shown, not that of the modes, which is narrower."""
+    generator, rows = np.random.default_rng(6), 200
+    inputs = generator.normal(size=rows)
+    inputs[150] = np.nan
+    record = regression(rows, inputs + 0.1 * generator.normal(size=rows), inputs, 0.1)
+    found = run_estimator(AdaptiveImm(record.setup), record)
+    assert found[150].status is Status.NOT_FINITE
+    np.testing.assert_array_equal(found[150].covariance, found[149].covariance)
+    np.testing.assert_array_equal(found[150].parameters, found[149].parameters)
+
+
+@pytest.mark.parametrize("mode", ["rest", "jump"])
+def test_what_is_known_exactly_and_never_moves_is_estimated_all_the_same(mode: str) -> None:
+    generator, rows = np.random.default_rng(7), 100
+    inputs = generator.normal(size=rows)
+    record = regression(rows, inputs + 0.1 * generator.normal(size=rows), inputs, 0.1)
+    prior = replace(record.prior, covariance=np.zeros((1, 1)))
+    options: dict[str, Any] = {"modes": (mode,), "background_per_hour": 0.0, "plausible": 1e-12}
+    found = run_estimator(AdaptiveImm(record.setup, **options), replace(record, prior=prior))
+    assert Status.NOT_FINITE not in {e.status for e in found}

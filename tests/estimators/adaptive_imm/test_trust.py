@@ -104,10 +104,18 @@ def test_a_disturbance_that_nobody_measures_is_kept_from_the_parameters() -> Non
     prior = Prior(0.0, np.zeros(1), np.ones(1), 1e-4 * np.eye(1), np.array([0.01]))
     setup = Setup(model, 1.0, ("th0",), ("y0",), unmeasured=("th1",))
     record = regression(1, outputs, inputs[:, :1], 0.01)
-    last = run_estimator(AdaptiveImm(setup), replace(record, setup=setup, prior=prior, samples=samples))[-1]
+    estimator = AdaptiveImm(setup)
+    last = run_estimator(estimator, replace(record, setup=setup, prior=prior, samples=samples))[-1]
     assert last.parameters.shape == (1,) and last.covariance.shape == (1, 1)
     assert last.parameters[0] == pytest.approx(1.0, abs=0.01)
     assert last.disturbances == {"th1": pytest.approx(1.3, abs=0.01)}
+
+    def again(start: Prior) -> Estimate:
+        return estimator.update(estimator.init(start), replace(samples[-1], time=last.time + 1.0))[1]
+
+    after, forgotten = again(prior.at(last)), again(replace(prior.at(last), disturbances={}))
+    assert after.disturbances["th1"] == pytest.approx(1.3, abs=0.01) and after.disturbance_std["th1"] < 0.05
+    assert abs(forgotten.disturbances["th1"] - 1.3) > 0.1
     shown = last.shown_with(samples[-1], model)
     assert shown.parameters is not None and shown.parameters[1] == last.disturbances["th1"]
     assert samples[-1].parameters is None

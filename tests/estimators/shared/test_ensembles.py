@@ -154,7 +154,7 @@ def test_an_update_of_its_own_is_not_passed_over() -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["rpem", "rpem_full", "adaptive_imm"])
+@pytest.mark.parametrize("name", ["rpem", "rpem_full", "ekf", "adaptive_imm"])
 def test_groups_of_members_give_the_same_bits(name: str) -> None:
     """A study may take its seeds in groups of any size."""
     priors, record = members()
@@ -170,7 +170,7 @@ def test_groups_of_members_give_the_same_bits(name: str) -> None:
 
 @needs_compiler
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["rpem", "rpem_full"])
+@pytest.mark.parametrize("name", ["rpem", "rpem_full", "adaptive_imm"])
 def test_the_cell(model: Model, name: str) -> None:
     """Over 60 samples, so that a difference of the step would grow."""
     rng = np.random.default_rng(2)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import read_dataset
+from adaptive_flot.greybox.data.wrong_unit import check_unit
 from adaptive_flot.greybox.model import Model
+from tests.discovery.heated import heated_tank
 
 VALUES = {
     "air_flow_m3_s": 1.5e-3,
@@ -59,3 +63,26 @@ def test_a_sound_record_and_one_with_some_wrong_values_pass(model: Model) -> Non
 
 def test_a_record_without_any_measurement_of_an_output_passes(model: Model) -> None:
     assert "recovery" not in read_dataset(record(recovery=np.nan), model).measured(model)
+
+
+def test_degrees_in_a_column_of_kelvin_are_named_by_the_range_of_the_state() -> None:
+    """The output has no range of its own; the state of the same name has."""
+    tank = heated_tank()
+    t = 30.0 * np.arange(1, 51)
+    kelvin = pd.DataFrame({"time_s": t, "power_W": 1e3, "fan_speed_1_s": 5.0, "temperature_K": 310.0})
+    assert read_dataset(kelvin, tank).outputs[0, 0] == 310.0
+    with pytest.raises(RangeError, match=r"in degC that would be 310: add 273.15 to the column"):
+        read_dataset(kelvin.assign(temperature_K=310.0 - 273.15), tank)
+    with pytest.raises(
+        RangeError, match=r"in degF that would be 333.15: multiply the column by 0.555556 and add 255.372"
+    ):
+        read_dataset(kelvin.assign(temperature_K=140.0), tank)
+
+
+def test_where_several_units_would_fit_all_are_named(model: Model) -> None:
+    """1.67e-4 m3/s is 0.167 L/s, 10 L/min and 0.6 m3/h: the number alone does not say which it was."""
+    wide = replace(model.inputs[1], usual=(1e-7, 1.0))
+    with pytest.raises(RangeError) as caught:
+        check_unit(wide, np.full(9, 50.0), "file.csv")
+    said = str(caught.value)
+    assert all(f"in {unit} that would be" in said for unit in ("L/min", "m3/h", "L/s")) and "3 units would fit" in said

@@ -263,3 +263,10 @@ def test_wrong_arguments_are_named() -> None:
         lanes(3, 5, fixed, by_row, every=["y"])
     with pytest.raises(ModelError, match="no 'z' to carry"):
         Lanes(filter_like(), {"z": "x_next"})
+
+
+def test_a_result_of_another_shape_can_not_be_carried() -> None:
+    x = ca.SX.sym("x", 3)
+    function = ca.Function("sums", [x], [ca.sum1(x)], ["x"], ["s"])
+    with pytest.raises(ModelError, match=r"'s' .1, 1. can not take the place of 'x' .3, 1."):
+        Lanes(function, {"x": "s"})

@@ -23,6 +23,8 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 MOST_EVALUATIONS = 15
+MOST_TIMES, STILL_FALLS = 6, 1e-3
+"""Fits one after the other from a far start, as long as the criterion falls by this share."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,21 @@ class JointFitter:
                 max_nfev=most, ftol=1e-4, xtol=1e-5,
             ).x  # fmt: skip
         return self.result(z, slopes(z) if len(z) else np.empty((0, 0)))
+
+    def fit_from_afar(self, z: FloatArray) -> JointFit:
+        """Fit everything from a start that may be far off, and go on as long as the criterion falls.
+
+        A record that does not start at rest begins many standard deviations away from its initial state. One fit of
+        `MOST_EVALUATIONS` then ends on the way, and whatever is fitted on from there seems to explain the rest.
+        """
+        fit = self.fit(z)
+        for _ in range(MOST_TIMES - 1):
+            further = self.fit(fit.unknowns)
+            falls = further.cost < (1 - STILL_FALLS) * fit.cost
+            fit = further if further.cost < fit.cost else fit
+            if not falls:
+                break
+        return fit
 
     def shared_slopes(self, fit: JointFit) -> FloatArray | None:
         """Derivatives by constants and initial states from another fit to the same records; None where states differ.
