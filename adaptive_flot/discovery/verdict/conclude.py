@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.discovery.verdict.thresholds import with_ranges
 from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.stretches import LONGEST_IS_USED
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole
 from adaptive_flot.greybox.model import Model
@@ -89,9 +91,17 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         told = words_of_effects(state.told.model, effects, _curves(state, effects)) if effects else ""
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
         likelier = beside_words(state.likelihood, much_better(state.error))
-        return " ".join(filter(None, (said, likelier, state.certain, state.background)))
+        part = _part_of_record(state.screening.notes)
+        return " ".join(filter(None, (said, likelier, state.certain, state.background, part)))
     errors = ", ".join(c.words for c in state.error)
-    return f"{state.sentence} Error of the free run on held-out rows: {errors}. {state.certain}".rstrip()
+    told = f"{state.sentence} Error of the free run on held-out rows: {errors}."
+    return " ".join(filter(None, (told, state.certain, _part_of_record(state.screening.notes))))
+
+
+def _part_of_record(notes: Sequence[str]) -> str:
+    """A word on what a verdict is about, where a hole has left only one stretch of the record."""
+    left = next((note for note in notes if LONGEST_IS_USED in note), "")
+    return f"This is about a part of the record only: {left}." if left else ""
 
 
 def _curves(state: State, effects: tuple[NamedEffect, ...]) -> tuple[EffectCurve, ...]:

@@ -28,6 +28,10 @@ MOST_TOLD = 3
 """Places that a note names."""
 
 
+LONGEST_IS_USED = "is used, the longest"
+"""Words of the note on a record of which one stretch is used."""
+
+
 def longest_stretch(table: pd.DataFrame, time: str, file: Path) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Rows of the longest stretch of a table, and what is left out, in words.
 
@@ -51,7 +55,7 @@ def longest_stretch(table: pd.DataFrame, time: str, file: Path) -> tuple[pd.Data
         return table, ()
     best = int(np.argmax(counts))
     used = (
-        f"the record has {len(known)} stretches with gaps between them: stretch {known[best]:g} is used, the longest, "
+        f"the record has {len(known)} stretches with gaps between them: stretch {known[best]:g} {LONGEST_IS_USED}, "
         f"with {counts[best]} of {len(table)} rows"
     )
     return table[number == known[best]], (*why, *([used] if len(known) > 1 else []))
