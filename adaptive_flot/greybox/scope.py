@@ -103,10 +103,10 @@ class Scope:
     ) -> ca.SX:
         """Pass a physical quantity through a named site, once or once per component of the same quantity.
 
-        `role` is the kind of thing it is: only sensors, actuators and feeds can lag, only a flow can spill. The guide to a
-        model of one's own lists what each role does. `mode` says how an effect acts here unless it says so itself: it
-        multiplies the quantity by exp(g), or adds g in the quantity's unit. With `unit`, what an effect here is given
-        in can be checked.
+        `role` is the kind of thing it is: only sensors, actuators and feeds can lag, only a flow can spill. The guide
+        to a model of one's own lists what each role does. `mode` says how an effect acts here unless it says so
+        itself: it multiplies the quantity by exp(g), or adds g in the quantity's unit. With `unit`, what an effect
+        here is given in can be checked.
         """
         before = self.sites.get(name, Site(name, role, mode, 0, unit, tuple(self.signals)))
         self.sites[name] = replace(before, passed=before.passed + 1)

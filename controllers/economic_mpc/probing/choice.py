@@ -38,6 +38,11 @@ def make_probing(
     if way not in WAYS:
         raise ModelError(f"probing: by = {way!r}; {near_match(str(way), WAYS)}")
     if way == "value":
+        if "noise_std" not in rest:
+            raise ModelError(
+                "probing: by: value needs noise_std; give the standard deviation of the noise of each measured output, "
+                "for example {concentrate_grade: 1.0e-3}"
+            )
         return Knowledge(setup, problem, limits, economics, **rest)
     return Probing(problem.layout, limits, **rest)
 
