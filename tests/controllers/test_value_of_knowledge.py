@@ -157,6 +157,7 @@ def test_a_plan_at_rest_teaches_one_combination_and_a_move_the_other_one_too() -
     ("options", "message"),
     [
         ({"by": "luck"}, "by = 'luck'"),
+        ({"noise_std": None}, "needs noise_std; give the standard deviation"),
         ({"noise_std": {}}, "noise_std > 0 of each measured output"),
         ({"walk": -1.0}, "walk >= 0"),
         ({"lasts_s": -1.0}, "at least 0"),

@@ -38,7 +38,7 @@ def make_probing(
     if way not in WAYS:
         raise ModelError(f"probing: by = {way!r}; {near_match(str(way), WAYS)}")
     if way == "value":
-        if "noise_std" not in rest:
+        if rest.get("noise_std") is None:
             raise ModelError(
                 "probing: by: value needs noise_std; give the standard deviation of the noise of each measured output, "
                 "for example {concentrate_grade: 1.0e-3}"
