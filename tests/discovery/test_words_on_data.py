@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from adaptive_flot.discovery.changes import find_changes, unless_an_event
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -38,6 +39,9 @@ def test_nothing_is_told_of_two_records_that_start_far_from_rest_with_nothing_wr
         found = find_changes(heated_tank(), news, references)
         assert found.verdict.word in ("none", "abstain") and not found.verdict.effects, found.verdict.reason
         assert all(c.before < 1.2 * NOISE for c in found.verdict.error)
+        if not references:  # nothing is left to explain, and so nothing is missing
+            assert found.verdict.word == found.judged.word == "none", found.verdict.reason
+            assert all(c.noise == pytest.approx(NOISE, rel=0.2) for c in found.verdict.error)
 
 
 def test_beside_a_reference_a_sensor_that_stops_is_said_and_an_event_there_is_suspect() -> None:

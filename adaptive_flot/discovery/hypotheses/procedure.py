@@ -28,7 +28,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows, measured_columns
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judge
 from adaptive_flot.discovery.hypotheses.plausible import moves_though_stopped
 from adaptive_flot.discovery.hypotheses.seen import seen_values
-from adaptive_flot.discovery.hypotheses.telling import verdict_of
+from adaptive_flot.discovery.hypotheses.telling import unless_at_noise, verdict_of
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -142,6 +142,8 @@ def compare(
     tested = tuple(sorted(possible, key=lambda t: t.total))
     usual = _usual_losses(calibration) if references else None
     judged, blocks = judge(rows, null, tested, usual)
+    if not references:
+        judged = unless_at_noise(judged, calibration, rows, null)
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
     told = judged.word in ("named", "class") and judged.best is not None
     best = judged.best if told and judged.best is not None else null

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -27,6 +28,22 @@ MOVED = 1.0
 JUDGED_ON = "free run, fresh stretches"
 
 
+AT_NOISE = 1.1
+"""Errors of at most so many times the noise from row to row are that noise."""
+
+
+def unless_at_noise(judged: Judged, calibration: Calibration, rows: Rows, null: Tested) -> Judged:
+    """The judgement without a reference: `none` where no hypothesis stands, and errors are the noise from row to row.
+
+    Else it would be said that something is missing where nothing is left to explain.
+    """
+    if judged.word != "abstain" or judged.best is not None:
+        return judged
+    if (rms(rows, null.fresh) > AT_NOISE * np.asarray(calibration.noise)).any():
+        return judged
+    return replace(judged, word="none", why="their errors are those of the noise from row to row")
+
+
 def verdict_of(
     calibration: Calibration,
     rows: Rows,
@@ -44,7 +61,7 @@ def verdict_of(
     error = tuple(
         OutputChange(
             model.outputs[c].name, model.outputs[c].unit, float(old[j]), float(new[j]),
-            float(calibration.usual.overall[j]),
+            float((calibration.usual.overall if reference else calibration.noise)[j]),
             (r.low, r.high),
         )
         for j, c in enumerate(rows.columns)
