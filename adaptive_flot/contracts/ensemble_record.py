@@ -46,7 +46,15 @@ class TracksEnsembles(Protocol):
     """An estimator that tracks many members at once, each as `track` or `update` would alone (to 1e-9)."""
 
     def track_ensemble(self, states: Sequence[Any], record: EnsembleRecord) -> list[tuple[Any, Track]]:
-        """State after the last sample, and the estimates, of each member; `states` are those before the first."""
+        """State after the last sample, and the estimates, of each member.
+
+        Parameters
+        ----------
+        states
+            Of each member before its first sample.
+        record
+            Their samples.
+        """
         ...
 
 

@@ -29,7 +29,7 @@ from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
-from adaptive_flot.discovery.record.screening import clean_outputs
+from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -121,13 +121,13 @@ def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Da
     """The comparison with a word on holes, sensors that say nothing, and events that seem to begin there."""
     verdict, said = compared.verdict, list[str]()
     for record in records:
-        _, found, suspects = clean_outputs(record, model)
-        ranges = [note for note in found if "outside the range" in note]
-        said += [f"{record.name}: {note}" for note in (*record.notes, *ranges, *suspects)]
+        _, _, suspects = clean_outputs(record, model)
+        ranges = [n for q, y in zip(model.outputs, record.outputs.T, strict=True) for n in out_of_range(q, y)]
+        said += [f"{record.name}: {note}." for note in (*record.notes, *ranges, *suspects)]
         if len(records) == 1:
-            said += suspect_notes([e.effect for e in verdict.effects], suspects, record.dt)
+            said += [f"{note}." for note in suspect_notes([e.effect for e in verdict.effects], suspects, record.dt)]
     if referred and len(records) > 1:
-        said.append("Events in time were not looked for: that takes one record without a gap, and a reference")
+        said.append("Events in time were not looked for: that takes one record without a gap, and a reference.")
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, *said))) if said else compared
 
 

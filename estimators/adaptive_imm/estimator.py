@@ -20,7 +20,7 @@ from estimators.adaptive_imm.modes import KINDS, Changes, Modes, transitions
 from estimators.adaptive_imm.options import check_modes, check_numbers, check_shares
 from estimators.adaptive_imm.region import LongRun
 from estimators.adaptive_imm.state import LAST, MORE_LIKELY, AdaptiveImmState, NoiseLevel
-from estimators.adaptive_imm.step import CARRIED, MATRICES, Step, combination
+from estimators.adaptive_imm.step import CARRIED, MATRICES, Step
 from estimators.adaptive_imm.trust import Trust
 from estimators.imm.modes import stationary
 from estimators.shared.coordinates import Coordinates
@@ -168,10 +168,8 @@ class AdaptiveImm:
         nominal = setup.model.parameter_values[setup.model.indices("parameters", whole.parameters)]
         self._nominal = self.coordinates.from_parameters(nominal)
         self._plausible_std = plausible * self.coordinates.scale
-        code, mixture = setup.model.compiled, combination(*self.modes.entry.T.shape)
-        self._combined = FastCall(mixture, matrices=("z", "P", "covariance"), as_machine_code=code)
         self._made = parts.function(whole, self.layout)
-        self._step = FastCall(self._made, matrices=MATRICES, as_machine_code=code)
+        self._step = FastCall(self._made, matrices=MATRICES, as_machine_code=setup.model.compiled)
 
     def init(self, prior: Prior) -> AdaptiveImmState:
         """Start from a prior, every mode alike and with the share of time that the process spends in it."""
@@ -225,8 +223,7 @@ class AdaptiveImm:
         status = Status.OK if present.any() else Status.MISSING
         if not np.isfinite(finite[0]):
             z, P, probability, lagged, slow = state.z, state.P, state.probability, state.lagged, state.slow
-            (mean, _), status = self._combined(z, P, probability * self._described), Status.NOT_FINITE
-            covariance = state.region
+            mean, covariance, status = z @ (probability * self._described), state.region, Status.NOT_FINITE
         else:
             noise = NoiseLevel(level, count, noise.least)
             if projected[0] > 0:
@@ -261,15 +258,7 @@ class AdaptiveImm:
     def track_ensemble(
         self, states: Sequence[AdaptiveImmState], record: EnsembleRecord
     ) -> list[tuple[AdaptiveImmState, Track]]:
-        """Take the records of many members at once; see `TracksEnsembles`.
-
-        Parameters
-        ----------
-        states
-            Of each member before its first sample.
-        record
-            Their samples.
-        """
+        """Take the records of many members at once; see `TracksEnsembles`."""
         return track_members(self, states, record)
 
     @cached_property

@@ -151,11 +151,3 @@ class Step:
             RESULTS,
             {"cse": True},
         )
-
-
-def combination(n: int, modes: int) -> ca.Function:
-    """`(z (n, M), P (n (n + 1) / 2, M), probability (M,)) -> (mean (n,), covariance (n, n))` of the mixture."""
-    z, P = ca.MX.sym("z", n, modes), ca.MX.sym("P", n * (n + 1) // 2, modes)
-    probability = ca.MX.sym("probability", modes)
-    results, names = combined(z, P, probability, probability), (["z", "P", "probability"], ["mean", "covariance"])
-    return ca.Function("combination", [z, P, probability], list(results), *names)

@@ -141,15 +141,7 @@ class Ekf:
         return EkfState(sample.time, z, P, state.noise_std), estimate
 
     def track_ensemble(self, states: Sequence[EkfState], record: EnsembleRecord) -> list[tuple[EkfState, Track]]:
-        """Take the records of many members at once; see `TracksEnsembles`.
-
-        Parameters
-        ----------
-        states
-            Of each member before its first sample.
-        record
-            Their samples.
-        """
+        """Take the records of many members at once; see `TracksEnsembles`."""
         parameters = known_parameters(record, self._p)
         measured, present = driving(record, self.columns)
         fixed = {

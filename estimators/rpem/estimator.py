@@ -204,15 +204,7 @@ class Rpem:
         return Track.joined(parts)
 
     def track_ensemble(self, states: Sequence[RpemState], record: EnsembleRecord) -> list[tuple[RpemState, Track]]:
-        """Take the records of many members at once; see `TracksEnsembles`.
-
-        Parameters
-        ----------
-        states
-            Of each member before its first sample.
-        record
-            Their samples.
-        """
+        """Take the records of many members at once; see `TracksEnsembles`."""
         tracked = self._ensemble(states, record)
         return [
             self._one_by_one(state, samples_of(record, m)) if found is None else found

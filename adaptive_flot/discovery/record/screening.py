@@ -106,12 +106,7 @@ def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ..
         before = np.isfinite(outputs[:, j])
         if not before.any():
             continue
-        if is_far_outside(q, outputs[:, j]):
-            middle = float(np.nanmedian(outputs[:, j]))
-            notes.append(
-                f"{q.name}: the median, {middle:g} {q.unit}, is outside the range [{q.lower:g}, {q.upper:g}] {q.unit}: "
-                "check its unit and its zero"
-            )
+        notes += out_of_range(q, outputs[:, j])
         notes += _clean(outputs[:, j], q.name, q.name in model.edges)
         suspects += [
             Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} says nothing")
@@ -123,6 +118,15 @@ def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ..
             suspects.append(Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} stands still"))
             notes.append(f"{suspects[-1]}, where it else changes from row to row: a sensor that had stopped?")
     return replace(record, outputs=outputs), tuple(notes), tuple(suspects)
+
+
+def out_of_range(quantity: Quantity, values: FloatArray) -> list[str]:
+    """A word on values (N,) outside their physical range; none where they are inside."""
+    if not is_far_outside(quantity, values):
+        return []
+    middle, unit = float(np.nanmedian(values)), quantity.unit
+    where = f"the range [{quantity.lower:g}, {quantity.upper:g}] {unit}"
+    return [f"{quantity.name}: the median, {middle:g} {unit}, is outside {where}: check its unit and its zero"]
 
 
 def runs_of(mask: BoolArray, least: int) -> list[tuple[int, int]]:
