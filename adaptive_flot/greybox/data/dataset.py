@@ -227,7 +227,7 @@ def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
         k = int(uneven[0]) + 1
         raise DataError(
             f"{file}: time is not uniform: {steps[k - 1]:g} s before line {line(table, k)}, {dt:g} s elsewhere; "
-            f"put it on an even grid with 'adaptive-flot import {file} --out even.csv --yes', and the same --model"
+            f"put it on an even grid with 'adaptive-flot import {file} --out even.csv', and the same --model"
         )
     return float((time[-1] - time[0]) / (len(time) - 1))
 
