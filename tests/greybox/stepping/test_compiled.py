@@ -82,7 +82,7 @@ def test_estimates_are_those_of_the_plain_estimator(model: Model, name: str) -> 
 
 
 @needs_compiler
-@pytest.mark.parametrize(("name", "functions"), [("ekf", 1), ("imm", 3), ("adaptive_imm", 2)])
+@pytest.mark.parametrize(("name", "functions"), [("ekf", 1), ("imm", 3), ("adaptive_imm", 1)])
 def test_filters_are_those_of_the_plain_filter(clock: Model, name: str, functions: int) -> None:
     """On a small model: with the cell the compiler takes ten seconds."""
     samples = [Sample(0.1 * k, np.array([1.0]), np.array([2.0 * np.sin(0.1 * k) + 0.2 * k])) for k in range(1, 41)]
