@@ -31,6 +31,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.searched_change import with_searched_effect
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -75,11 +76,29 @@ def _found(
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
     if not references or compared.verdict.word == "insufficient":
         return compared
-    if len(records) != 1 or not is_short(records[0], model):
+    if len(records) != 1:
         return _unless_much_is_left(compared)
+    judged = compared
+    if is_short(records[0], model):
+        judged = _row_by_row(compared, records[0], references, processes, progress, began)
+    judged = _unless_much_is_left(judged)
+    if _leaves_more(judged.verdict):
+        judged = _unless_much_is_left(with_searched_effect(judged, records[0], processes, progress))
+    return judged
+
+
+def _row_by_row(
+    compared: Comparison,
+    record: Dataset,
+    references: Sequence[Dataset],
+    processes: int,
+    progress: Callable[[str], None],
+    began: float,
+) -> Comparison:
+    """The comparison with what the innovations form tells, and without what it does not know."""
     reference = max(references, key=len)
     with np.errstate(all="ignore"):
-        search, base, told, sole, before = _with_process_noise(compared, records[0], reference, processes, progress)
+        search, base, told, sole, before = _with_process_noise(compared, record, reference, processes, progress)
         seconds = time.perf_counter() - began
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         with_it = compared
@@ -92,7 +111,7 @@ def _found(
             with_it = with_cause(compared, search, base, told, before, seconds)
             if with_it is compared and sole is not None:
                 with_it = with_cause(compared, search, base, sole, before, seconds)
-    return _unless_much_is_left(with_it if with_it is not compared else _unless_contradicted(compared, told))
+    return with_it if with_it is not compared else _unless_contradicted(compared, told)
 
 
 def unless_an_event(

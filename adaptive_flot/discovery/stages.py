@@ -53,6 +53,8 @@ from adaptive_flot.greybox.rescaled import factors_of, rescaled
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5
 """How long the last fits, and the proposed test, take: about so many times what the fit of the model as it is took."""
 
+NONE_FITTED = "no parameter has the role 'estimated': all keep the values of the model"
+
 
 def screen_record(state: State) -> State:
     """Leave out what in the record can not be used."""
@@ -88,7 +90,7 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     start = base.initial_state, parameters_of(base)
     said = wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
     if not state.adapted:
-        said += ("no parameter has the role 'estimated': all keep the values of the model",)
+        said += (NONE_FITTED,)
     screening = replace(state.screening, notes=state.screening.notes + said)
     took = time.monotonic() - began
     problem = replace(problem, deadline=min(problem.deadline, state.ends - FINAL_SHARE * took))

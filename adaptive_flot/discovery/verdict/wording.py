@@ -11,6 +11,9 @@ from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_site
 from adaptive_flot.discovery.verdict.sizes import words_alone
 
+LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
+LACKS_ONE, LACKS_SEVERAL = "The model lacks one", "The model lacks several effects."
+
 
 def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
     """What drifts and by how much, for each effect of a drift."""
@@ -30,6 +33,19 @@ def _largest_move(values: list[float]) -> float:
     """Difference of the extremes of a profile, negative where the larger comes first."""
     high, low = int(np.argmax(values)), int(np.argmin(values))
     return (values[high] - values[low]) * (1 if high > low else -1)
+
+
+def since_reference(reason: str, new: bool) -> str:
+    """A reason about a model whose reference has said what it lacks: it has changed, where that is known to be new."""
+    if new:
+        told = "This has changed since the reference.", "These have changed since the reference."
+        several = "One", "Several things have changed since the reference."
+    else:
+        told = ("The reference does not show whether it was there.",) * 2
+        several = "It is one", "It is several effects."
+    for lacks, said in zip((LACKS_THIS, LACKS_THESE, LACKS_ONE, LACKS_SEVERAL), (*told, *several), strict=True):
+        reason = reason.replace(lacks, said)
+    return reason
 
 
 def reason_words(
@@ -73,8 +89,8 @@ def reason_words(
     evidence = f"{result.verification}" if result.verification else ""
     evidence = evidence[:1].upper() + evidence[1:]
     if judgement.word == "named":
-        lacks = "these effects" if len(effects) > 1 else "this"
-        return f"{said}. The model lacks {lacks}. {beside_a_part(judgement)}{evidence}."
+        lacks = LACKS_THESE if len(effects) > 1 else LACKS_THIS
+        return f"{said}. {lacks} {beside_a_part(judgement)}{evidence}."
     if judgement.word == "class":
         return f"{_class_words(judgement, wrong)} {evidence}."
     if judgement.word == "unnamed":
@@ -108,7 +124,7 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     if judgement.part or all(len(a.names) == 1 for a in sets):
         alone = {a.names[0]: words_alone(a) for a in reversed(sets) if len(a.names) == 1}
         members = "; or ".join(alone.get(name, " by ".join(name)) for name in judgement.members)
-        said = f"The model lacks one of these, which this record can not tell apart: {members}."
+        said = f"{LACKS_ONE} of these, which this record can not tell apart: {members}."
         if alike := ", ".join(" by ".join(name) for name in alone if name not in judgement.members):
             said += f" At the same places it may as well be: {alike}."
         return f"{said} {beside_a_part(judgement)}".rstrip()

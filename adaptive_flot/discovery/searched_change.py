@@ -1,0 +1,151 @@
+"""What the search of a single record finds since a reference, where no simple hypothesis of the whole record is told.
+
+Hypotheses of the whole record are single faults of one part. A dependence of a shape of its own, a slow change, a part
+with two lags, or two effects are found by the search, as without a reference. The reference helps it in three ways: the
+constants are known, errors must fall to those that are usual, and what the model lacks there too has not changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.hypotheses.cross_validation import Fitted, Tested, fit_all_rows
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows
+from adaptive_flot.discovery.hypotheses.judgement import Judged
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN
+from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
+from adaptive_flot.discovery.results import Discovery, OutputChange, Verdict
+from adaptive_flot.discovery.stages import NONE_FITTED
+from adaptive_flot.discovery.verdict.wording import since_reference
+from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.model import Model
+
+MOST = 0.8
+"""Share of what is unusual that the effects must explain: what is left may be another cause, or the right one."""
+BETTER = 0.8
+"""What is told already is replaced where errors fall to so many times those with it, by their geometric mean."""
+AT_NOISE = 1.25
+"""Errors of at most so many times the noise from row to row are noise."""
+
+
+def with_searched_effect(
+    compared: Comparison,
+    record: Dataset,
+    processes: int,
+    progress: Callable[[str], None],
+) -> Comparison:
+    """The comparison with what the search tells; unchanged where it tells nothing, or nothing that is new.
+
+    Parameters
+    ----------
+    compared
+        The comparison of the record with its reference.
+    record
+        The record.
+    processes, progress
+        Fits at once, and a word for each stage.
+    """
+    calibration = compared.calibration
+    held = with_constants_held(calibration.model, calibration.constants.names)
+    found = discover(held, record, processes=processes, progress=progress)
+    verdict = found.verdict
+    if verdict.word not in ("named", "class") or not verdict.effects:
+        return compared
+    usual = {
+        calibration.model.outputs[c].name: float(s)
+        for c, s in zip(compared.rows.columns, calibration.usual.overall, strict=True)
+    }
+    # an instrument may have become noisier: such errors are no model's
+    error = tuple(replace(c, noise=max(usual[c.output], c.noise)) for c in verdict.error if c.output in usual)
+    if all(c.before <= ABOVE_USUAL * c.noise for c in error) or hardly_explained(error, ABOVE_USUAL, MOST):
+        return compared
+    if compared.verdict.word in ("named", "class") and not _tells_more(compared.verdict, verdict):
+        return compared
+    extended = found.model
+    after = fit_all_rows(extended, compared.rows, None, calibration.constants, None)
+    there = fit_all_rows(extended, calibration.rows, None, calibration.constants, None)
+    if after is None or there is None:
+        return compared
+    in_time = all(e.effect.driver == "time" for e in verdict.effects)
+    worse = _loss(calibration.rows, there) - _loss(calibration.rows, calibration.fit.errors)
+    if not in_time and worse < -LEAST_GAIN / 2:
+        return compared  # the model lacks it on the reference as well
+    return _told(compared, found, error, after, in_time or worse > LEAST_GAIN / 2)
+
+
+def with_constants_held(model: Model, names: tuple[str, ...]) -> Model:
+    """The model with constants that are not fitted."""
+    parameters = tuple(replace(p, role="fixed") if p.name in names else p for p in model.parameters)
+    return replace(model, parameters=parameters)
+
+
+def _tells_more(said: Verdict, found: Verdict) -> bool:
+    """Whether errors are clearly smaller than with what is told, or one of a class is told and only noise is left.
+
+    Where errors are the noise from row to row the model is right, and its likelihood may tell what errors do not.
+    """
+    if _left(found.error, found.error) <= BETTER * _left(said.error, found.error):
+        return True
+    member = said.word == "class" and found.word == "named" and len(found.effects) == 1
+    known = {(e.effect.site, e.effect.driver) for e in found.effects} <= set(said.members)
+    return member and known and all(c.after <= AT_NOISE * c.noise for c in found.error)
+
+
+def _told(
+    compared: Comparison, found: Discovery, error: tuple[OutputChange, ...], after: Fitted, new: bool
+) -> Comparison:
+    verdict = found.verdict
+    first = verdict.effects[0].effect
+    hypothesis = Hypothesis(first.site, first.driver, "alternative", first, (), ({},))
+    best = Tested(
+        hypothesis, after.fit, after.fit.errors, compared.rows.losses(after.fit.errors), np.empty((0, 0)), 0.0
+    )
+    word: Literal["named", "class"] = "named" if verdict.word == "named" else "class"
+    alone = f"By single faults of the whole record: {compared.verdict.reason}"
+    told = Verdict(
+        word=word,
+        reason=since_reference(verdict.reason, new),
+        effects=verdict.effects,
+        members=verdict.members,
+        error=error,
+        split="report rows, which nothing was fitted to",
+        report_times=verdict.report_times,
+        parameters=compared.verdict.parameters,
+        notes=(*(n for n in verdict.notes if n != NONE_FITTED), *_more_missing(error), alone),
+        seconds=compared.verdict.seconds + verdict.seconds,
+    )
+    return replace(
+        compared,
+        verdict=told,
+        model=found.model.with_parameters(after.fit.values),
+        judged=Judged(word, best, (), "", float("nan")),
+    )
+
+
+def _more_missing(error: Sequence[OutputChange]) -> tuple[str, ...]:
+    """What stays open."""
+    left = [f"{c.output} {c.after / c.noise:.3g} times" for c in error if c.after > ABOVE_USUAL * c.noise]
+    return (
+        f"More is missing: the error that is left is still above that of the reference: {', '.join(left)}.",
+    ) * bool(left)
+
+
+def _loss(rows: Rows, errors: Fitted | tuple[np.ndarray, ...]) -> float:
+    """Criterion of all rows that count."""
+    own = errors.fit.errors if isinstance(errors, Fitted) else errors
+    return float(sum(loss.sum() for loss in rows.losses(own)))
+
+
+def _left(error: Sequence[OutputChange], noise: Sequence[OutputChange]) -> float:
+    """Geometric mean over the outputs of the error after over the noise from row to row."""
+    level = {c.output: c.noise for c in noise if c.noise > 0}
+    left = [np.log(c.after / level[c.output]) for c in error if c.output in level and c.after > 0]
+    return float(np.exp(np.mean(left))) if left else float("inf")
