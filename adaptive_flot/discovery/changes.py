@@ -3,6 +3,9 @@
 The first compares free runs over hours, and finds what is the matter all the time. An event of a few rows is lost in
 it, and so is a fault beside what wanders. The innovations form sees both, row by row. Before it may speak, what the
 model lacks on the reference too is added to it: such a thing has not changed.
+
+Its time grows with rows times states. A record that is too long for it is searched as without a reference instead, with
+the constants held: see `searched_change`.
 """
 
 from __future__ import annotations
@@ -78,13 +81,13 @@ def _found(
         return compared
     if len(records) != 1:
         return _unless_much_is_left(compared)
-    judged = compared
     if is_short(records[0], model):
         judged = _row_by_row(compared, records[0], references, processes, progress, began)
-    judged = _unless_much_is_left(judged)
-    if _leaves_more(judged.verdict):
-        judged = _unless_much_is_left(with_searched_effect(judged, records[0], processes, progress))
-    return judged
+    elif _leaves_more(compared.verdict):
+        judged = with_searched_effect(compared, records[0], processes, progress)
+    else:
+        judged = compared
+    return _unless_much_is_left(judged)
 
 
 def _row_by_row(

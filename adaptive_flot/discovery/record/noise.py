@@ -59,9 +59,9 @@ class Noise:
 
         The series (N, m, q), weighted already, has no missing value.
         """
-        m = series.shape[1]
+        n, m, q = series.shape  # q may be 0: nothing is fitted
         rows, outputs = np.nonzero(inside)
-        flat, at = series.reshape(-1, series.shape[2]), rows * m + outputs
+        flat, at = series.reshape(n * m, q), rows * m + outputs
         white: FloatArray = flat[at]
         for i, lags in enumerate(self.lags.T):
             own = np.where(rows > i, lags[outputs], 0.0)  # the first rows have no past
