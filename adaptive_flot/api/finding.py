@@ -199,6 +199,7 @@ def discover(
     references: Sequence[AnyRecord],
     tag_map: AnyMap | None = None,
     processes: int | None = None,
+    budget: float | None = None,
     progress: bool = False,
 ) -> Change: ...
 
@@ -245,7 +246,8 @@ def discover(
     processes
         Fits that run at once; default as many as there are cores.
     budget
-        Seconds after which the search in a single record ends with what it has come to.
+        Seconds after which the search in a single record ends with what it has come to. With references the simple
+        hypotheses of the whole record are compared in any case.
     compiled
         Whether long runs are machine code, where this system has a C compiler. The numbers agree to rounding.
     progress
@@ -270,7 +272,7 @@ def discover(
     several = len(records) > 1 or bool(references)
     if several and limits:
         raise ModelError("limits: no test is proposed for several records; leave them out")
-    if several and budget is not None:
+    if len(records) > 1 and budget is not None:
         raise ModelError("budget: several records are judged as a whole; leave it out")
     made, origin = read_model(model)
     made = replace(made, record_code=compiled)
@@ -279,7 +281,7 @@ def discover(
     with staged(progress, name) as advance:
         if several:
             compared = discover_records(
-                records, made, list(references), tag_map=tags, processes=workers, progress=advance
+                records, made, list(references), tag_map=tags, processes=workers, progress=advance, budget=budget
             )
             return Change(name, compared, origin, sources)
         one = records[0]

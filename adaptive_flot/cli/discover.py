@@ -38,7 +38,8 @@ def discover(
         ),
     ] = None,
     budget: Annotated[
-        float | None, typer.Option(min=1.0, help="Seconds after which the search ends with what it has come to.")
+        float | None,
+        typer.Option(min=1.0, help="Seconds after which the search in one record ends with what it has come to."),
     ] = None,
     compile_: Annotated[
         bool,
@@ -69,7 +70,7 @@ def discover(
     limits, several = read_limits(limit or ()), bool(references) or len(data) > 1
     if several and limits:
         raise ModelError("--limit: no test is proposed for several records; leave it out")
-    if several and budget is not None:
+    if len(data) > 1 and budget is not None:
         raise ModelError("--budget: several records are judged as a whole; leave it out")
     tag_map = None if map_ is None else load_tag_map(map_)
     made = replace(make_model(model, cell=cell, folder=first.parent), record_code=compile_)
@@ -77,7 +78,9 @@ def discover(
     name = ", ".join(path.stem for path in data)
     with stage_bar(name) as progress:
         if several:
-            compared = discover_records(data, made, references, tag_map=tag_map, processes=workers, progress=progress)
+            compared = discover_records(
+                data, made, references, tag_map=tag_map, processes=workers, progress=progress, budget=budget
+            )
             verdict = compared.verdict
         else:
             searched = discover_file(

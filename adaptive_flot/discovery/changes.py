@@ -54,13 +54,16 @@ def find_changes(
     adapted: Sequence[str] = (),
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
+    budget: float | None = None,
 ) -> Comparison:
     """Find what has changed since a reference, or what a model lacks in several records of one process.
 
-    Arguments and errors are those of `compare`. Events, and causes beside what wanders, are looked for where there are
-    one record and a reference. What is wrong with the data is among the notes.
+    Arguments and errors are those of `compare`. With one record, `budget` is the time [s] after which nothing more is
+    searched for; None for as long as it takes. The hypotheses of the whole record are always compared. Events, and
+    causes beside what wanders, are looked for where there are one record and a reference. What is wrong with the data
+    is among the notes.
     """
-    compared = _found(model, records, references, adapted, processes, progress)
+    compared = _found(model, records, references, adapted, processes, progress, budget)
     if not references and len(records) > 1:
         compared = unless_an_event(compared, model, records, adapted, processes, progress)
     return _with_words_on_data(compared, model, records, bool(references))
@@ -73,6 +76,7 @@ def _found(
     adapted: Sequence[str],
     processes: int,
     progress: Callable[[str], None],
+    budget: float | None,
 ) -> Comparison:
     """What has changed, without a word on the data."""
     began = time.perf_counter()
@@ -81,10 +85,14 @@ def _found(
         return compared
     if len(records) != 1:
         return _unless_much_is_left(compared)
-    if is_short(records[0], model):
+    left = float("inf") if budget is None else began + budget - time.perf_counter()
+    if left <= 0:
+        said = "The budget ended before events, effects of other shapes and two effects were looked for."
+        judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, said)))
+    elif is_short(records[0], model):
         judged = _row_by_row(compared, records[0], references, processes, progress, began)
     elif _leaves_more(compared.verdict):
-        judged = with_searched_effect(compared, records[0], processes, progress)
+        judged = with_searched_effect(compared, records[0], processes, progress, left)
     else:
         judged = compared
     return _unless_much_is_left(judged)

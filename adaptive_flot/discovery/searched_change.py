@@ -30,6 +30,8 @@ from adaptive_flot.greybox.model import Model
 
 MOST = 0.8
 """Share of what is unusual that the effects must explain: what is left may be another cause, or the right one."""
+MOST_SECONDS = 60.0
+"""Longest time of the search: where a model is far off, it tries much and tells nothing."""
 BETTER = 0.8
 """What is told already is replaced where errors fall to so many times those with it, by their geometric mean."""
 AT_NOISE = 1.25
@@ -41,6 +43,7 @@ def with_searched_effect(
     record: Dataset,
     processes: int,
     progress: Callable[[str], None],
+    budget: float = MOST_SECONDS,
 ) -> Comparison:
     """The comparison with what the search tells; unchanged where it tells nothing, or nothing that is new.
 
@@ -52,10 +55,12 @@ def with_searched_effect(
         The record.
     processes, progress
         Fits at once, and a word for each stage.
+    budget
+        Seconds that the search may take, at most MOST_SECONDS.
     """
     calibration = compared.calibration
     held = with_constants_held(calibration.model, calibration.constants.names)
-    found = discover(held, record, processes=processes, progress=progress)
+    found = discover(held, record, processes=processes, progress=progress, budget=min(budget, MOST_SECONDS))
     verdict = found.verdict
     if verdict.word not in ("named", "class") or not verdict.effects:
         return compared

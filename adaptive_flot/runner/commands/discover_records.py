@@ -26,6 +26,7 @@ def discover_records(
     tag_map: TagMap | None = None,
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
+    budget: float | None = None,
 ) -> Comparison:
     """Read records, and find what has changed since the references; without any, what the model lacks in all of them.
 
@@ -43,6 +44,8 @@ def discover_records(
         Fits that run at once.
     progress
         Called with a word for each stage and each fit.
+    budget
+        Seconds after which nothing more is searched for in one record with a reference.
 
     Raises
     ------
@@ -50,7 +53,7 @@ def discover_records(
         A table or the model can not be used.
     """
     new, old = ([r for s in group for r in _read(s, model, tag_map)] for group in (sources, references))
-    return find_changes(model, new, old, processes=processes, progress=progress)
+    return find_changes(model, new, old, processes=processes, progress=progress, budget=budget)
 
 
 def save_extended(
