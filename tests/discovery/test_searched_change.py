@@ -1,0 +1,100 @@
+"""Protects: since a reference, effects of other shapes are found in long records; and what the reference lacks too has
+not changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from adaptive_flot.discovery import changes
+from adaptive_flot.discovery.changes import find_changes
+from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.searched_change import with_constants_held, with_searched_effect
+from adaptive_flot.discovery.verdict.wording import since_reference
+from adaptive_flot.greybox import Effect
+from tests.discovery.hypotheses.tank import record, tank
+
+FOULS = Effect("heat_loss", "time", "ramp", {"amplitude": -0.4, "onset": 3000.0, "duration": 4000.0}, mode="factor")
+
+
+# a loss that follows the power, which no single fault of the whole record is
+FOLLOWS = Effect("heat_loss", "power", "linear", {"slope": 0.4}, {"reference": 1200.0}, mode="factor")
+
+
+@pytest.fixture
+def long_records(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Records are taken to be too long for the innovations form."""
+    monkeypatch.setattr(changes, "is_short", lambda *given: False)
+
+
+@cache
+def compared() -> Comparison:
+    """A tank whose loss follows the power, beside one with a constant loss, judged by single faults, and not told."""
+    found = compare(tank(), [record("new", 1, FOLLOWS)], [record("old", 2)])
+    verdict = replace(found.verdict, word="abstain", effects=(), members=())
+    return replace(found, verdict=verdict, judged=replace(found.judged, word="abstain"))
+
+
+@pytest.mark.usefixtures("long_records")
+def test_a_gradual_change_is_told_with_its_times_and_as_one_since_the_reference() -> None:
+    verdict = find_changes(tank(), [record("new", 1, FOULS)], [record("old", 2)]).verdict
+    assert verdict.word == "named", verdict.reason
+    assert {(e.effect.site, e.effect.driver) for e in verdict.effects} == {("heat_loss", "time")}
+    assert "has changed since the reference" in verdict.reason
+    assert all(c.after < 1.5 * c.noise < c.before for c in verdict.error)
+    assert any(note.startswith("By single faults of the whole record") for note in verdict.notes)
+    assert not any("role 'estimated'" in note for note in verdict.notes)
+
+
+@pytest.mark.usefixtures("long_records")
+def test_a_budget_that_is_spent_leaves_the_search_out_and_says_so() -> None:
+    verdict = find_changes(tank(), [record("new", 1, FOULS)], [record("old", 2)], budget=1e-6).verdict
+    assert any(note.startswith("The budget ended before") for note in verdict.notes)
+    assert not any("since the reference" in verdict.reason for _ in verdict.effects)
+
+
+@pytest.mark.usefixtures("long_records")
+def test_nothing_is_told_where_nothing_has_changed() -> None:
+    assert find_changes(tank(), [record("new", 1)], [record("old", 2)]).verdict.word == "none"
+
+
+def searched(before: Comparison) -> Comparison:
+    """With what the search tells."""
+    return with_searched_effect(before, before.rows.records[0], 1, lambda stage: None)
+
+
+def test_a_dependence_is_told_as_new_where_the_reference_does_not_have_it() -> None:
+    verdict = searched(compared()).verdict
+    assert verdict.word in ("named", "class") and "since the reference" in verdict.reason, verdict.reason
+    assert {e.effect.site for e in verdict.effects} == {"heat_loss"}
+
+
+def test_errors_that_are_usual_on_the_reference_are_no_change() -> None:
+    """The reference is said to err as much: the search finds the same effect, and it is not told."""
+    before = compared()
+    usual = replace(before.calibration.usual, overall=100.0 * before.calibration.usual.overall)
+    found = replace(before, calibration=replace(before.calibration, usual=usual))
+    assert searched(found) is found
+
+
+def test_what_the_reference_lacks_too_is_not_told_as_a_change() -> None:
+    """The reference is taken to be the record itself: the effect makes its errors there smaller as well."""
+    before = compared()
+    old = replace(before.calibration, rows=before.rows, fit=before.null.fit)
+    found = replace(before, calibration=old)
+    assert searched(found) is found
+
+
+def test_constants_of_the_reference_are_held() -> None:
+    held = with_constants_held(tank(), ("loss",))
+    assert [p.name for p in held.parameters if p.role == "estimated"] == ["efficiency"]
+
+
+def test_words_say_whether_a_change_is_known_to_be_new() -> None:
+    reason = "Loss fell. The model lacks this. Confirmed."
+    assert since_reference(reason, True) == "Loss fell. This has changed since the reference. Confirmed."
+    assert since_reference(reason, False) == "Loss fell. The reference does not show whether it was there. Confirmed."
+    one = since_reference("The model lacks one of these, which this record can not tell apart: a; or b.", True)
+    assert one.startswith("One of these, which")
