@@ -36,6 +36,9 @@ BETTER = 0.8
 """What is told already is replaced where errors fall to so many times those with it, by their geometric mean."""
 AT_NOISE = 1.25
 """Errors of at most so many times the noise from row to row are noise."""
+REPORT_ROWS = "free run, report rows, which nothing was fitted to"
+SEARCHED: Literal["alternative"] = "alternative"
+"""Kind of what the search has found, of any shape."""
 
 
 def with_searched_effect(
@@ -109,9 +112,15 @@ def _told(
 ) -> Comparison:
     verdict = found.verdict
     first = verdict.effects[0].effect
-    hypothesis = Hypothesis(first.site, first.driver, "alternative", first, (), ({},))
+    hypothesis = Hypothesis(first.site, first.driver, SEARCHED, first, (), ({},))
     best = Tested(
-        hypothesis, after.fit, after.fit.errors, compared.rows.losses(after.fit.errors), np.empty((0, 0)), 0.0
+        hypothesis,
+        after.fit,
+        after.fit.errors,
+        compared.rows.losses(after.fit.errors),
+        np.empty((0, 0)),
+        0.0,
+        len(compared.calibration.constants.names),
     )
     word: Literal["named", "class"] = "named" if verdict.word == "named" else "class"
     alone = f"By single faults of the whole record: {compared.verdict.reason}"
@@ -121,7 +130,7 @@ def _told(
         effects=verdict.effects,
         members=verdict.members,
         error=error,
-        split="report rows, which nothing was fitted to",
+        split=REPORT_ROWS,
         report_times=verdict.report_times,
         parameters=compared.verdict.parameters,
         notes=(*(n for n in verdict.notes if n != NONE_FITTED), *_more_missing(error), alone),

@@ -40,7 +40,7 @@ class UsualLoss:
     losses
         Mean loss of a row in each block of the reference records (b,).
     constants
-        Number of constants and initial states that have a prior.
+        Number of constants that have a prior.
     rows
         Rows of the reference that count.
     """
@@ -53,12 +53,12 @@ class UsualLoss:
         """What is larger on new rows than it would be by chance, in words; None where nothing is.
 
         Chance: means of as many blocks, drawn from the reference (bootstrap), and constants that differ by what the
-        reference leaves open (chi-squared).
+        reference leaves open (chi-squared). Where a record starts, the reference does not say.
         """
         draws = np.random.default_rng(0).choice(self.losses, (DRAWS, max(blocks, 1))).mean(axis=1)
         if (tested.total - tested.prior) / count > float(np.quantile(draws, CHANCE)):
             return "its errors are larger than on the reference"
-        if tested.prior > float(chi2.ppf(CHANCE, self.constants)):
+        if tested.moved > float(chi2.ppf(CHANCE, max(self.constants, 1))):
             return "it needs constants that the reference excludes"
         return None
 

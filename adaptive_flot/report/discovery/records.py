@@ -10,8 +10,10 @@ import numpy as np
 from adaptive_flot.charts.palette import GREY
 from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.discovery.hypotheses.comparison import mean_difference
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.wording import words_of
+from adaptive_flot.discovery.searched_change import REPORT_ROWS, SEARCHED
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
 from adaptive_flot.report.kit.album import Album
@@ -107,11 +109,19 @@ def run_panels(comparison: Comparison, which: int) -> list[Panel]:
             Trace("model as it is", record.time, before, Role.CONSTANT, GREY),
         ]
         if best is not None and best.hypothesis is not None:
-            label = f"with {best.hypothesis.label.replace('_', ' ')}"
+            label = f"with {_told(comparison, best.hypothesis)}"
             after = measured - best.fit.errors[which][:, j]
             traces.append(Trace(label, record.time, after, Role.ESTIMATE))
         panels.append(Panel(q.name.replace("_", " "), q.unit, tuple(traces)))
     return panels
+
+
+def _told(comparison: Comparison, best: Hypothesis) -> str:
+    """What is told, for a line of the picture: a hypothesis of the whole record, or what the search has found."""
+    found = comparison.verdict.effects
+    if best.kind != SEARCHED:
+        return best.label.replace("_", " ")
+    return " and ".join(f"{e.effect.site} by {e.effect.driver}".replace("_", " ") for e in found)
 
 
 def _runs(comparison: Comparison, album: Album) -> list[Picture]:
@@ -130,7 +140,9 @@ def _errors(comparison: Comparison) -> Table:
         cells.append((c.output, c.unit, f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}"))
     usual = "on the reference" if comparison.referred else "of the plain fit"
     header = ("output", "unit", "before", "after", f"usual {usual}", "reduction [%], 95 % interval")
-    caption = f"Root mean square error, {comparison.verdict.split}; every stretch by a fit that did not see it"
+    split = comparison.verdict.split
+    by = "; every stretch by a fit that did not see it" if split != REPORT_ROWS else ""
+    caption = f"Root mean square error, {split}{by}"
     return Table(caption, header, tuple(cells), 2)
 
 

@@ -32,6 +32,13 @@ def test_nothing_is_told_where_nothing_has_changed() -> None:
     assert told().verdict.word == "none"
 
 
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_record_that_starts_far_from_the_first_guess_has_not_changed(seed: int) -> None:
+    """Where it starts says nothing of the constants, and the reference says nothing of where it starts."""
+    verdict = compare(tank(), [record("new", seed, start=380.0)], [record("old", 2)]).verdict
+    assert verdict.word == "none", verdict.reason
+
+
 @pytest.mark.parametrize(
     ("change", "parts"),
     [
