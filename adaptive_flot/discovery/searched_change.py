@@ -123,6 +123,7 @@ def _told(
         len(compared.calibration.constants.names),
     )
     word: Literal["named", "class"] = "named" if verdict.word == "named" else "class"
+    verdict = replace(verdict, notes=tuple(n for n in verdict.notes if n != NONE_FITTED))
     alone = f"By single faults of the whole record: {compared.verdict.reason}"
     told = Verdict(
         word=word,
@@ -133,7 +134,7 @@ def _told(
         split=REPORT_ROWS,
         report_times=verdict.report_times,
         parameters=compared.verdict.parameters,
-        notes=(*(n for n in verdict.notes if n != NONE_FITTED), *_more_missing(error), alone),
+        notes=(*_more_missing(error), alone, *map(_sentence, verdict.notes)),
         seconds=compared.verdict.seconds + verdict.seconds,
     )
     return replace(
@@ -147,9 +148,13 @@ def _told(
 def _more_missing(error: Sequence[OutputChange]) -> tuple[str, ...]:
     """What stays open."""
     left = [f"{c.output} {c.after / c.noise:.3g} times" for c in error if c.after > ABOVE_USUAL * c.noise]
-    return (
-        f"More is missing: the error that is left is still above that of the reference: {', '.join(left)}.",
-    ) * bool(left)
+    said = "More is missing: the error that is left is still above that of the reference"
+    return (f"{said}: {', '.join(left)}.",) if left else ()
+
+
+def _sentence(note: str) -> str:
+    """A note with a capital letter and a full stop, like those of several records."""
+    return f"{note[:1].upper()}{note[1:].rstrip('.')}."
 
 
 def _loss(rows: Rows, errors: Fitted | tuple[np.ndarray, ...]) -> float:
