@@ -41,6 +41,8 @@ from adaptive_flot.greybox.model import Model
 
 MUCH_LEFT = 4.0
 """An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
+AT_NOISE = 1.25
+"""Errors of at most so many times the noise from row to row are noise."""
 LACKING = ("lag", "store", "depends", "sign")
 """Kinds of effects that a model may lack on its reference."""
 
@@ -92,7 +94,7 @@ def _found(
     elif is_short(records[0], model):
         judged = _row_by_row(compared, records[0], references, processes, progress, began)
     elif _leaves_more(compared.verdict):
-        judged = with_searched_effect(compared, records[0], processes, progress, left)
+        judged = _unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))
     else:
         judged = compared
     return _unless_much_is_left(judged)
@@ -210,6 +212,30 @@ def _unless_much_is_left(compared: Comparison) -> Comparison:
     most = max(left, key=lambda name: left[name])
     why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
     return _taken_back(compared, f"{why}, so it may stand in for something else")
+
+
+def _unless_more_than_noise(compared: Comparison) -> Comparison:
+    """The comparison, its name or class taken back where the model is right on its reference, and not with the name.
+
+    Where it errs by no more than noise there, the right name leaves no more in any output.
+    """
+    verdict = compared.verdict
+    level = _noise_where_right(compared)
+    left = {c.output: c.after / level[c.output] for c in verdict.error if c.output in level}
+    most = max(left, key=lambda name: left[name], default="")
+    if verdict.word not in ("named", "class") or not most or left[most] <= FAR_ABOVE:
+        return compared
+    why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times its noise"
+    return _taken_back(compared, f"{why}, which is all that the model errs by on the reference")
+
+
+def _noise_where_right(compared: Comparison) -> dict[str, float]:
+    """Noise from row to row of each output in the new records and the reference; none where the model errs by more."""
+    calibration, columns = compared.calibration, compared.rows.columns
+    if (calibration.usual.overall > AT_NOISE * calibration.noise).any():
+        return {}
+    level = np.maximum(noise_floor(compared.rows.records, columns), calibration.usual.overall)
+    return {calibration.model.outputs[c].name: float(s) for c, s in zip(columns, level, strict=True)}
 
 
 def _taken_back(compared: Comparison, why: str, changed: str = "has changed") -> Comparison:

@@ -98,3 +98,16 @@ def test_words_say_whether_a_change_is_known_to_be_new() -> None:
     assert since_reference(reason, False) == "Loss fell. The reference does not show whether it was there. Confirmed."
     one = since_reference("The model lacks one of these, which this record can not tell apart: a; or b.", True)
     assert one.startswith("One of these, which")
+
+
+@pytest.mark.usefixtures("long_records")
+def test_a_name_that_leaves_more_than_noise_is_taken_back_where_the_model_is_right_on_its_reference(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Single faults call fouling a smaller loss; what the search would tell is left out."""
+    monkeypatch.setattr(changes, "with_searched_effect", lambda compared, *given: compared)
+    old = [record("old", 2)]
+    first = compare(tank(), [record("new", 1, FOULS)], old).verdict
+    found = find_changes(tank(), [record("new", 1, FOULS)], old).verdict
+    assert first.error[0].after > 2 * first.error[0].noise
+    assert found.word == "abstain" and found.effects == (), found.reason

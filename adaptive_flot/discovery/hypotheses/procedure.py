@@ -142,8 +142,7 @@ def compare(
     tested = tuple(sorted(possible, key=lambda t: t.total))
     usual = _usual_losses(calibration) if references else None
     judged, blocks = judge(rows, null, tested, usual)
-    if not references:
-        judged = unless_at_noise(judged, calibration, rows, null)
+    judged = unless_at_noise(judged, rows, null)
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
     told = judged.word in ("named", "class") and judged.best is not None
     best = judged.best if told and judged.best is not None else null

@@ -11,7 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
-from adaptive_flot.discovery.hypotheses.joint.rows import Rows
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
@@ -32,14 +32,15 @@ AT_NOISE = 1.1
 """Errors of at most so many times the noise from row to row are that noise."""
 
 
-def unless_at_noise(judged: Judged, calibration: Calibration, rows: Rows, null: Tested) -> Judged:
-    """The judgement without a reference: `none` where no hypothesis stands, and errors are the noise from row to row.
+def unless_at_noise(judged: Judged, rows: Rows, null: Tested) -> Judged:
+    """The judgement: `none` where no hypothesis stands, and errors are the noise from row to row of these records.
 
-    Else it would be said that something is missing where nothing is left to explain.
+    Else it would be said that something is missing where nothing is left to explain. With a reference, an instrument
+    may have become noisier.
     """
     if judged.word != "abstain" or judged.best is not None:
         return judged
-    if (rms(rows, null.fresh) > AT_NOISE * np.asarray(calibration.noise)).any():
+    if (rms(rows, null.fresh) > AT_NOISE * noise_floor(rows.records, rows.columns)).any():
         return judged
     return replace(judged, word="none", why="their errors are those of the noise from row to row")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from tests.discovery.hypotheses.tank import COLDER, DRAUGHT, LEAKS, ROWS, STUCK, record, tank
+from tests.discovery.hypotheses.tank import COLDER, DRAUGHT, LEAKS, NOISE, ROWS, STUCK, record, tank
 
 EFFECTS = {"stuck": (STUCK,), "leaks": (LEAKS,), "colder": (COLDER,), "draught": (DRAUGHT,), "none": ()}
 
@@ -110,3 +110,11 @@ def test_missing_values_and_spikes_give_no_other_name() -> None:
         verdict = compare(tank(), [replace(new, outputs=outputs)], [record("old", 2)]).verdict
         assert verdict.word in words
         assert all(e.effect.site == "heat_loss" for e in verdict.effects)
+
+
+def test_a_noisier_thermometer_is_no_change() -> None:
+    """Its errors are 1.8 times those of the reference, and all of them noise from row to row."""
+    new, rng = record("new", 1), np.random.default_rng(5)
+    noisier = replace(new, outputs=new.outputs + np.sqrt(1.8**2 - 1) * NOISE * rng.normal(size=new.outputs.shape))
+    verdict = compare(tank(), [noisier], [record("old", 2)]).verdict
+    assert verdict.word == "none" and "noise from row to row" in verdict.reason, verdict.reason
