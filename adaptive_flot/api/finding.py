@@ -271,7 +271,7 @@ def discover(
     name, workers = ", ".join(record_name(r) for r in records), processes or available_processes()
     several = len(records) > 1 or bool(references)
     if several and limits:
-        raise ModelError("limits: no test is proposed for several records; leave them out")
+        raise ModelError("limits: no test is proposed with a reference or for several records; leave them out")
     if len(records) > 1 and budget is not None:
         raise ModelError("budget: several records are judged as a whole; leave it out")
     made, origin = read_model(model)

@@ -69,7 +69,7 @@ def discover(
     )
     limits, several = read_limits(limit or ()), bool(references) or len(data) > 1
     if several and limits:
-        raise ModelError("--limit: no test is proposed for several records; leave it out")
+        raise ModelError("--limit: no test is proposed with a reference or for several records; leave it out")
     if len(data) > 1 and budget is not None:
         raise ModelError("--budget: several records are judged as a whole; leave it out")
     tag_map = None if map_ is None else load_tag_map(map_)

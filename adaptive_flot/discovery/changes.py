@@ -34,15 +34,13 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results import Verdict
-from adaptive_flot.discovery.searched_change import with_searched_effect
+from adaptive_flot.discovery.searched_change import AT_NOISE, with_searched_effect
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
 MUCH_LEFT = 4.0
 """An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
-AT_NOISE = 1.25
-"""Errors of at most so many times the noise from row to row are noise."""
 LACKING = ("lag", "store", "depends", "sign")
 """Kinds of effects that a model may lack on its reference."""
 

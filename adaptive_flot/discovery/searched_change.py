@@ -19,17 +19,16 @@ from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, what_is_left
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN
+from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import Discovery, OutputChange, Verdict
 from adaptive_flot.discovery.stages import NONE_FITTED
 from adaptive_flot.discovery.verdict.wording import since_reference
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 
-MOST = 0.8
-"""Share of what is unusual that the effects must explain: what is left may be another cause, or the right one."""
 MOST_SECONDS = 60.0
 """Longest time of the search: where a model is far off, it tries much and tells nothing."""
 BETTER = 0.8
@@ -77,16 +76,25 @@ def with_searched_effect(
         return compared
     if compared.verdict.word in ("named", "class") and not _tells_more(compared.verdict, verdict):
         return compared
-    extended = found.model
-    after = fit_all_rows(extended, compared.rows, None, calibration.constants, None)
-    there = fit_all_rows(extended, calibration.rows, None, calibration.constants, None)
-    if after is None or there is None:
-        return compared
-    in_time = all(e.effect.driver == "time" for e in verdict.effects)
-    worse = _loss(calibration.rows, there) - _loss(calibration.rows, calibration.fit.errors)
-    if not in_time and worse < -LEAST_GAIN / 2:
-        return compared  # the model lacks it on the reference as well
-    return _told(compared, found, error, after, in_time or worse > LEAST_GAIN / 2)
+    after = fit_all_rows(found.model, compared.rows, None, calibration.constants, None)
+    worse = _worse_on_reference(compared, found)
+    if after is None or worse < -LEAST_GAIN / 2:
+        return compared  # it can not be run, or the model lacks it on the reference as well
+    return _told(compared, found, error, after, worse > LEAST_GAIN / 2)
+
+
+def _worse_on_reference(compared: Comparison, found: Discovery) -> float:
+    """How much the criterion of the reference is worse with the effects; infinite where all are of the record's time.
+
+    Negative infinity where the reference can not be simulated with them: then nothing says that they are new.
+    """
+    if all(e.effect.driver == "time" for e in found.verdict.effects):
+        return float("inf")
+    calibration = compared.calibration
+    there = fit_all_rows(found.model, calibration.rows, None, calibration.constants, None)
+    if there is None:
+        return float("-inf")
+    return _loss(calibration.rows, there.fit.errors) - _loss(calibration.rows, calibration.fit.errors)
 
 
 def with_constants_held(model: Model, names: tuple[str, ...]) -> Model:
@@ -120,7 +128,6 @@ def _told(
         compared.rows.losses(after.fit.errors),
         np.empty((0, 0)),
         0.0,
-        len(compared.calibration.constants.names),
     )
     word: Literal["named", "class"] = "named" if verdict.word == "named" else "class"
     verdict = replace(verdict, notes=tuple(n for n in verdict.notes if n != NONE_FITTED))
@@ -134,7 +141,7 @@ def _told(
         split=REPORT_ROWS,
         report_times=verdict.report_times,
         parameters=compared.verdict.parameters,
-        notes=(*_more_missing(error), alone, *map(_sentence, verdict.notes)),
+        notes=(*what_is_left(error, reference=True), alone, *map(_sentence, verdict.notes)),
         seconds=compared.verdict.seconds + verdict.seconds,
     )
     return replace(
@@ -145,22 +152,14 @@ def _told(
     )
 
 
-def _more_missing(error: Sequence[OutputChange]) -> tuple[str, ...]:
-    """What stays open."""
-    left = [f"{c.output} {c.after / c.noise:.3g} times" for c in error if c.after > ABOVE_USUAL * c.noise]
-    said = "More is missing: the error that is left is still above that of the reference"
-    return (f"{said}: {', '.join(left)}.",) if left else ()
-
-
 def _sentence(note: str) -> str:
     """A note with a capital letter and a full stop, like those of several records."""
     return f"{note[:1].upper()}{note[1:].rstrip('.')}."
 
 
-def _loss(rows: Rows, errors: Fitted | tuple[np.ndarray, ...]) -> float:
+def _loss(rows: Rows, errors: Sequence[FloatArray]) -> float:
     """Criterion of all rows that count."""
-    own = errors.fit.errors if isinstance(errors, Fitted) else errors
-    return float(sum(loss.sum() for loss in rows.losses(own)))
+    return float(sum(loss.sum() for loss in rows.losses(errors)))
 
 
 def _left(error: Sequence[OutputChange], noise: Sequence[OutputChange]) -> float:

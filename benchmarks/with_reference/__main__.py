@@ -70,11 +70,11 @@ def score(
     timeout: Annotated[float, typer.Option(min=1.0, help="Seconds after which a record is given up.")] = 600.0,
 ) -> None:
     """Judge every record, each with its reference, and print how often what has changed is told."""
-    if not list((folder / "answers").glob("*.json")):
+    count = len(list((folder / "answers").glob("*.json")))
+    if not count:
         raise typer.BadParameter(f"{folder}: no answers; make some with `python -m benchmarks.with_reference generate`")
     with_reference = f"{sys.executable} -m benchmarks.with_reference judge {{record}} --json {{json}}"
     command = discover_command() if alone else with_reference
-    count = len(list((folder / "answers").glob("*.json")))
     with progress() as bar:
         task = bar.add_task(label, total=count)
         run_command(folder, label, command, jobs, timeout, lambda: bar.advance(task))

@@ -11,17 +11,14 @@ import pandas as pd
 from benchmarks.hidden_effects.cell.simulate import SimulationError
 from benchmarks.hidden_effects.cell.sites import INPUTS, OUTPUTS
 from benchmarks.hidden_effects.effects.catalogue import CATALOGUE, Entry
-from benchmarks.hidden_effects.generate.categories import DrawError
-from benchmarks.hidden_effects.generate.draw import draw_effect, draw_experiment, limits_of
+from benchmarks.hidden_effects.generate.categories import DrawError, sized_effect
+from benchmarks.hidden_effects.generate.draw import draw_experiment
 from benchmarks.hidden_effects.generate.ground_truth import Hidden
-from benchmarks.hidden_effects.generate.sizing import ORDINARY, scale_to
 from benchmarks.hidden_effects.plant.experiment import SimulatedRun, run
 
 ATTEMPTS = 10
 NONE_EVERY = 4
 """One record of so many has no effect."""
-TARGETS = (6.0, 40.0)
-"""Size of an effect, over the noise."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +56,9 @@ def make_record(seed: int, k: int) -> Record:
             if entry is None:
                 done, hidden, size = run(experiment), [], dict[str, float]()
             else:
-                spec = draw_effect(rng, entry, run(experiment))
-                target = float(np.exp(rng.uniform(*np.log(TARGETS))))
-                scaled = scale_to(experiment, spec, target, limits_of(entry, spec.shape), run(experiment))
-                if scaled is None or scaled[1].of(entry.site) < ORDINARY[0]:
-                    raise DrawError(f"{entry.site}/{entry.driver}: too small")
-                done, size = scaled[1].done, scaled[1].removable
-                hidden = [Hidden.of(scaled[0], size)]
+                spec, sized = sized_effect(experiment, entry, rng, last=False)
+                done, size = sized.done, sized.removable
+                hidden = [Hidden.of(spec, size)]
         except (SimulationError, DrawError) as error:
             problems.append(str(error))
             continue

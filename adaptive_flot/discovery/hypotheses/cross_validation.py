@@ -58,8 +58,6 @@ class Tested:
         Fitted coefficients of each fold (folds, coefficients).
     prior
         What it costs that constants and initial states are where they are.
-    constants
-        Number of fitted constants.
     """
 
     hypothesis: Hypothesis | None
@@ -68,18 +66,16 @@ class Tested:
     losses: tuple[FloatArray, ...]
     values: FloatArray
     prior: float
-    constants: int
 
     @property
     def total(self) -> float:
         """Criterion over all rows, each judged by a fit that did not see it, and the priors."""
         return float(sum(loss.sum() for loss in self.losses)) + self.prior
 
-    @property
-    def moved(self) -> float:
-        """The part of the prior that the constants cost: how far they are from what is known of them, chi-squared."""
+    def moved(self, constants: int) -> float:
+        """The part of the prior that so many constants cost: how far they are from what is known, chi-squared."""
         first = len(self.fit.coefficients)
-        return float(np.sum(self.fit.unknowns[first : first + self.constants] ** 2))
+        return float(np.sum(self.fit.unknowns[first : first + constants] ** 2))
 
 
 def stretches(rows: Rows, folds: int = FOLDS) -> list[tuple[BoolArray, ...]]:
@@ -182,8 +178,7 @@ def test_on_stretches(model: Model, rows: Rows, fitted: Fitted, *, hold_constant
         for target, theirs, mask in zip(fresh, part.errors, left_out, strict=True):
             target[mask] = theirs[mask]
     prior = float(np.sum(fitter.prior(whole.unknowns) ** 2))
-    count = len(fitted.constants.names)
-    return Tested(fitted.hypothesis, whole, tuple(fresh), rows.losses(fresh), np.array(values), prior, count)
+    return Tested(fitted.hypothesis, whole, tuple(fresh), rows.losses(fresh), np.array(values), prior)
 
 
 def _fitted_elsewhere(fitter: JointFitter, whole: JointFit, hold_constants: bool) -> JointFit:

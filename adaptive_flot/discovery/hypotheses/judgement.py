@@ -58,7 +58,7 @@ class UsualLoss:
         draws = np.random.default_rng(0).choice(self.losses, (DRAWS, max(blocks, 1))).mean(axis=1)
         if (tested.total - tested.prior) / count > float(np.quantile(draws, CHANCE)):
             return "its errors are larger than on the reference"
-        if tested.moved > float(chi2.ppf(CHANCE, max(self.constants, 1))):
+        if tested.moved(self.constants) > float(chi2.ppf(CHANCE, max(self.constants, 1))):
             return "it needs constants that the reference excludes"
         return None
 

@@ -82,7 +82,7 @@ def verdict_of(
         parameters=labels,
         notes=(
             *_stopped(model, rows),
-            *(_left(calibration, error, reference) if told else ()),
+            *(what_is_left(error, reference) if told else ()),
             *(_moved(calibration, after) if reference else ()),
         ),
         seconds=seconds,
@@ -119,14 +119,10 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
     return (f"The new records want other constants, which the reference leaves open: {', '.join(moved)}.",)
 
 
-def _left(calibration: Calibration, error: Sequence[OutputChange], reference: bool) -> tuple[str, ...]:
+def what_is_left(error: Sequence[OutputChange], reference: bool) -> tuple[str, ...]:
     """What stays open: errors that are still above those of the reference, or far above the noise from row to row."""
-    level, factor = (calibration.usual.overall, ABOVE_USUAL) if reference else (calibration.noise, ABOVE_NOISE)
-    left = [
-        f"{c.output} {c.after / usual:.3g} times"
-        for c, usual in zip(error, level, strict=True)
-        if c.after > factor * usual
-    ]
+    factor = ABOVE_USUAL if reference else ABOVE_NOISE
+    left = [f"{c.output} {c.after / c.noise:.3g} times" for c in error if c.after > factor * c.noise]
     if not left:
         return ()
     than = "that of the reference" if reference else "the noise from row to row"

@@ -130,7 +130,7 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         return f"{said} {beside_a_part(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
     either = [n for n in same_site(judgement.best.names) if n in shared]
-    words = ["The model lacks several effects."]
+    words = [LACKS_SEVERAL]
     if sure := ", ".join(f"{s} by {d}" for s, d in shared if (s, d) not in either):
         begun, ended = ("All that come near have", f"; still wrong: {', '.join(wrong)}") if wrong else ("Certain:", "")
         words.append(f"{begun} {sure}{ended}.")

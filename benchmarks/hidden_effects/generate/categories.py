@@ -61,7 +61,14 @@ def draw_record(seed: int, k: int, rng: Rng, *, last: bool) -> DrawnRecord:
     return _MAKERS[schedule.category(k)](seed, k, rng, last)
 
 
-def _sized_effect(experiment: Experiment, entry: Entry, rng: Rng, last: bool) -> tuple[Spec, Sized]:
+def sized_effect(experiment: Experiment, entry: Entry, rng: Rng, last: bool) -> tuple[Spec, Sized]:
+    """Draw an effect of a kind, and give it a size; `last` takes one that is too small rather than none.
+
+    Raises
+    ------
+    DrawError, SimulationError
+        It is too small, or the cell does not run.
+    """
     pilot = run(experiment)
     spec = draw_effect(rng, entry, pilot)
     target = float(np.exp(rng.uniform(*_TARGETS)))
@@ -74,7 +81,7 @@ def _sized_effect(experiment: Experiment, entry: Entry, rng: Rng, last: bool) ->
 def _single(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     entry = schedule.single_entry(seed, k)
     experiment = draw_experiment(rng, thin_allowed=OUTPUT_OF.get(entry.site, "level_m") in OUTPUTS[:3])
-    spec, sized = _sized_effect(experiment, entry, rng, last)
+    spec, sized = sized_effect(experiment, entry, rng, last)
     ordinary = ORDINARY[0] <= sized.of(spec.site) <= ORDINARY[1]
     hidden = Hidden.of(spec, sized.removable)
     return DrawnRecord("single", experiment, "named", (), (spec,), (hidden,), ordinary=ordinary, size=sized.removable,
@@ -106,7 +113,7 @@ def _drift(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
 
 def _pair(seed: int, k: int, rng: Rng, last: bool) -> DrawnRecord:
     experiment = draw_experiment(rng, thin_allowed=False)
-    effects = [_sized_effect(experiment, entry, rng, last) for entry in schedule.pair_entries(seed, k)]
+    effects = [sized_effect(experiment, entry, rng, last) for entry in schedule.pair_entries(seed, k)]
     specs = tuple(spec for spec, _ in effects)
     together = measure(experiment, specs)
     hidden = tuple(Hidden.of(spec, sized.removable) for spec, sized in effects)
