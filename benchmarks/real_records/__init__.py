@@ -6,5 +6,6 @@ air_handling_unit.py   A unit with imposed faults: one clean day as reference, f
 electric_drives.py     Five records of two drives whose counter does not see the sign of the speed.
 heat_exchanger.py      A steam heat exchanger whose gain falls with the flow; judged by running on.
 lamp.py                A lamp over a plate: a negative example.
-__main__.py            Every verdict beside the truth.
+asked.py               The figures that were asked for, with targets and what was measured.
+__main__.py            Every verdict beside the truth; the cascaded tanks of the package too.
 """

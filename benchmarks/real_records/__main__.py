@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,23 +18,14 @@ from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.processes import cascaded_tanks
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
+from benchmarks.real_records.asked import Judged, of_measured_records, of_simulated_records, table_of
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "data"
 LARGEST_CLASS = 2
-
-
-@dataclass(frozen=True)
-class Judged:
-    """A verdict beside the truth, and what it is worth.
-
-    `right`, `wrong`, `wide` where the right part is one of more than two, or `open` where nothing is told.
-    """
-
-    record: str
-    truth: str
-    verdict: Verdict
-    worth: str
+TANK_SITES = {"upper_outflow", "lower_inflow", "lower_outflow", "level_sensor"}
+"""Where the spill of the tanks acts, and the sensor, which ends at the rim of the lower one."""
 
 
 def told(verdict: Verdict) -> set[str]:
@@ -85,18 +76,27 @@ def single_records(folder: Path) -> Iterator[Judged]:
     """One record each, without a reference."""
     record = heat_exchanger.record(folder).rows(heat_exchanger.FIRST, heat_exchanger.LAST)
     found = discover(heat_exchanger.make_model(), record, processes=available_processes())
-    verdict = found.verdict
+    verdict, error = found.verdict, None
     if found.before is not None and found.after is not None:
         everything = heat_exchanger.record(folder).rows(heat_exchanger.FIRST, None)
-        plain, extended = (run_on(fit, everything, len(record)) for fit in (found.before, found.after))
-        verdict = replace(verdict, reason=f"{verdict.reason} Run on over the rest: {plain:.3f} -> {extended:.3f} degC.")
+        plain, error = (run_on(fit, everything, len(record)) for fit in (found.before, found.after))
+        verdict = replace(verdict, reason=f"{verdict.reason} Run on over the rest: {plain:.3f} -> {error:.3f} degC.")
     named = {(e.effect.site, e.effect.driver) for e in verdict.effects} if verdict.word == "named" else set()
     right = bool(named) and named <= {("heating", "flow"), ("residence_time", "flow")}
-    yield Judged(
-        "heat exchanger", " ".join(heat_exchanger.TRUTH), verdict, "right" if right else "wrong" if named else "open"
-    )
+    worth = "right" if right else "wrong" if named else "open"
+    yield Judged("heat exchanger", " ".join(heat_exchanger.TRUTH), verdict, worth, error)
     verdict = discover(lamp.make_model(), lamp.record(folder), processes=available_processes()).verdict
     yield Judged("lamp", ", ".join(lamp.TRUTH), verdict, "wrong" if verdict.word == "named" else "open")
+
+
+def tanks(folder: Path) -> Iterator[Judged]:
+    """The record to estimate from is searched; the other one reports, in a free run over all of it."""
+    searched, other = cascaded_tanks.read_benchmark(folder / "cascaded-tanks" / "dataBenchmark.csv")
+    model = cascaded_tanks.make_model()
+    verdict = discover(model, searched, report_record=other, processes=available_processes()).verdict
+    sites = told(verdict)
+    worth = "open" if verdict.word != "named" else "right" if sites <= TANK_SITES else "wrong"
+    yield Judged("cascaded tanks", "both tanks spill over their rims", verdict, worth, verdict.error[0].after)
 
 
 def main(folder: Path) -> int:
@@ -108,17 +108,14 @@ def main(folder: Path) -> int:
     table = Table(title="Verdicts on real records", title_justify="left")
     for heading in ("record", "truth", "verdict", "worth", "s", "told"):
         table.add_column(heading)
-    for group in (faulted_days, drives, single_records):
+    for group in (faulted_days, drives, single_records, tanks):
         for j in group(folder):
             judged.append(j)
             console.print(f"{j.record}: {j.verdict.word}, {j.worth}")
             table.add_row(j.record, j.truth, j.verdict.word, j.worth, f"{j.verdict.seconds:.0f}", j.verdict.reason)
     console.print(table)
-    shows = {f"air handling {day}" for day in air_handling_unit.SHOWS}
-    right = sum(j.worth == "right" for j in judged if j.record in shows)
-    wrong = sum(j.worth == "wrong" for j in judged)
-    console.print(f"Days whose fault shows, right part named or in a class of two: {right} of {len(shows)}.")
-    console.print(f"Wrong names, all records: {wrong} of {len(judged)}.")
+    shows = [f"air handling {day}" for day in air_handling_unit.SHOWS]
+    console.print(table_of([*of_measured_records(judged, shows), *of_simulated_records()]))
     return 0
 
 

@@ -10,6 +10,7 @@ from adaptive_flot.greybox import Dataset, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
 from benchmarks.real_records.__main__ import worth_of
+from benchmarks.real_records.asked import Judged, of_measured_records, of_simulated_records
 
 INPUTS = {
     "air handling unit": [15.0, 22.0, 0.3, 0.2, 0.1],
@@ -54,3 +55,33 @@ def test_every_fault_is_at_a_site_of_the_model() -> None:
 def test_a_verdict_is_worth_what_it_says_of_the_part_at_fault(word: Word, sites: set[str], worth: str) -> None:
     """No wrong part counts as right, and a class that holds the right part is never a wrong name."""
     assert worth_of("valve", Verdict(word, ""), sites) == worth
+
+
+def test_the_figures_asked_for_come_from_the_verdicts() -> None:
+    """A wrong name, a lamp that is named and an error above its target are each told as not met; the rest as met."""
+    judged = [
+        Judged("air handling a", "valve", Verdict("named", "", seconds=10.0), "right"),
+        Judged("air handling b", "valve", Verdict("abstain", "", seconds=10.0), "open"),
+        Judged("heat exchanger", "heating", Verdict("named", "", seconds=10.0), "right", 0.49),
+        Judged("cascaded tanks", "spill", Verdict("class", "", seconds=10.0), "open", 0.2443),
+        Judged("lamp", "not known", Verdict("named", "", seconds=100.0), "wrong"),
+    ]
+    met = {a.figure: a.met for a in of_measured_records(judged, ["air handling a", "air handling b"])}
+    assert met == {
+        "wrong names, measured records": False,
+        "air handling: right part, or a class of two": False,
+        "heat exchanger: effect": True,
+        "heat exchanger: error run on": True,
+        "cascaded tanks: error run on": False,
+        "lamp: verdict": False,
+        "cascaded tanks: verdict": False,
+        "measured records: seconds, median and 95 %": False,
+    }
+
+
+def test_published_figures_are_those_of_the_docs() -> None:
+    """Each long run has its published verdicts, and none of its figures is missing."""
+    figures = {a.figure: a for a in of_simulated_records()}
+    assert len(figures) == 7
+    assert figures["the 300: told"].measured.endswith("(135/160)")
+    assert figures["plant-like: told"].measured.endswith("(45/67)")
