@@ -214,7 +214,7 @@ def judge_alternatives(state: State) -> State:
     judgement = with_certain_part(problem, result, judgement)
     said = state.screening.notes
     if problem.time_is_up:
-        said = (*said, "the budget ended the search: further effects and freer forms were not all tried")
+        said = (*said, "the time for the search ended: further effects and freer forms were not all tried")
     if not result.rounds[0].compared:
         judgement = replace(judgement, word="abstain", members=())
     screening = replace(state.screening, notes=said)

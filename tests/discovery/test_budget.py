@@ -18,8 +18,8 @@ from tests.discovery.heated import heated_tank, tank_record
 def test_a_budget_that_is_spent_at_once_gives_a_verdict_without_a_name() -> None:
     found = discover(heated_tank(), tank_record(), budget=1e-6)
     assert found.verdict.word == "abstain" and found.verdict.effects == ()
-    assert found.verdict.reason.startswith("The budget ended the search before the rivals had been compared")
-    assert any("budget ended the search" in note for note in found.verdict.notes)
+    assert found.verdict.reason.startswith("The time for the search ended before the rivals had been compared")
+    assert any("time for the search ended" in note for note in found.verdict.notes)
 
 
 def test_a_budget_that_suffices_changes_nothing_and_each_fit_tells_what_is_tried(draught: Discovery) -> None:

@@ -26,6 +26,7 @@ SETTINGS: Mapping[str, Settings] = {
     "step": {"width": 1.0},
     "lag": {"scale": 1.0},
     "delay": {"scale": 1.0},
+    "direction": {"scale": 1.0},
 }
 
 
@@ -42,6 +43,18 @@ def curve(effect: NamedEffect, driver: FloatArray, change: FloatArray, unit: str
 @pytest.mark.parametrize(
     ("effect", "said"),
     [
+        (
+            told("heat_loss", "jacket", "direction", amplitude=0.1, turn=float(np.log(1.1)), width=0.5),
+            "heat loss depends on the sign of jacket: 21 % more above zero than below",
+        ),
+        (
+            told("thermometer", "jacket", "direction", amplitude=0.1, turn=-0.25, width=0.5),
+            "thermometer depends on the sign of jacket: 0.5 K less above zero than below",
+        ),
+        (
+            told("heat_loss", "constant", "shift", "a draught", 1e-4, amplitude=float(np.log(0.8))),
+            "heat loss is 20 % less than the model says (95 %: 19.99 to 20.01 %; a draught)",
+        ),
         (
             told("heat_loss", "constant", "shift", "a draught", 0.05, amplitude=float(np.log(0.8))),
             "heat loss is 20 % less than the model says (95 %: 15.9 to 23.9 %; a draught)",

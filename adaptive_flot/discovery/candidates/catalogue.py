@@ -26,6 +26,10 @@ DRIVER_KNOTS = 4
 FINE_KNOTS = 8
 FINE_TIME_KNOTS = 14
 """Knots of the curve of a finalist: a hard limit or a threshold must not be told apart from its site by its shape."""
+LEAST_TURNED = 0.05
+"""A signal goes both ways where it has either sign in more than this share of the rows."""
+TURN = 0.02
+"""Width over which a change turns with the sign of its driver, as a share of the driver's ordinary size."""
 SPILL_QUANTILES = (0.5, 0.7, 0.85, 0.95)
 """A spill is scored with its edge at these quantiles of the level."""
 
@@ -170,7 +174,9 @@ def event(site: Site, form: str, time: FloatArray, onset: float, length: float, 
 def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states: Sequence[str]) -> Iterator[Variant]:
     reference = float(np.median(values))
     spread = float(np.quantile(values, 0.98) - np.quantile(values, 0.02))
-    if not reference > 0:
+    if _turns(values):
+        yield _direction(site, driver, values, offset)
+    if not reference > 0 or float(np.quantile(values, 0.02)) < 0:  # no power of a negative number
         yield from _on_signed(site, driver, values, offset, LEAST_RANGE * float(np.mean(np.abs(values))))
         return
     if not spread > LEAST_RANGE * reference:
@@ -199,6 +205,19 @@ def _on_signed(site: Site, driver: str, values: FloatArray, offset: bool, least:
     knots = _knots(values)
     if knots is not None:
         yield _curve(site, driver, values, knots, offset)
+
+
+def _turns(values: FloatArray) -> bool:
+    """Whether a signal goes both ways, in a fair share of the rows each."""
+    return bool(min(np.mean(values < 0), np.mean(values > 0)) > LEAST_TURNED)
+
+
+def _direction(site: Site, driver: str, values: FloatArray, offset: bool) -> Variant:
+    """A change that turns with the sign of a signal, as dry friction does with that of a speed."""
+    width = TURN * float(np.quantile(np.abs(values), 0.9))
+    effect = Effect(site.name, driver, "direction", settings={"scale": width})
+    columns = (TimeProfile(site.name, v, offset) for v in (np.ones(len(values)), np.tanh(values / width)))
+    return Variant(effect, tuple(columns), ("amplitude", "turn"), (("width", width),))
 
 
 def _spills(site: Site, driver: str, values: FloatArray) -> Iterator[Variant]:

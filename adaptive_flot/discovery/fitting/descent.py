@@ -47,6 +47,8 @@ BACKGROUND_STEPS = 2
 """Steps that end on the best background."""
 START_FRACTIONS = (1.0, 0.3, 0.1)
 """Fractions of a first-order estimate that are tried as the start."""
+SMALL_FRACTIONS = (0.03, 0.01, 0.0)
+"""Those that are tried where no model runs with these: nothing at all, in the end."""
 
 
 def nodes_for(problem: Problem, model: Model) -> Nodes | None:
@@ -102,13 +104,17 @@ class Descent:
     def shrink(self, names: Sequence[str]) -> None:
         """Start from smaller values of these unknowns where these are nearer: a first-order estimate may be far off."""
         where = [self.unknowns.names.index(n) for n in names]
-        noise, starts = self._first_noise(), []
-        for fraction in START_FRACTIONS:
-            z = self.unknowns.centre.copy()
-            z[where] *= fraction
-            z = np.clip(z, self.unknowns.lower, self.unknowns.upper)
-            starts.append((self._objective(z, self._predict(z), noise), z))
-        self.unknowns.centre = min(starts, key=lambda start: start[0])[1]
+        noise, centre = self._first_noise(), self.unknowns.centre
+        for fractions in (START_FRACTIONS, SMALL_FRACTIONS):
+            starts = []
+            for fraction in fractions:
+                z = centre.copy()
+                z[where] *= fraction
+                z = np.clip(z, self.unknowns.lower, self.unknowns.upper)
+                starts.append((self._objective(z, self._predict(z), noise), z))
+            least, self.unknowns.centre = min(starts, key=lambda start: start[0])
+            if np.isfinite(least):
+                return
 
     def run(self, rounds: int, steps: int, first: bool) -> Fit | None:
         """Steps for as many noise models as `rounds`; `first` chooses the directions of the initial state itself."""

@@ -15,6 +15,7 @@ from adaptive_flot.discovery.candidates.dynamics import LONGEST_DELAY
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
+from adaptive_flot.discovery.fitting.unknowns import Unknowns
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
@@ -28,6 +29,8 @@ LEAST_SHARE = 0.3
 """A candidate whose first-order gain is below this share of the best one's is not refitted."""
 MOST_CHANGE = float(np.log(10))
 """A physical effect changes a quantity by a factor of ten at most; beyond it is another model, or none with a grip."""
+PATIENCE = 4
+"""Times as many steps as usual for the width of a turn: it moves slowly, and the initial state with it."""
 WORTH_A_RESTART = 10.0
 """Gain of another start of a free time profile, which has most places to rest in, that is worth yet another."""
 EACH_OUTPUT = 2
@@ -138,13 +141,14 @@ def fit_variant(
     shape = {effect.parameter(k) for k, _ in score.variant.start}
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
     first = first if drawn else limited(model, effect, first)
-    thresholds = {effect.parameter(n) for n in effect.names(CoefficientRole.THRESHOLD) if effect.family.memory}
-    if thresholds and warm is None:
-        fit = _size_first(fitter, model, free, thresholds, (first, start, bounds, rounds, steps, shrink))
+    later = {effect.parameter(n) for n in effect.names(CoefficientRole.THRESHOLD) if effect.family.memory}
+    width = {effect.parameter(n) for n in effect.names(CoefficientRole.BAND) if effect.form == "direction"}
+    if width or (later and warm is None):
+        fit = _size_first(fitter, model, free, later | width, (first, start, bounds, rounds, steps, shrink))
     else:
         fit = fitter.fit(model, free, first, start, bounds, rounds, steps, shrink)
     in_time = effect.driver == "time" and effect.family.is_curve and len(names) <= FINE_TIME_KNOTS
-    if fit is not None and steps == MOST_STEPS and in_time:
+    if fit is not None and steps == MOST_STEPS and (in_time or width):
         return fitter.settled(fit, bounds, WORTH_A_RESTART)
     return fit
 
@@ -153,22 +157,36 @@ def _size_first(
     fitter: Fitter,
     model: Model,
     free: tuple[str, ...],
-    thresholds: set[str],
+    later: set[str],
     how: tuple[dict[str, float], Fit, dict[str, tuple[float, float]], int, int, list[str]],
 ) -> Fit | None:
     """The fit of a switch by a signal: its size with the thresholds of its score, then the thresholds as well.
 
     While the size is far off, a threshold moves to where it hides the switch. So a few steps are for the size alone.
+    The same holds for the width over which a change turns with the sign of its driver.
     """
     first, start, bounds, rounds, steps, shrink = how
-    size = fitter.fit(model, tuple(n for n in free if n not in thresholds), first, start, bounds, rounds, steps, shrink)
+    turns = model.effects[-1].form == "direction"
+    starts, patience = (_starts(fitter, start), PATIENCE) if turns else ((start,), 1)
+    sizes = tuple(n for n in free if n not in later)
+    tried = [fitter.fit(model, sizes, first, each, bounds, rounds, steps, shrink) for each in starts]
+    size = min((fit for fit in tried if fit is not None), key=lambda fit: fit.loss, default=None)
     if size is None:
         return None
-    there = {n: first[n] for n in thresholds}
-    fit = fitter.fit(size.model, free, there, size, bounds, rounds, steps) if steps == MOST_STEPS else None
+    there = {n: first[n] for n in later}
+    fit = fitter.fit(size.model, free, there, size, bounds, rounds, patience * steps) if steps == MOST_STEPS else None
     if fit is None or fit.loss > size.loss:
         return fitter.fit(size.model, free, there, size, bounds, 0) or fit
     return fit
+
+
+def _starts(fitter: Fitter, start: Fit) -> tuple[Fit, Fit]:
+    """A fit to start from, and the same in the initial state that the model assumes.
+
+    Where much is missing, the initial state of the fit without it may be absurd, and a fit that starts there may stay.
+    """
+    assumed = Unknowns(fitter.problem, start.model, (), {}, None, {}).x0
+    return start, replace(start, initial_state=assumed)
 
 
 def variant_model(start: Fit, score: Score) -> Model:

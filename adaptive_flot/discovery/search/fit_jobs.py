@@ -60,10 +60,15 @@ def first_forms(linearisation: ScoredLinearisation, score: Score) -> list[Score]
     """The forms of the first rung: the best one, for what depends on time its curve too, and what a switch replaced."""
     if score.variant.effect.family.memory:
         return [score, *linearisation.scorer.variant_scores(score.candidate)[:1]]
-    if score.candidate.driver != "time":
-        return [score]
+    if score.candidate.driver != "time":  # to first order a curve bends towards any turn
+        return [score, *(s for s in linearisation.scorer.variant_scores(score.candidate) if _turns(s) and s != score)]
     curves = [s for s in linearisation.scorer.variant_scores(score.candidate) if s.variant.effect.family.is_curve][:1]
     return [score] if score.variant.effect.family.is_curve else [score, *curves]
+
+
+def _turns(score: Score) -> bool:
+    """Whether a form turns with the sign of its driver."""
+    return score.variant.effect.form == "direction"
 
 
 def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
@@ -73,7 +78,7 @@ def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:
     best_of_form: dict[tuple[str, str | None], Score] = {}
     for s in linearisation.scorer.variant_scores(score.candidate):
         key = s.variant.effect.form, s.variant.effect.mode
-        if key not in best_of_form and s.gain > 0.5 * score.gain:
+        if key not in best_of_form and (s.gain > 0.5 * score.gain or _turns(s)):
             best_of_form[key] = s
     in_time = score.candidate.driver == "time"
     kept = list(best_of_form.values())[:FORMS_EACH]

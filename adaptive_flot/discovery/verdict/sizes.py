@@ -69,6 +69,8 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     elif curve is None and effect.driver == "time":
         low, high = (_deviation(site, effect, v) for v in (min(effect.levels), max(effect.levels)))
         said = f"{name} {'wanders' if effect.form == 'polyline' else 'changes'} in time, between {low} and {high}"
+    elif effect.form == "direction":
+        said = f"{name} depends on the sign of {spaced(effect.driver)}: {_over_sign(site, effect)}"
     elif curve is None:
         said = f"{name} depends on {spaced(effect.driver)}"
     elif effect.driver == "time":
@@ -167,6 +169,12 @@ def _moved(site: Site, size: str, *, rises: bool, factor: float | None) -> str:
     return f"{'rose' if rises else 'fell'} by {size}"
 
 
+def _over_sign(site: Site, effect: Effect) -> str:
+    """The difference that the sign of the driver makes: `40.8 N more above zero than below`."""
+    (half,) = effect.values(CoefficientRole.SLOPE)
+    return f"{_deviation(site, effect, 2 * half)} above zero than below"
+
+
 def _over_driver(site: Site, curve: EffectCurve) -> str:
     a, b = _extremes(curve)
     driver, unit = spaced(curve.effect.driver), f" {curve.driver_unit}" if curve.driver_unit not in ("", "-") else ""
@@ -239,15 +247,23 @@ def _interval(site: Site, told: NamedEffect) -> str:
         return ""
     low, high = sorted(known[0], key=abs)
     if not level:
-        return f"95 %: {low:.3g} to {high:.3g} s"
+        return f"95 %: {_apart(low, high)} s"
     if low * high < 0:
         signed = (f"{'-' if v < 0 else '+'}{_amount(site, effect, v)}" for v in known[0])
         return f"95 %: {' to '.join(signed)}"
     if _is_factor(site, effect) and np.exp(high) > LARGE:
-        return f"95 %: {np.exp(low):.2g} to {np.exp(high):.2g} times"
+        return f"95 %: {_apart(np.exp(low), np.exp(high), 2)} times"
     if _is_factor(site, effect):
-        return f"95 %: {abs(100 * np.expm1(low)):.3g} to {abs(100 * np.expm1(high)):.3g} %"
-    return f"95 %: {abs(low):.3g} to {abs(high):.3g}{_unit(site)}"
+        return f"95 %: {_apart(abs(100 * np.expm1(low)), abs(100 * np.expm1(high)))} %"
+    return f"95 %: {_apart(abs(low), abs(high))}{_unit(site)}"
+
+
+def _apart(low: float, high: float, digits: int = 3) -> str:
+    """Two ends of an interval, with as many digits, up to 6, as tell them apart."""
+    for n in range(digits, 6):
+        if f"{low:.{n}g}" != f"{high:.{n}g}":
+            return f"{low:.{n}g} to {high:.{n}g}"
+    return f"{low:.6g} to {high:.6g}"
 
 
 def _unit(site: Site) -> str:

@@ -24,6 +24,8 @@ from adaptive_flot.greybox.forms.form import (
 )
 from adaptive_flot.greybox.quantities import FloatArray
 
+SHARPEST = 0.3
+"""Least width over which a change turns with the sign of its driver, in scales of it: a jump has no derivative."""
 LEAST_BLEND = 1e-6
 """A driver of a power law is taken as at least this share of its reference: keeps the logarithm finite."""
 
@@ -41,6 +43,11 @@ def _power(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
 def _linear(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     reference = number(s, "reference")
     return c["amplitude"] + c["slope"] * (driver / reference - 1)
+
+
+def _direction(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del s
+    return c["amplitude"] + c["turn"] * ca.tanh(driver / c["width"])
 
 
 def _step(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
@@ -126,6 +133,12 @@ def _curve_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
     )
 
 
+def _direction_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
+    scale = number(settings, "scale")
+    width = Coefficient("width", CoefficientRole.BAND, scale, SHARPEST * scale, scale=scale, unit="driver")
+    return _AMPLITUDE, Coefficient("turn", CoefficientRole.SLOPE, unit="g"), width
+
+
 _AMPLITUDE = Coefficient("amplitude", CoefficientRole.LEVEL, unit="g")
 _ONSET = Coefficient("onset", CoefficientRole.ONSET, 0.0, scale=60.0, unit="s")
 
@@ -150,6 +163,17 @@ STATIC_FORMS: tuple[Form, ...] = (
         {"reference": None},
         {"reference": "driver"},
         static=_linear,
+    ),
+    Form(
+        "direction",
+        "a change that turns with the sign of the driver, as dry friction does, with a free constant",
+        FormKind.LINE,
+        _direction_coefficients,
+        ("signal",),
+        {"scale": None},
+        {"scale": "driver"},
+        static=_direction,
+        abrupt=True,
     ),
     Form(
         "curve",

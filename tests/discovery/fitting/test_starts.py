@@ -66,6 +66,18 @@ def test_a_start_that_is_far_too_large_still_comes_to_the_truth(base: tuple[Prob
     assert dict(zip(found.names, found.values, strict=True))[EXPONENT_NAME] == pytest.approx(EXPONENT, abs=0.03)
 
 
+def test_a_start_with_which_the_model_can_not_run_is_nothing_at_all(base: tuple[Problem, Fit]) -> None:
+    """A loss that falls steeply with the temperature runs away: only without it there is a run to go on from."""
+    problem, fit = base
+    effect = Effect("heat_loss", "temperature", "proportional")
+    slope = effect.parameter("slope")
+    model = fit.model.with_effects([effect])
+    assert Fitter(problem).fit(model, (slope,), {slope: -1e9}, fit) is None
+    found = Fitter(problem).fit(model, (slope,), {slope: -1e9}, fit, shrink=(slope,))
+    assert found is not None
+    assert found.loss <= fit.loss
+
+
 LATE = (
     Effect("heating", "lag", "lag", {"amplitude": 1.0, "time_constant": 90.0}, {"scale": 1000.0}),
     Effect("thermometer", "lag", "lag", {"amplitude": 1.0, "time_constant": 60.0}, {"scale": 300.0}),
