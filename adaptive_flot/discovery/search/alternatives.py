@@ -142,7 +142,7 @@ def fit_variant(
     shrink = [] if warm else [n for n in names if n in first and n not in shape]
     first = first if drawn else limited(model, effect, first)
     later = {effect.parameter(n) for n in effect.names(CoefficientRole.THRESHOLD) if effect.family.memory}
-    width = {effect.parameter(n) for n in effect.names(CoefficientRole.BAND) if effect.form == "direction"}
+    width = {effect.parameter(n) for n in effect.names(CoefficientRole.BAND) if effect.family.turns}
     if width or (later and warm is None):
         fit = _size_first(fitter, model, free, later | width, (first, start, bounds, rounds, steps, shrink))
     else:
@@ -166,7 +166,7 @@ def _size_first(
     The same holds for the width over which a change turns with the sign of its driver.
     """
     first, start, bounds, rounds, steps, shrink = how
-    turns = model.effects[-1].form == "direction"
+    turns = model.effects[-1].family.turns
     starts, patience = (_starts(fitter, start), PATIENCE) if turns else ((start,), 1)
     sizes = tuple(n for n in free if n not in later)
     tried = [fitter.fit(model, sizes, first, each, bounds, rounds, steps, shrink) for each in starts]

@@ -68,7 +68,7 @@ def first_forms(linearisation: ScoredLinearisation, score: Score) -> list[Score]
 
 def _turns(score: Score) -> bool:
     """Whether a form turns with the sign of its driver."""
-    return score.variant.effect.form == "direction"
+    return score.variant.effect.family.turns
 
 
 def forms(linearisation: ScoredLinearisation, fitted: FittedJob) -> list[Job]:

@@ -69,7 +69,7 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     elif curve is None and effect.driver == "time":
         low, high = (_deviation(site, effect, v) for v in (min(effect.levels), max(effect.levels)))
         said = f"{name} {'wanders' if effect.form == 'polyline' else 'changes'} in time, between {low} and {high}"
-    elif effect.form == "direction":
+    elif effect.family.turns:
         said = f"{name} depends on the sign of {spaced(effect.driver)}: {_over_sign(site, effect)}"
     elif curve is None:
         said = f"{name} depends on {spaced(effect.driver)}"

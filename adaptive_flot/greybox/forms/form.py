@@ -64,6 +64,7 @@ class FormKind(Enum):
     CONSTANT = "the same change always"
     LINE = "a straight line in the driver or its logarithm, with a free constant"
     CURVE = "a spline in the driver whose shape is free"
+    TURN = "a change that turns with the sign of the driver"
     THRESHOLD = "something begins where the driver exceeds a threshold"
     PROPORTIONAL = "a change in proportion to the driver"
     EVENT = "something begins at a time"
@@ -188,6 +189,11 @@ class Form:
     def is_curve(self) -> bool:
         """Whether it is a spline whose shape is free."""
         return self.kind is FormKind.CURVE
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns with the sign of its driver."""
+        return self.kind is FormKind.TURN
 
     @property
     def is_event(self) -> bool:

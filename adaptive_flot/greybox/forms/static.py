@@ -167,7 +167,7 @@ STATIC_FORMS: tuple[Form, ...] = (
     Form(
         "direction",
         "a change that turns with the sign of the driver, as dry friction does, with a free constant",
-        FormKind.LINE,
+        FormKind.TURN,
         _direction_coefficients,
         ("signal",),
         {"scale": None},

@@ -72,7 +72,7 @@ KNOTS = (0.5, 1.0, 1.6)
 NEEDED: dict[str, float | tuple[float, ...]] = {"reference": 1.2, "scale": 1.0, "knots": KNOTS, "middle": 1.2}
 AWAKE = {
     **{CoefficientRole.ONSET: 12.3, CoefficientRole.THRESHOLD: 1.1, CoefficientRole.LIMIT: 1.0},
-    **{CoefficientRole.FLOOR: 0.2, CoefficientRole.POSITION: 0.5, CoefficientRole.BAND: 0.1},
+    **{CoefficientRole.FLOOR: 0.2, CoefficientRole.POSITION: 0.5, CoefficientRole.BAND: 0.4},
     CoefficientRole.PERIOD: 7.0,
 }
 
