@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, Round, SearchResult, Verification
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, Round, SearchResult, Verification, Word
 from adaptive_flot.discovery.search.substance import excess_by_output, still_wrong
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
 from adaptive_flot.discovery.verdict.judge import judge
@@ -142,6 +142,16 @@ def test_what_all_sets_share_is_not_certain_while_an_output_stays_wrong(two_thin
     assert "Certain: flow_meter by constant." in reason_words(judged, result, (), ())
     said = reason_words(judged, result, (), (), wrong=["temperature"])
     assert "All that come near have flow_meter by constant; still wrong: temperature." in said and "Certain" not in said
+
+
+@pytest.mark.parametrize("word", ["named", "unnamed"])
+def test_an_output_that_stays_wrong_is_said_beside_a_name(two_things: Discovery, word: Word) -> None:
+    """A name that leaves an error far above the noise is not all there is, or not the right one."""
+    result = _search(two_things, ((LOSS, SENSOR), 0.0))
+    judged = replace(_judged(result), word=word)
+    assert "Still far above" not in reason_words(judged, result, (), ())
+    said = reason_words(judged, result, (), (), wrong=["concentrate_grade"])
+    assert said.endswith("Still far above the noise: concentrate grade.")
 
 
 def test_two_dependences_of_one_quantity_are_no_two_causes(two_things: Discovery) -> None:

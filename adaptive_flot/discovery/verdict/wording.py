@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_site
-from adaptive_flot.discovery.verdict.sizes import words_alone
+from adaptive_flot.discovery.verdict.sizes import spaced, words_alone
 
 LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
 LACKS_ONE, LACKS_SEVERAL = "The model lacks one", "The model lacks several effects."
@@ -90,16 +90,22 @@ def reason_words(
     evidence = evidence[:1].upper() + evidence[1:]
     if judgement.word == "named":
         lacks = LACKS_THESE if len(effects) > 1 else LACKS_THIS
-        return f"{said}. {lacks} {beside_a_part(judgement)}{evidence}."
+        return f"{said}. {lacks} {beside_a_part(judgement)}{evidence}.{_still_wrong(wrong)}"
     if judgement.word == "class":
         return f"{_class_words(judgement, wrong)} {evidence}."
     if judgement.word == "unnamed":
-        return f"{said}. The model lacks this, and it has no name. {beside_a_part(judgement)}{evidence}."
+        evidence = f"{beside_a_part(judgement)}{evidence}.{_still_wrong(wrong)}"
+        return f"{said}. The model lacks this, and it has no name. {evidence}"
     close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
         f"none explains it well ({close}). {evidence}."
     )
+
+
+def _still_wrong(wrong: Sequence[str]) -> str:
+    """A sentence on the outputs whose errors stay far above their noise with what is told; empty for none."""
+    return f" Still far above the noise: {', '.join(map(spaced, wrong))}." if wrong else ""
 
 
 def beside_words(likelihood: float, smaller: bool = False) -> str:
