@@ -38,8 +38,8 @@ app.command(
     epilog="Example: adaptive-flot estimate record.csv --fit n --fit C --fit floatability --save-cell fitted.yaml"
 )(estimate)
 app.command(
-    epilog="Examples: adaptive-flot discover record.csv --json verdict.json --save-model extended.yaml; "
-    "what has changed: adaptive-flot discover today.csv --reference good_week.csv"
+    epilog="Example: adaptive-flot discover record.csv --json verdict.json --save-model extended.yaml. "
+    "What has changed: adaptive-flot discover today.csv --reference good_week.csv"
 )(discover)
 app.command(epilog="Example: adaptive-flot compare results/closed_loop_drift/run --out results/comparison")(compare)
 app.command(epilog="Example: adaptive-flot sweep paper_1000 --workers 2 --out results/paper_1000")(sweep)
