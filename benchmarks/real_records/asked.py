@@ -20,7 +20,7 @@ from benchmarks.plant_like.score import figures
 
 BENCHMARKS = Path(__file__).parents[1]
 SIMULATED = BENCHMARKS / "hidden_effects" / "published" / "discover.csv"
-SIMULATED_BY = "fea1b49, published"
+SIMULATED_BY = "1430e2e, published"
 PLANT_LIKE = BENCHMARKS / "plant_like" / "published" / "discover_5f354d4_seed_2053.csv"
 PLANT_LIKE_BY = "5f354d4, published"
 OF_THE_300 = {
