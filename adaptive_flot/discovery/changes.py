@@ -19,6 +19,7 @@ import numpy as np
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import one_thread
+from adaptive_flot.discovery.fitting.step_length import steps_words
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
@@ -149,7 +150,7 @@ def unless_an_event(
 
 def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Dataset], referred: bool) -> Comparison:
     """The comparison with a word on holes, sensors that say nothing, and events that seem to begin there."""
-    verdict, said = compared.verdict, list[str]()
+    verdict, said = compared.verdict, [f"{note}." for note in steps_words(model, compared.calibration.model)]
     for record in records:
         _, _, suspects = clean_outputs(record, model)
         ranges = [n for q, y in zip(model.outputs, record.outputs.T, strict=True) for n in out_of_range(q, y)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.fitting.parallel import one_thread
+from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State, Verdict
@@ -40,6 +41,8 @@ from adaptive_flot.greybox.model import Model
 
 SEARCH_SHARE = 0.7
 """Share of a budget that the search may take; the rest is for the last fits, the report and the proposed test."""
+MOST_AGAIN = 2
+"""How often a search is begun again in shorter steps, which what it has found asks for."""
 
 
 @one_thread()
@@ -98,12 +101,48 @@ def discover(
     if budget is not None:
         now = time.monotonic()
         state = replace(state, ends=now + budget, search_ends=now + SEARCH_SHARE * budget)
+    ended, verdict = _run(state)
+    for _ in range(MOST_AGAIN):
+        finer = _finer(ended, verdict)
+        if finer is None or time.monotonic() > state.search_ends:
+            break
+        progress("once more, in shorter steps")
+        noted = replace(record, notes=(*record.notes, *steps_words(model, finer)))
+        screening = Screening(noted, (), ())
+        ended, verdict = _run(replace(state, model=finer, screening=screening))
+    else:
+        finer = _finer(ended, verdict)
+    if finer is not None:
+        verdict = _taken_back(verdict, finer)
+    return ended.ended(replace(verdict, seconds=time.perf_counter() - began))
+
+
+def _run(state: State) -> tuple[State, Verdict]:
+    """All stages: what was worked out, and the verdict."""
     for stage in STAGES:
         outcome = stage(state)
         if isinstance(outcome, Verdict):
-            return state.ended(replace(outcome, seconds=time.perf_counter() - began))
+            return state, outcome
         state = outcome
     raise AssertionError("the last stage gives a verdict")
+
+
+def _finer(state: State, verdict: Verdict) -> Model | None:
+    """The model with steps as short as what is told asks for; None where it has them, and where nothing is told."""
+    if verdict.word not in ("named", "class", "unnamed") or state.problem is None or state.after is None:
+        return None
+    finer = steps_for(state.problem, state.model, state.after)
+    return None if finer is state.model else finer
+
+
+def _taken_back(verdict: Verdict, finer: Model) -> Verdict:
+    """The verdict without its name: the integration errs along what is told."""
+    nearest = verdict.reason[:1].lower() + verdict.reason[1:]
+    reason = (
+        f"Something is missing, and it is not told what: the steps of the model are too long for what was found. "
+        f"Set max_step_s={finer.max_step_s:.3g}. The nearest: {nearest}"
+    )
+    return replace(verdict, word="abstain", reason=reason, effects=(), members=())
 
 
 STAGES: tuple[Callable[[State], State | Verdict], ...] = (

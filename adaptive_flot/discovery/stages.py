@@ -26,6 +26,7 @@ from adaptive_flot.discovery.fitting.base_fit import prepare, split_finer, split
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
+from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.record.screening import screen
@@ -78,7 +79,11 @@ def split_rows(state: State) -> State:
 def fit_model_as_it_is(state: State) -> State | Verdict:
     """Fit the model without any effect: the base of every comparison."""
     began = time.monotonic()
-    prepared = prepare(state.known_problem, state.model)
+    model = steps_for(state.known_problem, state.model)
+    prepared = prepare(state.known_problem, model)
+    again = model if prepared is None else steps_for(prepared[0], model, prepared[1])
+    if again is not model:
+        model, prepared = again, prepare(state.known_problem, again)
     if prepared is None:
         name = state.model.name
         reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
@@ -88,13 +93,15 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     problem = replace(problem, site_sizes=responses.sizes)
     noise = noise_by_differences(problem.measured)
     start = base.initial_state, parameters_of(base)
-    said = wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
+    said = steps_words(state.model, model)
+    said += wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
     if not state.adapted:
         said += (NONE_FITTED,)
     screening = replace(state.screening, notes=state.screening.notes + said)
     took = time.monotonic() - began
     problem = replace(problem, deadline=min(problem.deadline, state.ends - FINAL_SHARE * took))
-    return replace(state, screening=screening, problem=problem, base=base, responses=responses, base_seconds=took)
+    state = replace(state, model=model, screening=screening, problem=problem, base_seconds=took)
+    return replace(state, base=base, responses=responses)
 
 
 def check_explained(state: State) -> State | Verdict:

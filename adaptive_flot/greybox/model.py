@@ -38,6 +38,8 @@ __all__ = ["Effect", "FloatArray", "Kind", "Model", "Parameter", "Quantity", "Sc
 Arguments = TypeVarTuple("Arguments")
 MOST_EXTENDED = 64
 """Kinds of effects whose equations a model keeps: a search comes back to those of a few rounds."""
+STEPS_BESIDE_A_TURN = 4
+"""Integration steps, for each of the model's own, beside an effect that turns with the sign of a signal."""
 Made = TypeVar("Made")
 
 
@@ -226,8 +228,16 @@ class Model(Checks, Described):
         return made
 
     def steps_in(self, dt: float) -> int:
-        """Steps of the fast integration in dt [s], as many as `max_step_s` asks for."""
-        return max(1, math.ceil(dt / self.max_step_s - 1e-9))
+        """Steps of the fast integration in dt [s], as many as `longest_step_s` asks for."""
+        return max(1, math.ceil(dt / self.longest_step_s - 1e-9))
+
+    @property
+    def longest_step_s(self) -> float:
+        """Longest integration step [s]: `max_step_s`, and a share of it with an effect that turns with a sign.
+
+        The right-hand side of such a model has nearly a jump, and is the stiffer the larger that is.
+        """
+        return self.max_step_s / (STEPS_BESIDE_A_TURN if any(e.family.turns for e in self.effects) else 1)
 
     def derived(self, builder: Callable[[Model, *Arguments], Made], *arguments: *Arguments) -> Made:
         """Return `builder(model, *arguments)`, made once for this model and those of other parameter values.

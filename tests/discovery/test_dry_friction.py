@@ -6,6 +6,8 @@ controller, as such drives do.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,10 +65,13 @@ def record(dry: float) -> Dataset:
     return Dataset("drive", time, DT, held, seen)
 
 
-@pytest.mark.parametrize("dry", [15.0, 0.0])
-def test_dry_friction_is_named_with_its_size_and_only_where_it_is(dry: float) -> None:
-    """A motor force that depends on the speed is the same term by another name, and has no reason for it."""
-    verdict = discover(drive(), record(dry)).verdict
+@pytest.mark.parametrize(("dry", "step"), [(15.0, DT / 2), (40.0, DT), (0.0, DT / 2)])
+def test_dry_friction_is_named_with_its_size_and_only_where_it_is(dry: float, step: float) -> None:
+    """A motor force that depends on the speed is the same term by another name, and has no reason for it.
+
+    Where steps are too long for so sharp a jump, no run had it, and an encoder that answers late took its place.
+    """
+    verdict = discover(replace(drive(), max_step_s=step), record(dry)).verdict
     if not dry:
         assert verdict.word == "none", verdict.reason
         return

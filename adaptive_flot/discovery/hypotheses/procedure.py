@@ -23,8 +23,8 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
 )
 from adaptive_flot.discovery.hypotheses.families import STRUCTURE, Hypothesis, hypotheses
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
-from adaptive_flot.discovery.hypotheses.joint.known_before import loose_constants, scattered_starts
-from adaptive_flot.discovery.hypotheses.joint.rows import Rows, measured_columns, rows_of
+from adaptive_flot.discovery.hypotheses.joint.known_before import first_states, loose_constants, scattered_starts
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows, measured_columns, noise_floor, rows_of
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judge
 from adaptive_flot.discovery.hypotheses.plausible import moves_though_stopped
 from adaptive_flot.discovery.hypotheses.seen import seen_values
@@ -33,6 +33,7 @@ from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.step_size import with_short_steps
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,9 @@ def compare(
         raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
     free = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
     columns = measured_columns(model, (*records, *references))
+    for record in (*references, *records):
+        start, noise = first_states(model, [record])[0], noise_floor([record], columns)
+        model = with_short_steps(model, record, start, model.parameter_values, columns, noise)
     progress("fit the constants")
     calibration = calibrate(model, references or records, free, columns, records, local=bool(references))
     sizes = [calibration.usual.sizes(r) for r in records] if references else calibration.rows.sizes

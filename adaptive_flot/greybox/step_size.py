@@ -1,0 +1,63 @@
+"""Whether the steps of a model are short enough for a record, and the same model with steps that are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.greybox.data.dataset import MOST_STEPS, Dataset
+from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.greybox.stepping.stepper import Stepper
+
+TOLERATED = 0.2
+"""Error of the integration, in standard deviations of the noise, that changes nothing of what a record says."""
+LOOKED_AT = 3000
+"""Most rows of a record that are looked at, from its first one on."""
+SHORTEST_SHARE = 1 / 64
+"""Shortest step that is tried, as a share of the model's own."""
+
+
+def with_short_steps(
+    model: Model, record: Dataset, state: FloatArray, parameters: FloatArray, columns: Sequence[int], noise: FloatArray
+) -> Model:
+    """The model, its `max_step_s` halved as often as the record asks for; as it is where its steps are short enough.
+
+    They are where half of them change no output by more than TOLERATED of its noise (root of the mean square over the
+    first LOOKED_AT rows). A run that leaves all bounds needs shorter ones. A model that no step helps stays as it is.
+
+    Parameters
+    ----------
+    model, record
+        The model, and the record that is to be simulated.
+    state, parameters
+        State (nx,) at the first row, and parameters (np,).
+    columns
+        Indices of the m measured outputs.
+    noise
+        Standard deviation of the noise of each (m,).
+    """
+    part = record.rows(0, min(len(record), LOOKED_AT))
+    own = model.steps_in(record.dt)
+
+    def run(steps: int) -> FloatArray:
+        simulator = RecordSimulator(model, part.dt, stepper=Stepper(model, part.dt, substeps=steps))
+        with np.errstate(all="ignore"):
+            return simulator.outputs(part, state, parameters)[:, list(columns)]
+
+    steps, coarse = own, run(own)
+    while steps * SHORTEST_SHARE <= own and 2 * steps * len(record) <= MOST_STEPS:
+        fine = run(2 * steps)
+        if _agree(coarse, fine, noise):
+            share = model.max_step_s / model.longest_step_s
+            return model if steps == own else replace(model, max_step_s=share * record.dt / steps)
+        steps, coarse = 2 * steps, fine
+    return model
+
+
+def _agree(coarse: FloatArray, fine: FloatArray, noise: FloatArray) -> bool:
+    """Whether two runs (N, m) are finite and the same but for a small share of the noise (m,)."""
+    apart = np.sqrt(np.mean((coarse - fine) ** 2, axis=0))
+    return bool((apart <= TOLERATED * noise).all())  # nan compares as false
