@@ -42,7 +42,7 @@ from adaptive_flot.greybox.model import Model
 
 MUCH_LEFT = 4.0
 """An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
-LACKING = ("lag", "store", "depends", "sign")
+LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
 
 

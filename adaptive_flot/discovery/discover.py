@@ -56,6 +56,7 @@ def discover(
     limits: Mapping[str, tuple[float, float]] | None = None,
     processes: int = 1,
     budget: float | None = None,
+    referred: bool = False,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Discovery:
     """Find what physical effect a model lacks, from a measured record.
@@ -78,6 +79,8 @@ def discover(
         Fits that run at once.
     budget
         Seconds after which the search ends with what it has come to; None for as long as it takes.
+    referred
+        Whether a reference has shown that the model explains such records; it is then not asked for again.
     progress
         Called with a word for each stage and each fit.
 
@@ -97,7 +100,7 @@ def discover(
     if limits:
         input_range(record.inputs, model.inputs, limits)  # a wrong limit is refused before the search
     names = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
-    state = State(model, names, report_record, limits, processes, progress, Screening(record, (), ()))
+    state = State(model, names, report_record, limits, processes, progress, Screening(record, (), ()), referred)
     if budget is not None:
         now = time.monotonic()
         state = replace(state, ends=now + budget, search_ends=now + SEARCH_SHARE * budget)

@@ -62,7 +62,8 @@ def with_searched_effect(
     """
     calibration = compared.calibration
     held = with_constants_held(calibration.model, calibration.constants.names)
-    found = discover(held, record, processes=processes, progress=progress, budget=min(budget, MOST_SECONDS))
+    limit = min(budget, MOST_SECONDS)
+    found = discover(held, record, processes=processes, progress=progress, budget=limit, referred=True)
     verdict = found.verdict
     if verdict.word not in ("named", "class") or not verdict.effects:
         return compared

@@ -105,8 +105,11 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
 
 
 def check_explained(state: State) -> State | Verdict:
-    """Give up where the inputs explain nothing: no dependence could be told from a disturbance."""
-    reason = nothing_explained(*state.fitted)
+    """Give up where the inputs explain nothing: no dependence could be told from a disturbance.
+
+    Not where a reference has shown that they do: what has changed may be what made them explain so much.
+    """
+    reason = "" if state.referred else nothing_explained(*state.fitted)
     return insufficient(replace(state.screening, reasons=(reason,))) if reason else state
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
@@ -80,3 +81,17 @@ def test_dry_friction_is_named_with_its_size_and_only_where_it_is(dry: float, st
     assert (told.effect.site, told.effect.driver, told.effect.form) == ("friction", "speed", "direction")
     assert told.effect.coefficients["turn"] == pytest.approx(dry, rel=0.05)
     assert verdict.error[0].after < 1.5 * NOISE
+
+
+def test_dry_friction_that_came_since_a_reference_has_changed() -> None:
+    """Single faults of the whole record find it; the search finds its size, to the noise of the encoder.
+
+    The model alone explains nothing of such a record, and no regression does: it is an integrator. The reference has
+    shown that it can.
+    """
+    verdict = find_changes(drive(), [record(15.0)], [replace(record(0.0), name="old")]).verdict
+    assert verdict.word == "named", verdict.reason
+    (told,) = verdict.effects
+    assert (told.effect.site, told.effect.driver, told.effect.form) == ("friction", "speed", "direction")
+    assert told.effect.coefficients["turn"] == pytest.approx(15.0, rel=0.05)
+    assert "has changed since the reference" in verdict.reason

@@ -12,5 +12,6 @@ step_events.py  Steps, ramps and washouts in time.
 pulses.py       Changes that come and go, by the best pair of edges.
 relays.py       Switches with two thresholds of a signal.
 dynamics.py     Sensors that respond late; actuators that follow late, stick or reach a limit.
+turns.py        What turns with the sign of a signal, as dry friction does.
 direction.py    Which way a physical cause goes.
 """

@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.candidates.dynamics import late, limited
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.spline import knots_of, spline_values, through
+from adaptive_flot.discovery.candidates.turns import turning, turns
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.record.screening import LEAST_OF_SCALE, LEAST_RANGE
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
@@ -26,10 +27,6 @@ DRIVER_KNOTS = 4
 FINE_KNOTS = 8
 FINE_TIME_KNOTS = 14
 """Knots of the curve of a finalist: a hard limit or a threshold must not be told apart from its site by its shape."""
-LEAST_TURNED = 0.05
-"""A signal goes both ways where it has either sign in more than this share of the rows."""
-TURN = 0.02
-"""Width over which a change turns with the sign of its driver, as a share of the driver's ordinary size."""
 SPILL_QUANTILES = (0.5, 0.7, 0.85, 0.95)
 """A spill is scored with its edge at these quantiles of the level."""
 
@@ -174,7 +171,7 @@ def event(site: Site, form: str, time: FloatArray, onset: float, length: float, 
 def _on_signal(site: Site, driver: str, values: FloatArray, offset: bool, states: Sequence[str]) -> Iterator[Variant]:
     reference = float(np.median(values))
     spread = float(np.quantile(values, 0.98) - np.quantile(values, 0.02))
-    if _turns(values):
+    if turns(values):
         yield _direction(site, driver, values, offset)
     if not reference > 0 or float(np.quantile(values, 0.02)) < 0:  # no power of a negative number
         yield from _on_signed(site, driver, values, offset, LEAST_RANGE * float(np.mean(np.abs(values))))
@@ -207,15 +204,10 @@ def _on_signed(site: Site, driver: str, values: FloatArray, offset: bool, least:
         yield _curve(site, driver, values, knots, offset)
 
 
-def _turns(values: FloatArray) -> bool:
-    """Whether a signal goes both ways, in a fair share of the rows each."""
-    return bool(min(np.mean(values < 0), np.mean(values > 0)) > LEAST_TURNED)
-
-
 def _direction(site: Site, driver: str, values: FloatArray, offset: bool) -> Variant:
-    """A change that turns with the sign of a signal, as dry friction does with that of a speed."""
-    width = TURN * float(np.quantile(np.abs(values), 0.9))
-    effect = Effect(site.name, driver, "direction", settings={"scale": width})
+    told = turning(site.name, driver, values)
+    width = told.coefficients["width"]
+    effect = replace(told, coefficients={})
     columns = (TimeProfile(site.name, v, offset) for v in (np.ones(len(values)), np.tanh(values / width)))
     return Variant(effect, tuple(columns), ("amplitude", "turn"), (("width", width),))
 

@@ -8,13 +8,14 @@ from typing import Literal
 
 import numpy as np
 
+from adaptive_flot.discovery.candidates.turns import has_sign, turning, turns, turns_with
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
 Kind = Literal[
     "switch", "ramp", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis",
-    "dead zone", "depends", "store", "alternative",
+    "dead zone", "depends", "turns", "store", "alternative",
 ]  # fmt: skip
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""
@@ -30,6 +31,8 @@ LAGS = (2.0, 10.0, 50.0)
 """Starts of a time constant, in sampling intervals. A slower sensor would show next to nothing of what happens."""
 SLOPES = (-0.3, 0.3)
 """Starts of the logarithm of a factor from the lowest to the highest value of a driver."""
+TURNS = (-2.0, -0.3, 0.3, 2.0)
+"""Starts of what turns with the sign of a signal, as shares of a value's ordinary size."""
 ENDS = (0.05, 0.95)
 """Quantiles of a driver between which a dependence is drawn as a straight line."""
 WIDEST_SPAN = 0.3
@@ -104,7 +107,7 @@ class Hypothesis:
     @property
     def label(self) -> str:
         """Name in tables: ``heating_valve leaks``."""
-        by = f" by {self.driver}" if self.kind in ("depends", "store") else ""
+        by = f" by {self.driver}" if self.kind in ("depends", "turns", "store") else ""
         return f"{self.site} {self.kind}{by}"
 
 
@@ -156,6 +159,8 @@ def _at_site(
         for name, d in drivers.items():
             if np.quantile(d, ENDS[1]) - np.quantile(d, ENDS[0]) > LEAST_MOVE * float(np.median(np.abs(d))):
                 yield _depends(site, name, d)
+            if has_sign(model, name) and turns(d) and turns_with(v, d):
+                yield _turns(site, name, d, size)
     if site.role == "flow":
         for state in model.states:
             if state.name in drivers:
@@ -258,6 +263,22 @@ def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:
     effect = Effect(site.name, driver, "curve", settings={"knots": (low, high)}, mode="factor")
     starts = tuple({"value_1": -slope, "value_2": slope} for slope in SLOPES)
     return Hypothesis(site.name, driver, "depends", effect, ("value_1", "value_2"), starts)
+
+
+def _turns(site: Site, driver: str, d: FloatArray, size: float) -> Hypothesis:
+    starts = tuple({"amplitude": 0.0, "turn": s * size} for s in TURNS)
+    h = turned(site, driver, d, starts, {"amplitude": MATTERS * size, "turn": MATTERS * size})
+    width = h.effect.coefficients["width"]
+    started = tuple({**start, "width": width} for start in h.starts)
+    return replace(h, free=(*h.free, "width"), starts=started)
+
+
+def turned(
+    site: Site, driver: str, d: FloatArray, starts: tuple[Mapping[str, float], ...], scales: Mapping[str, float]
+) -> Hypothesis:
+    """What turns with the sign of a signal (N,), as dry friction does: an amount that is added, not a factor."""
+    effect = turning(site.name, driver, d, "offset")
+    return Hypothesis(site.name, driver, "turns", effect, ("amplitude", "turn"), starts, {}, scales)
 
 
 def _store(site: Site, state: str, moved: float, size: float, dt: float) -> Hypothesis:

@@ -77,6 +77,9 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.kind == "store":
         tau = values["time_constant"]
         return f"{name} lacks a second store behind {h.driver.replace('_', ' ')}, with a time constant of {tau:.3g} s"
+    if h.kind == "turns":
+        more = f"{abs(2 * values['turn']):.3g}{unit} {'more' if values['turn'] > 0 else 'less'}"
+        return f"{name} depends on the sign of {h.driver.replace('_', ' ')}: {more} above zero than below"
     change = values["value_2"] - values["value_1"]
     low, high = h.effect.settings["knots"]  # type: ignore[misc]
     driver = h.driver.replace("_", " ")

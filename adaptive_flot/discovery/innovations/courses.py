@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from adaptive_flot.discovery.candidates.dynamics import dragged
+from adaptive_flot.discovery.candidates.turns import has_sign, turns, turns_with
 from adaptive_flot.discovery.hypotheses.families import (
     ENDS,
     LEAST_MOVE,
@@ -18,6 +19,7 @@ from adaptive_flot.discovery.hypotheses.families import (
     Kind,
     offset_limits,
     span_limits,
+    turned,
 )
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -135,6 +137,8 @@ def _at_site(
         for driver, d in drivers.items():
             if driver in _known_at(model, site):
                 yield from _depends(site, driver, d, by)
+                if has_sign(model, driver) and turns(d) and (site.mode == "offset" or turns_with(v, d)):
+                    yield _turns(site, driver, d)
         for state in model.states:
             if site.role == "flow" and state.name in drivers and "." not in state.name:
                 yield from _stores(site, state.name, drivers[state.name], v, dt)
@@ -238,6 +242,12 @@ def _depends(site: Site, driver: str, d: FloatArray, by: FloatArray) -> Iterator
         Hypothesis(site.name, driver, "depends", effect, ("value_1", "value_2"), ({},)),
         by[:, None] * np.column_stack([1 - line, line]), ("value_1", "value_2"),
     )  # fmt: skip
+
+
+def _turns(site: Site, driver: str, d: FloatArray) -> Suspect:
+    hypothesis = turned(site, driver, d, ({},), {})
+    width = hypothesis.effect.coefficients["width"]
+    return Suspect(hypothesis, np.column_stack([np.ones_like(d), np.tanh(d / width)]), hypothesis.free)
 
 
 def _stores(site: Site, state: str, x: FloatArray, v: FloatArray, dt: float) -> Iterator[Suspect]:

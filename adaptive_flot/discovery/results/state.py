@@ -38,6 +38,8 @@ class State:
         Called with a word for each stage.
     screening
         The record, and from the first stage on what in it can not be used.
+    referred
+        Whether a reference has shown that the model explains such records.
     ends, search_ends
         When everything, and when the search, is to end, by `time.monotonic` [s].
     base_seconds
@@ -85,6 +87,7 @@ class State:
     processes: int
     progress: Callable[[str], None]
     screening: Screening
+    referred: bool = False
     ends: float = float("inf")
     search_ends: float = float("inf")
     base_seconds: float = 0.0

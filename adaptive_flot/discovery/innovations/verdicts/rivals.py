@@ -143,7 +143,7 @@ def not_two(told: Told) -> Told:
     kinds = [h.kind for h in told.certain]
     if told.word == "class" and not told.certain and all(_of_two(e) for e in told.alike):
         said = f"one of {', '.join(h.label for h in told.effects)}, and a further one"
-    elif len(kinds) < 2 or ("store" in kinds and "depends" not in kinds):
+    elif len(kinds) < 2 or ("store" in kinds and not {"depends", "turns"} & set(kinds)):
         return told
     else:
         said = " and ".join(h.label for h in told.certain)
