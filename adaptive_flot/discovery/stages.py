@@ -39,6 +39,7 @@ from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, p
 from adaptive_flot.discovery.test_design.movable import held_inputs, held_words
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
 from adaptive_flot.discovery.verdict.conclude import insufficient
+from adaptive_flot.discovery.verdict.idle_effects import without_idle_effects
 from adaptive_flot.discovery.verdict.judge import (
     but_for_what_has_no_reason,
     constants_told,
@@ -90,7 +91,7 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
         return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
     responses = Responses(problem, base)
-    problem = replace(problem, site_sizes=responses.sizes)
+    problem = replace(problem, site_sizes=responses.sizes, absorbed=responses.absorbed_constants())
     noise = noise_by_differences(problem.measured)
     start = base.initial_state, parameters_of(base)
     said = steps_words(state.model, model)
@@ -219,6 +220,7 @@ def judge_alternatives(state: State) -> State:
     problem, result = state.searched
     result = first_that_stands(problem, result)
     result, judgement = held_up(problem, result, judge(result))
+    result, judgement = without_idle_effects(problem, result, judgement)
     if problem.background is not None:
         judgement = but_for_what_has_no_reason(result, judgement)
     judgement = with_certain_part(problem, result, judgement)

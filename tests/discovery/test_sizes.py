@@ -27,6 +27,7 @@ SETTINGS: Mapping[str, Settings] = {
     "lag": {"scale": 1.0},
     "delay": {"scale": 1.0},
     "direction": {"scale": 1.0},
+    "cubic": {"knots": (-1.0, 1.0)},
 }
 
 

@@ -16,6 +16,7 @@ from adaptive_flot.discovery.hypotheses.families import hypotheses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
 from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.discovery.verdict.idle_effects import without_idle_effects
 from adaptive_flot.discovery.verdict.judge import (
     _one_way_each,
     but_for_what_has_no_reason,
@@ -279,6 +280,24 @@ def test_a_name_is_confirmed_for_what_it_names(draught: Discovery) -> None:
     )
     assert judge(found).word == "named"
     assert held_up(draught.problem, found, judge(found))[1].word == "abstain"
+
+
+@pytest.mark.parametrize(("alone", "told"), [(5.0, (BY_FAN,)), (50.0, (BY_FAN, BY_TIME))])
+def test_an_effect_that_adds_nothing_to_another_is_not_told(
+    draught: Discovery, alone: float, told: tuple[tuple[str, str], ...]
+) -> None:
+    """The first effect alone is worse than both by a criterion of `alone`: by less than 10, the second one is idle."""
+    assert draught.problem is not None
+    found = _search(draught, (BY_FAN, True, 0.0))
+    (both,) = found.alternatives
+    first = replace(both, fit=replace(both.fit, bic=both.fit.bic + alone))
+    both = replace(both, names=(BY_FAN, BY_TIME), known=(True, True))
+    round_1 = replace(found.rounds[0], alternatives=(first,))
+    found = replace(found, rounds=(round_1,), alternatives=(both,))
+    judged = replace(judge(found), word="named", best=both)
+    result, judged = without_idle_effects(draught.problem, found, judged)
+    assert judged.best is not None and judged.best.names == told == result.alternatives[0].names
+    assert judged.word == "named"
 
 
 def test_what_fresh_rows_contradict_gives_way_to_a_name_that_is_as_good_and_stands(draught: Discovery) -> None:

@@ -67,10 +67,17 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
                 # the other kind of error: a gain where an offset is usual, an offset where a gain is
                 either = [v for v in variants if v.effect.family.is_constant or v.effect.family.is_curve]
                 variants += tuple(_otherwise(v, site) for v in either)
+            absorbed = responses.problem.absorbed
+            variants = tuple(v for v in variants if not _is_absorbed(v, site, absorbed))
             if variants:
                 nameable = (site.name, driver) in known or _nameable(model, site, driver)
                 candidates.append(Candidate(site, driver, nameable, variants))
     return candidates
+
+
+def _is_absorbed(variant: Variant, site: Site, absorbed: frozenset[tuple[str, str]]) -> bool:
+    """Whether a variant is a constant change that adapted parameters take up."""
+    return variant.effect.family.is_constant and (site.name, variant.effect.mode or site.mode) in absorbed
 
 
 def _makes_sense(site: Site, driver: str) -> bool:
@@ -202,6 +209,15 @@ def _on_signed(site: Site, driver: str, values: FloatArray, offset: bool, least:
     knots = _knots(values)
     if knots is not None:
         yield _curve(site, driver, values, knots, offset)
+        yield _cubic(site, driver, values, (low, high), offset)
+
+
+def _cubic(site: Site, driver: str, values: FloatArray, ends: tuple[float, float], offset: bool) -> Variant:
+    """A cubic law, as of a spring that hardens: it bends the most at the ends, where a natural spline is straight."""
+    effect = Effect(site.name, driver, "cubic", settings={"knots": ends})
+    z = (2 * values - ends[0] - ends[1]) / (ends[1] - ends[0])
+    columns = tuple(TimeProfile(site.name, z**k, offset) for k in range(4))
+    return Variant(effect, columns, ("amplitude", "slope", "square", "cube"))
 
 
 def _direction(site: Site, driver: str, values: FloatArray, offset: bool) -> Variant:

@@ -14,7 +14,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.nodes import IntArray, Nodes, NodeStepper, substeps
@@ -23,6 +23,8 @@ from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
 FILLED_AT_ONCE = 64
 """Rows of responses that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
+TAKEN_UP = 1.5e-3
+"""What is left of a response, as a share of it, that is rounding and curvature: what is free already takes it up."""
 LEAST_VALUE = 1e-6
 """Share of its largest value below which a site is at zero."""
 
@@ -206,6 +208,19 @@ class Responses:
         least = LEAST_VALUE * float(np.max(np.abs(value), initial=0.0))
         inverse: FloatArray = np.where(np.abs(value) > least, 1 / np.where(np.abs(value) > least, value, 1.0), 0.0)
         return inverse
+
+    def absorbed_constants(self) -> frozenset[tuple[str, str]]:
+        """Sites, each with a mode, whose constant change all that is free already takes up, but for rounding."""
+        names: list[tuple[str, Mode]] = [(s, mode) for s in self.sites for mode in ("factor", "offset")]
+        ones = np.ones(len(self.problem.record))
+        responses = self.of([TimeProfile(s, ones, mode == "offset") for s, mode in names])
+        scale = np.maximum(np.abs(responses).max(axis=(0, 2)), 1e-300)[None, :, None]
+        a = (responses / scale).reshape(-1, len(names))
+        b = (self.nuisance / scale).reshape(-1, self.nuisance.shape[2])
+        base = np.linalg.qr(b / np.maximum(np.linalg.norm(b, axis=0), 1e-300))[0]
+        left = np.linalg.norm(a - base @ (base.T @ a), axis=0)
+        size = np.linalg.norm(a, axis=0)
+        return frozenset(n for n, x, s in zip(names, left, size, strict=True) if x < TAKEN_UP * s)
 
     def adapted_sites(self) -> tuple[str, ...]:
         """Sites whose constant change does what a change of an adapted parameter does, and nothing else.

@@ -50,6 +50,9 @@ class Problem:
         model would explain the error away, and its largest values are the physics that is looked for.
     site_sizes
         Ordinary size of a change at each site, in its unit (see `Responses.sizes`); empty before the first fit.
+    absorbed
+        Sites, each with a mode, whose constant change the adapted parameters take up along the model as it is. None is
+        offered beside an effect either: there it would only put right what the shape of that one lacks.
     deadline
         When searches and fits are to end, by `time.monotonic` [s]: they keep what they have come to.
     nodes
@@ -68,6 +71,7 @@ class Problem:
     nodes: Nodes | None = None
     background: Background | None = None
     site_sizes: Mapping[str, float] = field(default_factory=dict)
+    absorbed: frozenset[tuple[str, str]] = frozenset()
     deadline: float = float("inf")
 
     @property

@@ -115,7 +115,10 @@ def constants(scorer: Scorer, ended: list[Alternative]) -> list[tuple[Score, Fit
         nearly = at[site].gain > NEARLY * scores.get((site, effect.driver), np.inf)
         if not nearly and (effect.driver == "time" or _bend(a.fit, effect) > BENT * max(a.gain, 0.0)):
             continue
-        shift = next(v for v in scorer.variant_scores(at[site].candidate) if v.variant.effect.mode == effect.mode)
+        shifts = scorer.variant_scores(at[site].candidate)
+        shift = next((v for v in shifts if v.variant.effect.mode == effect.mode), None)
+        if shift is None:  # adapted parameters take it up
+            continue
         at_site[site] = replace(shift, start={"amplitude": float(np.mean(levels))}), a.fit
     return list(at_site.values())
 

@@ -19,12 +19,14 @@ from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 def simpler(fitter: Fitter, base: Fit, a: Alternative) -> list[Alternative]:
     """The alternative with one dependence on a signal, in turn each, replaced by a constant at the same site.
 
-    Left out is what would name a constant twice, and what can not be simulated.
+    Left out is what would name a constant twice, what adapted parameters take up, and what can not be simulated.
     """
-    alternatives = []
+    alternatives, modes = [], {s.name: s.mode for s in base.model.sites}
     for k, effect in enumerate(a.effects):
         constant = (effect.site, "constant")
         if effect.driver in STATELESS_DRIVERS or constant in a.names or effect.family.static is None:
+            continue
+        if (effect.site, effect.mode or modes[effect.site]) in fitter.problem.absorbed:
             continue
         others = [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k]
         shift = Effect(effect.site, "constant", "shift", mode=effect.mode)

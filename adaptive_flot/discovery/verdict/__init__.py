@@ -3,6 +3,7 @@
 Map
 ---
 judge.py        One of six words, from the ranked alternatives.
+idle_effects.py An effect that adds nothing to the others is not told.
 certain_part.py A part that is certain, where the whole is not told.
 heed_report.py  The stage in which the report rows have their say.
 report_veto.py  What held-out rows contradict is not told as a name.

@@ -62,7 +62,7 @@ class FormKind(Enum):
     """What kind of dependence a form describes; the value says it in words."""
 
     CONSTANT = "the same change always"
-    LINE = "a straight line in the driver or its logarithm, with a free constant"
+    LINE = "a line in the driver or its logarithm, or a polynomial, with a free constant"
     CURVE = "a spline in the driver whose shape is free"
     TURN = "a change that turns with the sign of the driver"
     THRESHOLD = "something begins where the driver exceeds a threshold"

@@ -45,6 +45,14 @@ def _linear(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     return c["amplitude"] + c["slope"] * (driver / reference - 1)
 
 
+def _cubic(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    knots = numbers(s, "knots")
+    low, high = knots[0], knots[-1]
+    z = (2 * driver - low - high) / (high - low)
+    g: ca.SX = c["amplitude"] + z * (c["slope"] + z * (c["square"] + z * c["cube"]))
+    return g
+
+
 def _direction(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     del s
     return c["amplitude"] + c["turn"] * ca.tanh(driver / c["width"])
@@ -163,6 +171,16 @@ STATIC_FORMS: tuple[Form, ...] = (
         {"reference": None},
         {"reference": "driver"},
         static=_linear,
+    ),
+    Form(
+        "cubic",
+        "polynomial of third degree in the driver, from -1 to 1 between two knots, as of a spring that hardens",
+        FormKind.LINE,
+        fixed(_AMPLITUDE, *(Coefficient(n, CoefficientRole.SLOPE, unit="g") for n in ("slope", "square", "cube"))),
+        ("signal",),
+        {"knots": None},
+        {"knots": "driver"},
+        static=_cubic,
     ),
     Form(
         "direction",

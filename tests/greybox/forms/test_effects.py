@@ -1,7 +1,9 @@
 """Effects: nothing at amplitude zero (to the bit), the stated law elsewhere, named errors."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ SETTINGS: dict[str, dict[str, float | tuple[float, ...]]] = {
     "polyline": {"knots": (1.0e-3, 1.2e-3, 1.6e-3, 1.9e-3)},
     "hinge": {"reference": 1.5e-3},
     "direction": {"scale": 1.5e-3},
+    "cubic": {"knots": (1.0e-3, 1.9e-3)},
     "span": {"middle": 1.5e-3},
     "lag": {"scale": 1e-6},
     "lags": {"scale": 1e-6},
@@ -48,8 +51,9 @@ def inputs(rows: int) -> np.ndarray:
 @pytest.mark.parametrize("form", FORMS)
 def test_an_effect_of_amplitude_zero_is_the_nominal_model_to_the_bit(cell: Model, form: str) -> None:
     u = inputs(60)
-    base = Stepper(cell, 1.0).simulate(steady_state(cell, u[0]).state, u)
     extended = cell.with_effects([effect(form)])
+    cell = replace(cell, max_step_s=extended.longest_step_s)
+    base = Stepper(cell, 1.0).simulate(steady_state(cell, u[0]).state, u)
     found = Stepper(extended, 1.0).simulate(steady_state(extended, u[0]).state, u)
     start = base.states[0]
     again = Stepper(extended, 1.0).simulate(np.concatenate([start, np.zeros(len(extended.states) - 9)]), u[1:])
@@ -170,3 +174,15 @@ def test_without_effects_is_the_model_before(cell: Model) -> None:
 def test_a_wrong_effect_is_one_clear_error(cell: Model, wrong: Callable[[Model], object], says: str) -> None:
     with pytest.raises(ModelError, match=says):
         wrong(cell)
+
+
+def test_a_cubic_law_is_the_polynomial_as_written() -> None:
+    """From -1 to 1 between the knots, and further beyond them: NumPy's polynomial is the reference."""
+    knots, coefficients = (2.0, 6.0), {"amplitude": 0.5, "slope": -1.0, "square": 0.25, "cube": 2.0}
+    law = FORMS["cubic"].static
+    assert law is not None
+    d, c = ca.SX.sym("d"), {n: ca.SX(v) for n, v in coefficients.items()}
+    found = ca.Function("g", [d], [law(d, c, {"knots": knots})])
+    for driver in (0.0, 2.0, 4.0, 5.5, 9.0):
+        expected = np.polynomial.Polynomial(list(coefficients.values()))((driver - 4.0) / 2.0)
+        assert float(found(driver)) == pytest.approx(expected, rel=1e-12)
