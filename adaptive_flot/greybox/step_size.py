@@ -14,6 +14,9 @@ from adaptive_flot.greybox.stepping.stepper import Stepper
 
 TOLERATED = 0.2
 """Error of the integration, in standard deviations of the noise, that changes nothing of what a record says."""
+SMALL = 1e-3
+"""Noise, as a share of the spread of an output, that is believed at most: a signal that oscillates within a few rows
+differs from row to row by far more than its noise."""
 LOOKED_AT = 3000
 """Most rows of a record that are looked at, from its first one on."""
 SHORTEST_SHARE = 1 / 64
@@ -25,8 +28,8 @@ def with_short_steps(
 ) -> Model:
     """The model, its `max_step_s` halved as often as the record asks for; as it is where its steps are short enough.
 
-    They are where half of them change no output by more than TOLERATED of its noise (root of the mean square over the
-    first LOOKED_AT rows). A run that leaves all bounds needs shorter ones. A model that no step helps stays as it is.
+    They are where half of them change no output by more than TOLERATED of its noise, or of SMALL of its spread where that
+    is less (root of the mean square over the first LOOKED_AT rows). A run that leaves all bounds needs shorter ones. A model that no step helps stays as it is.
 
     Parameters
     ----------
@@ -41,6 +44,8 @@ def with_short_steps(
     """
     part = record.rows(0, min(len(record), LOOKED_AT))
     own = model.steps_in(record.dt)
+    measured = part.outputs[:, list(columns)]
+    noise = np.minimum(noise, SMALL * np.nan_to_num(np.nanstd(measured, axis=0), nan=np.inf))
 
     def run(steps: int) -> FloatArray:
         simulator = RecordSimulator(model, part.dt, stepper=Stepper(model, part.dt, substeps=steps))

@@ -26,6 +26,8 @@ from adaptive_flot.greybox.quantities import FloatArray
 
 SHARPEST = 0.3
 """Least width over which a change turns with the sign of its driver, in scales of it: a jump has no derivative."""
+WIDEST = 10.0
+"""Largest such width, likewise: what changes over more of the driver's range does not turn with its sign."""
 LEAST_BLEND = 1e-6
 """A driver of a power law is taken as at least this share of its reference: keeps the logarithm finite."""
 
@@ -143,7 +145,7 @@ def _curve_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
 
 def _direction_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
     scale = number(settings, "scale")
-    width = Coefficient("width", CoefficientRole.BAND, scale, SHARPEST * scale, scale=scale, unit="driver")
+    width = Coefficient("width", CoefficientRole.BAND, scale, SHARPEST * scale, WIDEST * scale, scale, unit="driver")
     return _AMPLITUDE, Coefficient("turn", CoefficientRole.SLOPE, unit="g"), width
 
 
