@@ -17,6 +17,7 @@ verdict/      The word, its reasons, and how they are put.
 hypotheses/   Named hypotheses about several records: what has changed since a reference.
 innovations/  A second opinion with process noise: when something happened, and what it may be.
 discover.py   What is called for one record: the stages, one after the other.
+later_inputs.py  Whether inputs act one row later than a record says.
 stages.py     The stages, from the data to the proposed test.
 fallbacks.py  What is still told where the whole is not: a course, or a part.
 changes.py    What has changed since a reference, events too.

@@ -12,6 +12,7 @@ from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
+from adaptive_flot.discovery.later_inputs import with_later_inputs
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.discovery.stages import (
@@ -117,6 +118,10 @@ def discover(
         finer = _finer(ended, verdict)
     if finer is not None:
         verdict = _taken_back(verdict, finer)
+    later = with_later_inputs(ended, verdict)
+    if later is not None and time.monotonic() < state.search_ends:
+        progress("once more, with inputs moved by a row")
+        ended, verdict = _run(replace(state, model=ended.model, screening=Screening(later, (), ())))
     return ended.ended(replace(verdict, seconds=time.perf_counter() - began))
 
 

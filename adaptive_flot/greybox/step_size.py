@@ -28,8 +28,9 @@ def with_short_steps(
 ) -> Model:
     """The model, its `max_step_s` halved as often as the record asks for; as it is where its steps are short enough.
 
-    They are where half of them change no output by more than TOLERATED of its noise, or of SMALL of its spread where that
-    is less (root of the mean square over the first LOOKED_AT rows). A run that leaves all bounds needs shorter ones. A model that no step helps stays as it is.
+    They are where half of them change no output by more than TOLERATED of its noise, or of SMALL of its spread where
+    that is less (root of the mean square over the first LOOKED_AT rows). A run that leaves all bounds needs shorter
+    ones. A model that no step helps stays as it is.
 
     Parameters
     ----------

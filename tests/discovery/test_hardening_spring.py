@@ -6,10 +6,13 @@ left an error there, and a sensor that "shows 132 % too much" was named beside i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, ROWS, STEPS, NOISE = 1.0 / 600, 1500, 8, 2e-4
@@ -45,27 +48,36 @@ def oscillator() -> Model:
     )
 
 
-def record(cubic: float) -> Dataset:
+def record(cubic: float, rows: int = ROWS) -> Dataset:
     """A record with a force of the third power of the position, over the mass [1/(m2 s2)]."""
     rng = np.random.default_rng(1)
-    frequency = np.fft.rfftfreq(ROWS, DT)
+    frequency = np.fft.rfftfreq(rows, DT)
     phases = np.exp(2j * np.pi * rng.random(len(frequency)))
-    voltage = np.fft.irfft(np.where((frequency > 1) & (frequency < 150), phases, 0), ROWS)
-    voltage *= 0.045 / voltage.std() * np.linspace(0.3, 1.6, ROWS)
-    z, h, seen = np.zeros(2), DT / STEPS, np.zeros(ROWS)
+    voltage = np.fft.irfft(np.where((frequency > 1) & (frequency < 150), phases, 0), rows)
+    voltage *= 0.045 / voltage.std() * np.linspace(0.3, 1.6, rows)
+    z, h, seen = np.zeros(2), DT / STEPS, np.zeros(rows)
 
     def rate(z: np.ndarray, u: float) -> np.ndarray:
         return np.array([z[1], GAIN * u - STIFFNESS * z[0] - DAMPING * z[1] - cubic * z[0] ** 3])
 
-    for k in range(1, ROWS):
+    for k in range(1, rows):
         for _ in range(STEPS):
             a = rate(z, voltage[k])
             b = rate(z + h / 2 * a, voltage[k])
             c = rate(z + h / 2 * b, voltage[k])
             z = z + h / 6 * (a + 2 * b + 2 * c + rate(z + h * c, voltage[k]))
         seen[k] = z[0]
-    seen += NOISE * rng.standard_normal(ROWS)
-    return Dataset("oscillator", DT * np.arange(ROWS, dtype=float), DT, voltage[:, None], seen[:, None])
+    seen += NOISE * rng.standard_normal(rows)
+    return Dataset("oscillator", DT * np.arange(rows, dtype=float), DT, voltage[:, None], seen[:, None])
+
+
+def test_inputs_that_act_a_row_later_than_the_record_says_are_no_effect() -> None:
+    """A logger writes an input with what was measured when it was given. A drive that "answers late" was told."""
+    there = record(0.0, 500)
+    logged = replace(there, inputs=np.vstack([there.inputs[1:], there.inputs[-1:]]))
+    verdict = discover(oscillator(), logged).verdict
+    assert verdict.word == "none", verdict.reason
+    assert MOVED in verdict.notes and MOVED in verdict.reason
 
 
 @pytest.mark.parametrize("cubic", [7e5, 0.0])

@@ -10,6 +10,7 @@ import numpy as np
 from adaptive_flot.discovery.assessment.verification import block_rows, changes, whiteness
 from adaptive_flot.discovery.candidates.direction import against, listed
 from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
@@ -99,9 +100,11 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
 
 
 def _part_of_record(notes: Sequence[str]) -> str:
-    """A word on what a verdict is about, where a hole has left only one stretch of the record."""
+    """A word on what a verdict is about: where a hole has left only one stretch of the record, or inputs were moved."""
     left = next((note for note in notes if LONGEST_IS_USED in note), "")
-    return f"This is about a part of the record only: {left}." if left else ""
+    moved = next((note for note in notes if note == MOVED), "")
+    said = (f"This is about a part of the record only: {left}." if left else "", f"Note: {moved}." if moved else "")
+    return " ".join(filter(None, said))
 
 
 def _curves(state: State, effects: tuple[NamedEffect, ...]) -> tuple[EffectCurve, ...]:
