@@ -14,7 +14,7 @@ from adaptive_flot.greybox.stepping.stepper import Stepper
 
 TOLERATED = 0.2
 """Error of the integration, in standard deviations of the noise, that changes nothing of what a record says."""
-SMALL = 1e-3
+SMALL = 3e-3
 """Noise, as a share of the spread of an output, that is believed at most: a signal that oscillates within a few rows
 differs from row to row by far more than its noise."""
 LOOKED_AT = 3000
