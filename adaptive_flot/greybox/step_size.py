@@ -46,7 +46,8 @@ def with_short_steps(
     part = record.rows(0, min(len(record), LOOKED_AT))
     own = model.steps_in(record.dt)
     measured = part.outputs[:, list(columns)]
-    noise = np.minimum(noise, SMALL * np.nan_to_num(np.nanstd(measured, axis=0), nan=np.inf))
+    spread = np.nan_to_num(np.nanstd(measured, axis=0))
+    noise = np.minimum(noise, np.where(spread > 0, SMALL * spread, np.inf))
 
     def run(steps: int) -> FloatArray:
         simulator = RecordSimulator(model, part.dt, stepper=Stepper(model, part.dt, substeps=steps))

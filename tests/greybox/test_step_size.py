@@ -5,6 +5,8 @@ A run in steps that are too long leaves a discrepancy, which a search would take
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -86,3 +88,11 @@ def test_steps_are_shorter_beside_an_effect_that_turns_with_a_sign() -> None:
     short = checked(model)
     assert short.steps_in(1.0) > model.steps_in(1.0)
     assert short.steps_in(1.0) == round(4 * 1.0 / short.max_step_s)
+
+
+def test_a_signal_that_oscillates_within_a_few_rows_is_not_taken_for_its_noise() -> None:
+    """Its differences from row to row are as large as itself, and so is the noise that they seem to show."""
+    model, wave = lag(0.6, 1.0), np.where(np.arange(ROWS) % 2, 1.0, -1.0)[:, None]
+    there = replace(record(), inputs=wave, outputs=wave)
+    short = with_short_steps(model, there, np.zeros(1), model.parameter_values, [0], np.array([2.0]))
+    assert short.steps_in(1.0) > model.steps_in(1.0)
