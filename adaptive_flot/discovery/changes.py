@@ -90,7 +90,7 @@ def _found(
     if left <= 0:
         said = "The budget ended before events, effects of other shapes and two effects were looked for."
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, said)))
-    elif is_short(records[0], model):
+    elif is_short(records[0], compared.calibration.model):
         judged = _row_by_row(compared, records[0], references, processes, progress, began)
     elif _leaves_more(compared.verdict):
         judged = _unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adaptive_flot.discovery.fitting.step_length import steps_words
 from adaptive_flot.greybox import Dataset, Effect, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.step_size import TOLERATED, with_short_steps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -96,3 +97,15 @@ def test_a_signal_that_oscillates_within_a_few_rows_is_not_taken_for_its_noise()
     there = replace(record(), inputs=wave, outputs=wave)
     short = with_short_steps(model, there, np.zeros(1), model.parameter_values, [0], np.array([2.0]))
     assert short.steps_in(1.0) > model.steps_in(1.0)
+
+
+def test_steps_that_are_far_too_short_are_made_longer_where_that_changes_next_to_nothing() -> None:
+    """A longest step that nobody has set is a second: rows of a minute would take sixty steps."""
+    model = lag(20.0, 1.0 / 64)
+    noise, p = np.array([NOISE]), model.parameter_values
+    longer = with_short_steps(model, record(), np.zeros(1), p, [0], noise, longer=True)
+    assert checked(model) is model
+    assert longer.steps_in(1.0) == 4
+    run = RecordSimulator(longer, 1.0).outputs(record(), np.zeros(1), model.parameter_values)[:, 0]
+    assert np.sqrt(np.mean((run - exact(20.0)) ** 2)) <= 0.03 * NOISE
+    assert steps_words(model, longer) == ()

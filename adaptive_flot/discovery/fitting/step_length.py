@@ -15,7 +15,7 @@ from adaptive_flot.greybox.step_size import with_short_steps
 
 
 def steps_for(problem: Problem, model: Model, fit: Fit | None = None) -> Model:
-    """The model, its `max_step_s` as short as the record asks for; see `with_short_steps`.
+    """The model, its `max_step_s` as the record asks for; shorter only, along a fit. See `with_short_steps`.
 
     The error of the integration is looked at along the run from the model's own values, or along that of a fit of the
     model with or without effects. A discrepancy that the integration makes is else taken for one of the plant.
@@ -26,13 +26,14 @@ def steps_for(problem: Problem, model: Model, fit: Fit | None = None) -> Model:
     else:
         run, state, parameters = fit.model, fit.initial_state, parameters_of(fit)
     noise = np.maximum(noise_by_differences(problem.measured), problem.floor)
-    short = with_short_steps(run, problem.record, state, parameters, problem.columns, noise)
+    longer = fit is None  # once, before anything is fitted
+    short = with_short_steps(run, problem.record, state, parameters, problem.columns, noise, longer=longer)
     return model if short is run else replace(model, max_step_s=short.max_step_s)
 
 
 def steps_words(given: Model, used: Model) -> tuple[str, ...]:
     """A word on steps that were made shorter; none where they were not."""
-    if used.max_step_s == given.max_step_s:
+    if used.max_step_s >= given.max_step_s:
         return ()
     return (
         f"max_step_s={given.max_step_s:g} of model '{given.name}' is too long for this record: the integration errs by "

@@ -112,9 +112,7 @@ def compare(
         raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
     free = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
     columns = measured_columns(model, (*records, *references))
-    for record in (*references, *records):
-        start, noise = first_states(model, [record])[0], noise_floor([record], columns)
-        model = with_short_steps(model, record, start, model.parameter_values, columns, noise)
+    model = _with_steps_for(model, (*references, *records), columns)
     progress("fit the constants")
     calibration = calibrate(model, references or records, free, columns, records, local=bool(references))
     sizes = [calibration.usual.sizes(r) for r in records] if references else calibration.rows.sizes
@@ -154,6 +152,16 @@ def compare(
     return Comparison(
         verdict, extended, calibration, rows, blocks, null, tested, judged, len(candidates), bool(references)
     )
+
+
+def _with_steps_for(model: Model, records: Sequence[Dataset], columns: Sequence[int]) -> Model:
+    """The model in the steps that the record asks for which needs the shortest."""
+
+    def asked(record: Dataset) -> Model:
+        start, noise = first_states(model, [record])[0], noise_floor([record], columns)
+        return with_short_steps(model, record, start, model.parameter_values, columns, noise, longer=True)
+
+    return min(map(asked, records), key=lambda m: m.max_step_s)
 
 
 def _candidates(calibration: Calibration, base: JointFit, rows: Rows, reference: bool) -> tuple[Hypothesis, ...]:

@@ -15,13 +15,16 @@ from adaptive_flot.greybox.model import Model
 
 MOST_WORK = 4_000
 """Rows times states up to which a record is taken as it is."""
+USUAL_STEPS = 8
+"""Integration steps a row up to which these make little difference."""
 FEWEST_ROWS = 500
 """Fewest rows that may be left of a longer record, which is thinned to as much work: fewer show no event."""
 
 
 def is_short(record: Dataset, model: Model) -> bool:
-    """Whether a record is short enough for the innovations form as it is."""
-    return len(record) * len(model.states) <= MOST_WORK
+    """Whether a record is short enough for the innovations form as it is; that of a stiff model takes longer."""
+    stiff = max(1.0, model.steps_in(record.dt) / USUAL_STEPS)
+    return len(record) * len(model.states) * stiff <= MOST_WORK
 
 
 def searchable(record: Dataset, model: Model) -> Dataset | None:
