@@ -33,6 +33,7 @@ from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
+from adaptive_flot.discovery.not_new import why_not_new
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.discovery.searched_change import AT_NOISE, with_searched_effect
@@ -96,7 +97,8 @@ def _found(
         judged = _unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))
     else:
         judged = compared
-    return _unless_much_is_left(judged)
+    why = why_not_new(judged, confirmed=is_short(records[0], compared.calibration.model))
+    return _taken_back(judged, why, "is missing") if why else _unless_much_is_left(judged)
 
 
 def _row_by_row(

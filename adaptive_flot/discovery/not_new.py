@@ -1,0 +1,54 @@
+"""What is no change since a reference: it is on the reference as well, or so small that what wanders may be it."""
+
+from __future__ import annotations
+
+from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
+from adaptive_flot.discovery.hypotheses.families import EVENTS
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN
+from adaptive_flot.discovery.searched_change import AT_NOISE, SEARCHED
+
+AS_LARGE = 0.5
+"""A fault is the same on the reference where it is at least so many times as large there, and goes the same way."""
+
+
+def why_not_new(compared: Comparison, confirmed: bool) -> str:
+    """Why what is named or in a class is no change; empty where it may be one.
+
+    Parameters
+    ----------
+    compared
+        The comparison with a reference.
+    confirmed
+        Whether the innovations form has been asked whether it knows the name.
+    """
+    verdict = compared.verdict
+    if verdict.word not in ("named", "class"):
+        return ""
+    if _is_there_before(compared):
+        return "it explains the reference as well, so that the model lacks it there too"
+    calibration = compared.calibration
+    wanders = bool((calibration.usual.overall > AT_NOISE * calibration.noise).any())
+    if wanders and not confirmed and all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
+        return "errors are not far above those of the reference, which are more than noise: what wanders may do that"
+    return ""
+
+
+def _is_there_before(compared: Comparison) -> bool:
+    """Whether the best hypothesis explains the reference, too, and about as large: a plant has it on all records.
+
+    The constants of the reference hide most of what the model lacks there, and other inputs bring it to light.
+    """
+    best, calibration = compared.judged.best, compared.calibration
+    h = best.hypothesis if best is not None else None
+    if best is None or h is None or h.kind in (*EVENTS, SEARCHED) or not h.free:
+        return False
+    base = fit_all_rows(calibration.model, calibration.rows, None, calibration.constants, None)
+    if base is None:
+        return False
+    there = fit_all_rows(calibration.model, calibration.rows, h, calibration.constants, base.fit)
+    if there is None or base.fit.cost - there.fit.cost < 2 * LEAST_GAIN:
+        return False
+    sizes = ((there.fit.value(n), best.fit.value(n)) for n in h.parameters)
+    return all(before * now > 0 and abs(before) >= AS_LARGE * abs(now) for before, now in sizes)
