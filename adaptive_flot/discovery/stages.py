@@ -33,6 +33,7 @@ from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.discovery.results import State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
+from adaptive_flot.discovery.search.mirrored import with_mirrored_lags
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.search.search import first_round, search
 from adaptive_flot.discovery.test_design.experiment import TEST_ROWS, leading, plan_experiment
@@ -218,6 +219,7 @@ def compare_with_common_nuisance(state: State) -> State:
 def judge_alternatives(state: State) -> State:
     """Turn the ranking into one of six words; what is named must itself stand on the confirm split."""
     problem, result = state.searched
+    result = with_mirrored_lags(problem, result)
     result = first_that_stands(problem, result)
     result, judgement = held_up(problem, result, judge(result))
     result, judgement = without_idle_effects(problem, result, judgement)

@@ -9,6 +9,7 @@ alternatives.py        Which candidates are worth a full fit, and that fit.
 fit_jobs.py            Which fits are made in a round.
 successive_halving.py  Refits in rounds, the worse half left out of the next.
 substance.py           Whether a further effect brings enough to be worth it.
+mirrored.py            Lags of all inputs beside lags of all outputs.
 simplify.py            A dependence that has become flat, tried as a constant.
 joint_search.py        Several effects at once.
 joint_fits.py          Fits of combinations from scattered starts.
