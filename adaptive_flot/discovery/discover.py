@@ -136,8 +136,13 @@ def _run(state: State) -> tuple[State, Verdict]:
 
 
 def _finer(state: State, verdict: Verdict) -> Model | None:
-    """The model with steps as short as what is told asks for; None where it has them, and where nothing is told."""
+    """The model with steps as short as what is told asks for; None where it has them, and where nothing is told.
+
+    The edges of an event in time fall between steps, whose length moves them a little: no stiffness.
+    """
     if verdict.word not in ("named", "class", "unnamed") or state.problem is None or state.after is None:
+        return None
+    if any(e.driver == "time" for e in state.after.model.effects):
         return None
     finer = steps_for(state.problem, state.model, state.after)
     return None if finer is state.model else finer

@@ -18,8 +18,8 @@ def long(rows: int) -> Dataset:
     return Dataset("long", np.arange(rows, dtype=float), 1.0, np.ones((rows, 1)), np.zeros((rows, 1)))
 
 
-def of_states(count: int) -> Any:
-    return SimpleNamespace(states=range(count))
+def of_states(count: int, steps: int = 1) -> Any:
+    return SimpleNamespace(states=range(count), steps_in=lambda dt: steps)
 
 
 def test_a_short_record_is_taken_as_it_is() -> None:
@@ -53,3 +53,9 @@ def test_the_rows_kept_are_those_that_the_thinned_inputs_lead_to(apart: int) -> 
     full = RecordSimulator(model(), DT).outputs(data, start, p)[::apart]
     fast = RecordSimulator(model(), apart * DT).outputs(thin, start, p)
     np.testing.assert_allclose(fast, full, atol=0.02 * np.ptp(full))
+
+
+def test_a_stiff_model_makes_a_record_long() -> None:
+    """Each row then takes many integration steps, and the innovations form as many times as long."""
+    assert is_short(long(1200), of_states(3, steps=8))
+    assert not is_short(long(1200), of_states(3, steps=18))
