@@ -6,9 +6,10 @@ from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN
 from adaptive_flot.discovery.searched_change import AT_NOISE, SEARCHED
 
+EXPLAINS = 0.7
+"""A fault explains the reference where it leaves at most so much of its criterion: another one takes a few per cent."""
 AS_LARGE = 0.5
 """A fault is the same on the reference where it is at least so many times as large there, and goes the same way."""
 
@@ -48,7 +49,7 @@ def _is_there_before(compared: Comparison) -> bool:
     if base is None:
         return False
     there = fit_all_rows(calibration.model, calibration.rows, h, calibration.constants, base.fit)
-    if there is None or base.fit.cost - there.fit.cost < 2 * LEAST_GAIN:
+    if there is None or there.fit.cost > EXPLAINS * base.fit.cost:
         return False
     sizes = ((there.fit.value(n), best.fit.value(n)) for n in h.parameters)
     return all(before * now > 0 and abs(before) >= AS_LARGE * abs(now) for before, now in sizes)
