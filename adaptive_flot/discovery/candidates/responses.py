@@ -211,6 +211,8 @@ class Responses:
 
     def absorbed_constants(self) -> frozenset[tuple[str, str]]:
         """Sites, each with a mode, whose constant change all that is free already takes up, but for rounding."""
+        if not self.nuisance.size:
+            return frozenset()
         names: list[tuple[str, Mode]] = [(s, mode) for s in self.sites for mode in ("factor", "offset")]
         ones = np.ones(len(self.problem.record))
         responses = self.of([TimeProfile(s, ones, mode == "offset") for s, mode in names])
