@@ -98,7 +98,7 @@ def _found(
     else:
         judged = compared
     why = why_not_new(judged, confirmed=is_short(records[0], compared.calibration.model))
-    return _taken_back(judged, why, "is missing") if why else _unless_much_is_left(judged)
+    return _taken_back(judged, why, said="No change is told") if why else _unless_much_is_left(judged)
 
 
 def _row_by_row(
@@ -239,12 +239,13 @@ def _noise_where_right(compared: Comparison) -> dict[str, float]:
     return {calibration.model.outputs[c].name: float(s) for c, s in zip(columns, level, strict=True)}
 
 
-def _taken_back(compared: Comparison, why: str, changed: str = "has changed") -> Comparison:
+def _taken_back(compared: Comparison, why: str, changed: str = "has changed", said: str = "") -> Comparison:
     """The comparison without its name, and why."""
     word: Literal["abstain"] = "abstain"
     verdict = compared.verdict
     nearest = verdict.reason[:1].lower() + verdict.reason[1:]
-    reason = f"Something {changed}, and it is not told what: {why}. The nearest: {nearest}"
+    said = said or f"Something {changed}, and it is not told what"
+    reason = f"{said}: {why}. The nearest: {nearest}"
     return replace(
         compared,
         verdict=replace(verdict, word=word, reason=reason, effects=(), members=()),
