@@ -10,6 +10,8 @@ from adaptive_flot.discovery.searched_change import AT_NOISE, SEARCHED
 
 EXPLAINS = 0.7
 """A fault explains the reference where it leaves at most so much of its criterion: another one takes a few per cent."""
+NEARLY_ALL = 0.9
+"""Share of what is above the usual errors that a name takes which needs no more."""
 AS_LARGE = 0.5
 """A fault is the same on the reference where it is at least so many times as large there, and goes the same way."""
 
@@ -31,8 +33,12 @@ def why_not_new(compared: Comparison, confirmed: bool) -> str:
         return "it explains the reference as well, so that the model lacks it there too"
     calibration = compared.calibration
     wanders = bool((calibration.usual.overall > AT_NOISE * calibration.noise).any())
-    if wanders and not confirmed and all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
-        return "errors are not far above those of the reference, which are more than noise: what wanders may do that"
+    little = all(c.before <= FAR_ABOVE * c.noise for c in verdict.error)
+    if wanders and not confirmed and little and not compared.judged.explained >= NEARLY_ALL:
+        return (
+            "errors are not far above those of the reference, which are more than noise, and it does not explain nearly "
+            "all of that: what wanders may do that"
+        )
     return ""
 
 
