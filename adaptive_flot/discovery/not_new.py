@@ -36,8 +36,8 @@ def why_not_new(compared: Comparison, confirmed: bool) -> str:
     little = all(c.before <= FAR_ABOVE * c.noise for c in verdict.error)
     if wanders and not confirmed and little and not compared.judged.explained >= NEARLY_ALL:
         return (
-            "errors are not far above those of the reference, which are more than noise, and it does not explain nearly "
-            "all of that: what wanders may do that"
+            "errors are not far above those of the reference, which are more than noise, and it does not explain "
+            "nearly all of that: what wanders may do that"
         )
     return ""
 
