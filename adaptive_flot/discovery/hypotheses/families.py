@@ -127,10 +127,14 @@ def hypotheses(
         Sampling interval and length of the shortest record [s].
     """
     there = {e.label for e in model.effects}
+    amounts = [h for site in model.sites if (h := _amount(model, site, seen)) is not None]
     each = [
-        _at_site(model, site, seen[site.name], drivers, dt, duration)
-        for site in model.sites
-        if np.isfinite(seen[site.name]).all()
+        amounts,
+        *(
+            _at_site(model, site, seen[site.name], drivers, dt, duration)
+            for site in model.sites
+            if np.isfinite(seen[site.name]).all()
+        ),
     ]
     return tuple(h for some in each for h in some if h.effect.label not in there)
 
@@ -256,6 +260,19 @@ def _offset(site: Site, spread: float) -> Hypothesis:
         offset_limits(spread),
         {"amplitude": MATTERS * spread},
     )
+
+
+def _amount(model: Model, site: Site, seen: Mapping[str, FloatArray]) -> Hypothesis | None:
+    """A constant amount at a site of a balance whose own value is zero: a leak, a load, a heat that nobody counts.
+
+    Its scale is the ordinary size of the other sites of its unit; none where there is none.
+    """
+    if site.role not in ("process", "flow", "feed") or site.mode != "offset" or np.any(seen[site.name] != 0):
+        return None
+    others = [s for s in model.sites if s.unit == site.unit and s.role != "sensor"]
+    sizes = [float(np.median(np.abs(seen[s.name]))) for s in others if np.isfinite(seen[s.name]).all()]
+    size = max(sizes, default=0.0)
+    return replace(_offset(site, size), limits={}) if size > 0 else None
 
 
 def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:
