@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery import searched_change
 from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
@@ -83,12 +84,13 @@ def test_dry_friction_is_named_with_its_size_and_only_where_it_is(dry: float, st
     assert verdict.error[0].after < 1.5 * NOISE
 
 
-def test_dry_friction_that_came_since_a_reference_has_changed() -> None:
+def test_dry_friction_that_came_since_a_reference_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Single faults of the whole record find it; the search finds its size, to the noise of the encoder.
 
     The model alone explains nothing of such a record, and no regression does: it is an integrator. The reference has
     shown that it can.
     """
+    monkeypatch.setattr(searched_change, "MOST_SECONDS", 600.0)  # a machine under load searches as far
     verdict = find_changes(drive(), [record(15.0)], [replace(record(0.0), name="old")]).verdict
     assert verdict.word == "named", verdict.reason
     (told,) = verdict.effects
