@@ -19,6 +19,7 @@ filtering/           A model in innovations form: extended Kalman filter, smooth
 data/                Measured tables.
 assumed_start.py     What is said of a record that does not start where its model assumes.
 steady_state.py      Steady states and their sensitivities.
+step_size.py         Integration steps as short as a record asks for, and no shorter.
 linear.py            State space at an operating point (imports python-control, so it is not part of this front).
 cramer_rao_bound.py  Posterior Cramer-Rao bound: the smallest error that any estimator can have.
 """
