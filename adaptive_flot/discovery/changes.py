@@ -87,17 +87,18 @@ def _found(
         return compared
     if len(records) != 1:
         return _unless_much_is_left(compared)
+    short = is_short(records[0], compared.calibration.model)
     left = float("inf") if budget is None else began + budget - time.perf_counter()
     if left <= 0:
         said = "The budget ended before events, effects of other shapes and two effects were looked for."
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, said)))
-    elif is_short(records[0], compared.calibration.model):
+    elif short:
         judged = _row_by_row(compared, records[0], references, processes, progress, began)
     elif _leaves_more(compared.verdict):
         judged = _unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))
     else:
         judged = compared
-    why = why_not_new(judged, confirmed=is_short(records[0], compared.calibration.model))
+    why = why_not_new(judged, confirmed=short)
     return _taken_back(judged, why, said="No change is told") if why else _unless_much_is_left(judged)
 
 

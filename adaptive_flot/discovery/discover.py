@@ -113,7 +113,7 @@ def discover(
         progress("once more, in shorter steps")
         noted = replace(record, notes=(*record.notes, *steps_words(model, finer)))
         screening = Screening(noted, (), ())
-        ended, verdict = _run(replace(state, model=finer, screening=screening))
+        ended, verdict = _run(replace(state, model=finer, screening=screening, steps_stay=True))
     else:
         finer = _finer(ended, verdict)
     if finer is not None:
@@ -121,7 +121,7 @@ def discover(
     later = with_later_inputs(ended, verdict)
     if later is not None and time.monotonic() < state.search_ends:
         progress("once more, with inputs moved by a row")
-        ended, verdict = _run(replace(state, model=ended.model, screening=Screening(later, (), ())))
+        ended, verdict = _run(replace(state, model=ended.model, screening=Screening(later, (), ()), steps_stay=True))
     return ended.ended(replace(verdict, seconds=time.perf_counter() - began))
 
 

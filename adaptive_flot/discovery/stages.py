@@ -81,7 +81,7 @@ def split_rows(state: State) -> State:
 def fit_model_as_it_is(state: State) -> State | Verdict:
     """Fit the model without any effect: the base of every comparison."""
     began = time.monotonic()
-    model = steps_for(state.known_problem, state.model)
+    model = steps_for(state.known_problem, state.model, longer=not state.steps_stay)
     prepared = prepare(state.known_problem, model)
     again = model if prepared is None else steps_for(prepared[0], model, prepared[1])
     if again is not model:

@@ -14,8 +14,8 @@ from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.step_size import with_short_steps
 
 
-def steps_for(problem: Problem, model: Model, fit: Fit | None = None) -> Model:
-    """The model, its `max_step_s` as the record asks for; shorter only, along a fit. See `with_short_steps`.
+def steps_for(problem: Problem, model: Model, fit: Fit | None = None, *, longer: bool = False) -> Model:
+    """The model, its `max_step_s` as the record asks for; made `longer` where that is said. See `with_short_steps`.
 
     The error of the integration is looked at along the run from the model's own values, or along that of a fit of the
     model with or without effects. A discrepancy that the integration makes is else taken for one of the plant.
@@ -26,7 +26,6 @@ def steps_for(problem: Problem, model: Model, fit: Fit | None = None) -> Model:
     else:
         run, state, parameters = fit.model, fit.initial_state, parameters_of(fit)
     noise = np.maximum(noise_by_differences(problem.measured), problem.floor)
-    longer = fit is None  # once, before anything is fitted
     short = with_short_steps(run, problem.record, state, parameters, problem.columns, noise, longer=longer)
     return model if short is run else replace(model, max_step_s=short.max_step_s)
 

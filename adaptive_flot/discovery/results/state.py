@@ -40,6 +40,8 @@ class State:
         The record, and from the first stage on what in it can not be used.
     referred
         Whether a reference has shown that the model explains such records.
+    steps_stay
+        Whether the model has the steps that an effect has asked for, which are not made longer again.
     ends, search_ends
         When everything, and when the search, is to end, by `time.monotonic` [s].
     base_seconds
@@ -88,6 +90,7 @@ class State:
     progress: Callable[[str], None]
     screening: Screening
     referred: bool = False
+    steps_stay: bool = False
     ends: float = float("inf")
     search_ends: float = float("inf")
     base_seconds: float = 0.0
