@@ -272,8 +272,6 @@ def discover(
     several = len(records) > 1 or bool(references)
     if several and limits:
         raise ModelError("limits: no test is proposed with a reference or for several records; leave them out")
-    if len(records) > 1 and budget is not None:
-        raise ModelError("budget: several records are judged as a whole; leave it out")
     made, origin = read_model(model)
     made = replace(made, record_code=compiled)
     sources = (*(file for r in (*records, *references) for file in record_files(r, tag_map)), *origin.files)

@@ -39,7 +39,7 @@ def discover(
     ] = None,
     budget: Annotated[
         float | None,
-        typer.Option(min=1.0, help="Seconds after which the search in one record ends with what it has come to."),
+        typer.Option(min=1.0, help="Seconds after which the search ends with what it has come to."),
     ] = None,
     compile_: Annotated[
         bool,
@@ -70,8 +70,6 @@ def discover(
     limits, several = read_limits(limit or ()), bool(references) or len(data) > 1
     if several and limits:
         raise ModelError("--limit: no test is proposed with a reference or for several records; leave it out")
-    if len(data) > 1 and budget is not None:
-        raise ModelError("--budget: several records are judged as a whole; leave it out")
     tag_map = None if map_ is None else load_tag_map(map_)
     made = replace(make_model(model, cell=cell, folder=first.parent), record_code=compile_)
     workers, page = processes or available_processes(), folder / "report.html"

@@ -43,6 +43,7 @@ from adaptive_flot.greybox.model import Model
 
 MUCH_LEFT = 4.0
 """An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
+SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
 LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
 
@@ -60,14 +61,15 @@ def find_changes(
 ) -> Comparison:
     """Find what has changed since a reference, or what a model lacks in several records of one process.
 
-    Arguments and errors are those of `compare`. With one record, `budget` is the time [s] after which nothing more is
-    searched for; None for as long as it takes. The hypotheses of the whole record are always compared. Events, and
-    causes beside what wanders, are looked for where there are one record and a reference. What is wrong with the data
-    is among the notes.
+    Arguments and errors are those of `compare`. `budget` is the time [s] after which nothing more is searched for; None
+    for as long as it takes. Where it ends before all hypotheses of the whole record are compared, nothing is named.
+    Events, and causes beside what wanders, are looked for where there are one record and a reference. What is wrong
+    with the data is among the notes.
     """
-    compared = _found(model, records, references, adapted, processes, progress, budget)
+    ends = float("inf") if budget is None else time.monotonic() + budget
+    compared = _found(model, records, references, adapted, processes, progress, ends)
     if not references and len(records) > 1:
-        compared = unless_an_event(compared, model, records, adapted, processes, progress)
+        compared = unless_an_event(compared, model, records, adapted, processes, progress, ends)
     return _with_words_on_data(compared, model, records, bool(references))
 
 
@@ -78,27 +80,29 @@ def _found(
     adapted: Sequence[str],
     processes: int,
     progress: Callable[[str], None],
-    budget: float | None,
+    ends: float,
 ) -> Comparison:
-    """What has changed, without a word on the data."""
-    began = time.perf_counter()
-    compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress)
+    """What has changed, without a word on the data; `ends` is the `time.monotonic` at which a budget is spent."""
+    compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress, ends=ends)
+    if not compared.complete:
+        why = f"the budget ended before all {compared.tried} hypotheses were compared"
+        return _taken_back(compared, why, said="Nothing is told")
     if not references or compared.verdict.word == "insufficient":
         return compared
     if len(records) != 1:
         return _unless_much_is_left(compared)
-    short = is_short(records[0], compared.calibration.model)
-    left = float("inf") if budget is None else began + budget - time.perf_counter()
+    short, left = is_short(records[0], compared.calibration.model), ends - time.monotonic()
+    judged: Comparison | None = compared
     if left <= 0:
-        said = "The budget ended before events, effects of other shapes and two effects were looked for."
-        judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, said)))
+        judged = None
     elif short:
-        judged = _row_by_row(compared, records[0], references, processes, progress, began)
+        judged = _row_by_row(compared, records[0], references, processes, progress, ends)
     elif _leaves_more(compared.verdict):
         judged = _unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))
-    else:
-        judged = compared
-    why = why_not_new(judged, confirmed=short)
+    confirmed = short and judged is not None
+    if judged is None:
+        judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, SPENT)))
+    why = why_not_new(judged, confirmed)
     return _taken_back(judged, why, said="No change is told") if why else _unless_much_is_left(judged)
 
 
@@ -108,13 +112,16 @@ def _row_by_row(
     references: Sequence[Dataset],
     processes: int,
     progress: Callable[[str], None],
-    began: float,
-) -> Comparison:
-    """The comparison with what the innovations form tells, and without what it does not know."""
-    reference = max(references, key=len)
+    ends: float,
+) -> Comparison | None:
+    """The comparison with what the innovations form tells, and without what it does not know; None without the time."""
+    began, reference = time.perf_counter(), max(references, key=len)
     with np.errstate(all="ignore"):
-        search, base, told, sole, before = _with_process_noise(compared, record, reference, processes, progress)
-        seconds = time.perf_counter() - began
+        known = _with_process_noise(compared, record, reference, processes, progress, ends)
+        if known is None:
+            return None
+        search, base, told, sole, before = known
+        seconds = compared.verdict.seconds + time.perf_counter() - began
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         with_it = compared
         if _has_event(told):
@@ -136,6 +143,7 @@ def unless_an_event(
     adapted: Sequence[str],
     processes: int,
     progress: Callable[[str], None],
+    ends: float = float("inf"),
 ) -> Comparison:
     """The comparison, its name taken back where the longest record alone is explained by what happened at some time.
 
@@ -144,7 +152,8 @@ def unless_an_event(
     if compared.verdict.word not in ("named", "class"):
         return compared
     longest = max(records, key=len)
-    alone = discover(model, longest, adapted=adapted, processes=processes, progress=progress).verdict
+    budget = None if ends == float("inf") else max(ends - time.monotonic(), 0.0)
+    alone = discover(model, longest, adapted=adapted, processes=processes, progress=progress, budget=budget).verdict
     if alone.word != "named" or not alone.effects or any(e.effect.driver != "time" for e in alone.effects):
         return compared
     said = alone.reason.partition(". ")[0]
@@ -256,27 +265,36 @@ def _taken_back(compared: Comparison, why: str, changed: str = "has changed", sa
 
 
 def _with_process_noise(
-    compared: Comparison, record: Dataset, reference: Dataset, processes: int, progress: Callable[[str], None]
-) -> tuple[Search, Explanation, Told, Told | None, tuple[Search, Explanation]]:
+    compared: Comparison,
+    record: Dataset,
+    reference: Dataset,
+    processes: int,
+    progress: Callable[[str], None],
+    ends: float,
+) -> tuple[Search, Explanation, Told, Told | None, tuple[Search, Explanation]] | None:
     """What has changed, by a model that has what the reference lacks; both searches with the model as it is.
 
-    Of explanations of two effects also what is certain alone.
+    Of explanations of two effects also what is certain alone. None where the time was up before.
     """
     calibration, columns = compared.calibration, compared.rows.columns
     constants, model = calibration.constants, calibration.model
     floor = noise_floor([reference], columns)
     progress("what the reference lacks")
-    before = Search(model, reference, columns, floor, constants.names, constants, processes, LACKING)
+    before = Search(model, reference, columns, floor, constants.names, constants, processes, LACKING, ends=ends)
     start = before.base(model.parameter_values)
     lacking = judge(before, start, before.run(start))
+    if before.time_is_up:
+        return None
     explanation = lacking.best if lacking.word == "named" else start
     extended = before.model_of(explanation)
     where = extended.indices("parameters", constants.names)
     known = Constants(constants.names, extended.parameter_values[list(where)], constants.root)
     progress("events in the new record")
-    search = Search(extended, record, columns, floor, constants.names, known, processes, ramps=True)
+    search = Search(extended, record, columns, floor, constants.names, known, processes, ramps=True, ends=ends)
     base = search.base(extended.parameter_values)
     found = search.run(base, progress)
+    if search.time_is_up:
+        return None
     before = replace(before, model=extended)
     there = before.base(extended.parameter_values)
     told = _changed(judge(search, base, found), search, before, there)

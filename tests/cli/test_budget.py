@@ -1,4 +1,4 @@
-"""`discover --budget`: a verdict in words, and no budget where it has no meaning."""
+"""`discover --budget`: a verdict in words, of one record and of several; and what is no budget."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from adaptive_flot.discovery.changes import find_changes
 from tests.cli.conftest import Call
 from tests.cli.test_discover import write_tank
+from tests.discovery.hypotheses.tank import record, tank
 
 
-def test_several_records_take_no_budget(call: Call, tmp_path: Path) -> None:
+def test_a_budget_bounds_several_records_too(call: Call, tmp_path: Path) -> None:
+    """A budget of no time at all names nothing; the command line takes one for several records, as for one."""
     write_tank(tmp_path)
-    result = call("discover", "tank.csv", "tank.csv", "--model", "heated:make_model", "--budget", "5")
-    assert result.code == 2 and "--budget" in result.err and len(result.err.splitlines()) == 1
+    result = call("discover", "tank.csv", "tank.csv", "--model", "heated:make_model", "--budget", "1", "--no-report")
+    assert result.code == 0 and result.err == ""
+    spent = find_changes(tank(), [record("a", 1), record("b", 2)], budget=1e-6).verdict
+    assert spent.word == "abstain" and "the budget ended before all" in spent.reason
 
 
 @pytest.mark.parametrize("seconds", ["0", "-3", "soon"])

@@ -13,6 +13,8 @@ import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.record.moved_inputs import MOVED
+from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.discovery.verdict.sizes import words_of_effects
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, ROWS, STEPS, NOISE = 1.0 / 600, 1500, 8, 2e-4
@@ -83,7 +85,8 @@ def test_inputs_that_act_a_row_later_than_the_record_says_are_no_effect() -> Non
 @pytest.mark.parametrize("cubic", [7e5, 0.0])
 def test_a_hardening_spring_is_a_force_over_the_position_and_nothing_else(cubic: float) -> None:
     """Spring and damper are forces of one balance: over the position, they are the same term by two names."""
-    verdict = discover(oscillator(), record(cubic)).verdict
+    found = discover(oscillator(), record(cubic))
+    verdict = found.verdict
     if not cubic:
         assert verdict.word == "none", verdict.reason
         return
@@ -92,3 +95,14 @@ def test_a_hardening_spring_is_a_force_over_the_position_and_nothing_else(cubic:
     assert ("spring", "position") in told
     assert told <= {("spring", "position"), ("damper", "position"), ("drive", "position")}
     assert verdict.error[0].after < 1.2 * NOISE
+    # the straight part of the law is the fitted stiffness: the picture shows the bend alone, and its band holds it
+    assert found.problem is not None and found.told is not None
+    (curve,) = effect_curves(found.problem, found.told, 1)
+    assert curve.bend_only and curve.anchor is not None
+    sign = -1 if curve.effect.site == "drive" else 1
+    truth = sign * cubic * (curve.driver**3 - curve.anchor**3 - 3 * curve.anchor**2 * (curve.driver - curve.anchor))
+    np.testing.assert_allclose(curve.change, truth, atol=0.02 * np.max(np.abs(truth)))
+    assert np.all(np.abs(curve.change - truth) < np.maximum(2 * (curve.high - curve.change), 1e-3 * np.max(truth)))
+    assert "than a straight line through the middle says" in words_of_effects(
+        found.told.model, verdict.effects, [curve]
+    )

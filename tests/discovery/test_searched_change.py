@@ -3,9 +3,11 @@ not changed."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
 from adaptive_flot.discovery import changes
@@ -51,8 +53,37 @@ def test_a_gradual_change_is_told_with_its_times_and_as_one_since_the_reference(
 @pytest.mark.usefixtures("long_records")
 def test_a_budget_that_is_spent_leaves_the_search_out_and_says_so() -> None:
     verdict = find_changes(tank(), [record("new", 1, FOULS)], [record("old", 2)], budget=1e-6).verdict
-    assert any(note.startswith("The budget ended before") for note in verdict.notes)
-    assert not any("since the reference" in verdict.reason for _ in verdict.effects)
+    assert verdict.word == "abstain" and not verdict.effects and not verdict.members
+    assert verdict.reason.startswith("Nothing is told: the budget ended before all ")
+
+
+@pytest.mark.parametrize("short", [True, False])
+def test_a_budget_that_ends_after_the_single_faults_leaves_them_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, short: bool
+) -> None:
+    """The innovations form of a short record has an end, too: a stiff reactor took minutes, whatever was asked."""
+    ended = []
+
+    def all_compared(*given: object, ends: float, **named: object) -> Comparison:
+        ended.append(ends)
+        found = replace(compared(), complete=True)
+        while time.monotonic() < ends:
+            time.sleep(0.01)
+        return found
+
+    monkeypatch.setattr(changes, "compare", all_compared)
+    monkeypatch.setattr(changes, "is_short", lambda *given: short)
+    verdict = find_changes(tank(), [record("new", 1, FOLLOWS)], [record("old", 2)], budget=0.05).verdict
+    assert len(ended) == 1 and np.isfinite(ended[0])
+    assert verdict.word == "abstain" and changes.SPENT in verdict.notes
+    # with the time to begin, and not to end: what the innovations form had come to is not told
+    began = [0.0, 0.0]  # `find_changes` and what is left after the comparison
+    clock = lambda: began.pop() if began else 1e9  # noqa: E731
+    monkeypatch.setattr(changes, "compare", lambda *given, **named: compared())
+    if short:
+        monkeypatch.setattr(time, "monotonic", clock)
+        verdict = find_changes(tank(), [record("new", 1, FOLLOWS)], [record("old", 2)], budget=5.0).verdict
+        assert verdict.word == "abstain" and changes.SPENT in verdict.notes
 
 
 @pytest.mark.usefixtures("long_records")

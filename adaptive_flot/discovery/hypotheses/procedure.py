@@ -58,6 +58,8 @@ class Comparison:
         Number of hypotheses that were fitted.
     referred
         Whether there was a reference.
+    complete
+        Whether there was time to compare all hypotheses.
     """
 
     verdict: Verdict
@@ -70,6 +72,7 @@ class Comparison:
     judged: Judged
     tried: int
     referred: bool
+    complete: bool = True
 
 
 @one_thread()
@@ -81,6 +84,7 @@ def compare(
     adapted: Sequence[str] = (),
     processes: int = 1,
     progress: Callable[[str], None] = lambda stage: None,
+    ends: float = float("inf"),
 ) -> Comparison:
     """Find what has changed since a reference, or what a model lacks in several records of one process.
 
@@ -99,6 +103,8 @@ def compare(
         Hypotheses that are fitted at once.
     progress
         Called with a word for each stage.
+    ends
+        Time of `time.monotonic` after which no further hypothesis is fitted or tested; the constants are in any case.
 
     Raises
     ------
@@ -127,6 +133,8 @@ def compare(
     progress(f"fit {len(candidates)} hypotheses")
 
     def fit_one(h: Hypothesis) -> Fitted | None:
+        if time.monotonic() > ends:
+            return None
         with np.errstate(all="ignore"):
             return fit_all_rows(calibration.model, rows, h, constants, base.fit, refresh=refresh, elsewhere=elsewhere)
 
@@ -134,13 +142,17 @@ def compare(
     near = worth_testing(base, fitted)
     progress(f"test {len(near)} of them on fresh stretches")
 
-    def test_one(f: Fitted) -> Tested:
+    def test_one(f: Fitted) -> Tested | None:
+        if f.hypothesis is not None and time.monotonic() > ends:
+            return None
         with np.errstate(all="ignore"):
             near = refined(calibration.model, rows, f, refresh) if references and f.hypothesis else f
             return test_on_stretches(calibration.model, rows, near, hold_constants=bool(references))
 
     null, *results = parallel_map(test_one, [base, *near], processes, lambda: progress("test"))
-    possible = (t for t in results if not moves_though_stopped(calibration.model, rows, t))
+    assert null is not None  # the model as it is is always tested
+    complete = time.monotonic() <= ends
+    possible = (t for t in results if t is not None and not moves_though_stopped(calibration.model, rows, t))
     tested = tuple(sorted(possible, key=lambda t: t.total))
     usual = _usual_losses(calibration) if references else None
     judged, blocks = judge(rows, null, tested, usual)
@@ -150,7 +162,7 @@ def compare(
     best = judged.best if told and judged.best is not None else null
     extended = model_with(calibration.model, best.hypothesis).with_parameters(best.fit.values)
     return Comparison(
-        verdict, extended, calibration, rows, blocks, null, tested, judged, len(candidates), bool(references)
+        verdict, extended, calibration, rows, blocks, null, tested, judged, len(candidates), bool(references), complete
     )
 
 

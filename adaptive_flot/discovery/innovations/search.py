@@ -6,6 +6,7 @@ decides which of two names is right.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -98,6 +99,8 @@ class Search:
         The free constants as the model came, from which what is slow is fitted once more; none where they are known.
     ramps
         Whether gradual changes are looked for. What wanders is full of them, so a reference must say how much does.
+    ends
+        Time of `time.monotonic` after which nothing more is looked for.
     """
 
     model: Model
@@ -110,6 +113,12 @@ class Search:
     kinds: tuple[str, ...] | None = None
     as_given: tuple[float, ...] = ()
     ramps: bool = False
+    ends: float = float("inf")
+
+    @property
+    def time_is_up(self) -> bool:
+        """Whether the search has to end: what it has found by then may lack a better explanation."""
+        return time.monotonic() > self.ends
 
     def model_of(self, explanation: Explanation) -> Model:
         """The model with the effects of an explanation and its fitted parameters."""
@@ -144,6 +153,8 @@ class Search:
         """All explanations that were refitted, the best first; the model as it is among them."""
         found, beam, best = [base], [base], base
         for count in range(1, MOST_EFFECTS + 1):
+            if self.time_is_up:
+                break
             progress(f"innovations form: explanations of {count} effect{'s' if count > 1 else ''}")
             further = [e for start in beam for e in self._further(start)]
             ranked = _distinct(further)
@@ -157,12 +168,14 @@ class Search:
 
     def _further(self, start: Explanation) -> list[Explanation]:
         """The explanation with one more effect, for each that is worth its numbers."""
+        if self.time_is_up:
+            return []
         screening = self.screening(start, [s.name for s in self.model.sites])
         # one course in time at most: a second one would draw whatever is left
         events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
         screened = screening.all(events=events, ramps=events and self.ramps)
         chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
-        refits = parallel_map(lambda s: self._with(start, s), chosen, self.processes)
+        refits = parallel_map(lambda s: None if self.time_is_up else self._with(start, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
 
     @property

@@ -24,6 +24,8 @@ EDGE_WIDTHS = 6
 BAND = 1.96
 FREE = 3.0
 """Where the curve at its middle is so many times as uncertain as its shape, only the shape is shown."""
+ASIDE = 1e-3
+"""Step over which the slope at the middle is taken, as a share of what the driver covers."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class EffectCurve:
     anchor
         Value of the driver at which the change is shown as none, since the record can not tell a constant one from the
         adapted parameters; None where it can.
+    bend_only
+        Whether its slope at `anchor` is shown as none too: a fitted stiffness takes up the straight part of a spring.
     """
 
     effect: Effect
@@ -63,6 +67,7 @@ class EffectCurve:
     high: FloatArray
     seen: FloatArray
     anchor: float | None = None
+    bend_only: bool = False
     falling: FloatArray | None = None
     is_on: BoolArray | None = None
 
@@ -128,21 +133,35 @@ def _curve(fit: Fit, effect: Effect, seen: FloatArray, value: float) -> EffectCu
     sees, back = _branches(effect, x)
     middle = np.array([float(g(v, c)) for v in sees])
     gradient = np.array([np.array(slope(v, c)).ravel() for v in sees])
-    covariance, anchor = _covariance(fit, names), None
-    std = _spread(gradient, covariance)
+    covariance, anchor, bend_only = _covariance(fit, names), None, False
     if effect.family.static is not None:
-        typical = float(np.median(seen))
-        (at_typical,), _ = _branches(effect, np.array([typical]))
-        there = np.array(slope(at_typical, c)).ravel()
-        shape_only = _spread(gradient - there, covariance)
-        if _spread(there[None], covariance)[0] > FREE * np.max(shape_only):
-            anchor, std, middle = typical, shape_only, middle - float(g(at_typical, c))
+        typical, step = float(np.median(seen)), ASIDE * float(np.ptp(x))
+        near, _ = _branches(effect, typical + step * np.array([0.0, -1.0, 1.0]))
+        values, slopes = (
+            np.array([float(g(v, c)) for v in near]),
+            np.array([np.array(slope(v, c)).ravel() for v in near]),
+        )
+        shape, its_gradient = middle - values[0], gradient - slopes[0]
+        line, its_line = (np.multiply.outer((x - typical) / (2 * step), d[2] - d[1]) for d in (values, slopes))
+        stds = _spread(its_gradient - its_line, covariance), _spread(its_line, covariance)
+        bend_only = back is None and not relative and _bend_only(shape - line, stds[0], line, stds[1])
+        if bend_only:
+            anchor, middle, gradient = typical, shape - line, its_gradient - its_line
+        elif _spread(slopes[:1], covariance)[0] > FREE * np.max(_spread(its_gradient, covariance)):
+            anchor, middle, gradient = typical, shape, its_gradient
+    std = _spread(gradient, covariance)
     shown = np.exp if relative else np.asarray
     low, change, high = (shown(middle + k * BAND * std) for k in (-1, 0, 1))
     unit = "-" if relative else (site.unit or "")
     falling = None if back is None else shown(np.array([float(g(v, c)) for v in back]))
     driver_unit = units.get(effect.driver, "")
-    return EffectCurve(effect, driver_unit, unit, relative, x, change, low, high, seen, anchor, falling)
+    return EffectCurve(effect, driver_unit, unit, relative, x, change, low, high, seen, anchor, bend_only, falling)
+
+
+def _bend_only(bend: FloatArray, bend_std: FloatArray, line: FloatArray, line_std: FloatArray) -> bool:
+    """Whether the record tells how a curve (K,) bends, and not its straight part: that may be none, unlike the bend."""
+    unknown = np.max(line_std) > FREE * np.max(bend_std) and np.max(np.abs(line)) < BAND * np.max(line_std)
+    return bool(unknown and np.max(np.abs(bend) - BAND * bend_std) > 0)
 
 
 def _places(effect: Effect, low: float, high: float) -> FloatArray:

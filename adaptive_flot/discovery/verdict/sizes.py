@@ -182,6 +182,11 @@ def _over_driver(site: Site, curve: EffectCurve) -> str:
     if curve.relative:
         size, word = _times(_ratio(curve, a, b)).rsplit(" ", 1)
         return f"{size} {here} {word} {there}"
+    if curve.bend_only:  # the straight part is one of the adapted parameters
+        most = int(np.argmax(np.abs(curve.change)))
+        more = "more" if curve.change[most] > 0 else "less"
+        size = f"{abs(curve.change[most]):.3g}{_unit(site)} {more}"
+        return f"{size} at {driver} {curve.driver[most]:.3g}{unit} than a straight line through the middle says"
     more = "more" if curve.change[b] > curve.change[a] else "less"
     return f"{_between(site, curve, a, b)} {more} {here} than {there}"
 

@@ -183,7 +183,12 @@ def _curve_pictures(discovery: Discovery, problem: Problem, after: Fit, album: A
         f"{names}: {told}, over what the record covers, with the 95 % band from the covariance of the fit. Below: how "
         "often the record was there."
     )
-    if any(c.anchor is not None for c in curves):
+    if any(c.bend_only for c in curves):
+        caption += (
+            " Only how it bends away from a straight line through the middle of the record is shown: a straight part "
+            "is one of the adapted parameters."
+        )
+    if any(c.anchor is not None and not c.bend_only for c in curves):
         caption += (
             " Shown relative to the middle of the record, which is all it tells: a constant change at this site is "
             "one of the adapted parameters."

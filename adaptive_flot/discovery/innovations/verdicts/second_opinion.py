@@ -76,10 +76,13 @@ def second_opinion(state: State) -> State:
         problem.adapted,
         processes=state.processes,
         as_given=tuple(start[name] for name in problem.adapted),
+        ends=state.ends,
     )
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
         found = search.run(base, state.progress)
+        if search.time_is_up:
+            return state
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = _by_the_rules(state, search, base, told)
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
