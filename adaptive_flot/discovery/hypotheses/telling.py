@@ -23,6 +23,8 @@ FAR_ABOVE = 2.0
 """An error so many times its usual one is far above it."""
 FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
+JUST_ABOVE = 1.05
+"""Errors of at most so many times those of the reference are told as no larger."""
 MOVED = 1.0
 """A constant is said to have moved from so many of its standard deviations on."""
 JUDGED_ON = "free run, fresh stretches"
@@ -158,9 +160,9 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
         near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis) or "nothing"
         most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
         if reference and most <= FAR_ABOVE:
-            first = (
-                f"Errors are up to {max(most, 1.0):.2g} times those of the reference, and the records do not say why"
-            )
+            larger = f"up to {most:.2g} times those of the reference"
+            size = larger if most > JUST_ABOVE else "no larger than those of the reference, but unlike them"
+            first = f"Errors are {size}, and the records do not say why"
             return f"{first}: {judged.why}. What wanders in the process may do that. Nearest: {near}."
         return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near}."
     said = [_part_in_words(model, judged, t) for t in judged.parts]
