@@ -6,6 +6,7 @@ are right, and a name or a class is a false alarm. Command: `python -m benchmark
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -45,7 +46,7 @@ def pairs(folder: Path) -> Iterator[Pair]:
 def _neighbours(name: str, model: Model, record: Dataset, count: int) -> Iterator[Pair]:
     """Each part of a record with the one before as its reference, and the first with the last."""
     edges = [round(k * len(record) / count) for k in range(count + 1)]
-    parts = [record.rows(a, b) for a, b in zip(edges, edges[1:], strict=False)]
+    parts = [record.rows(a, b) for a, b in itertools.pairwise(edges)]
     for i in range(count):
         j = (i + 1) % count
         yield f"{name}, part {i + 1} -> {j + 1} of {count}", model, parts[i], parts[j]
