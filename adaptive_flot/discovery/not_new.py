@@ -5,13 +5,17 @@ from __future__ import annotations
 from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.searched_change import AT_NOISE, SEARCHED
 
 EXPLAINS = 0.7
 """A fault explains the reference where it leaves at most so much of its criterion: another one takes a few per cent."""
 NEARLY_ALL = 0.9
 """Share of what is above the usual errors that a name takes which needs no more."""
+FAR_OFF = 10.0
+"""Errors on the reference of so many times the noise from row to row: the model lacks much there already."""
+OTHERWISE = 4.0
+"""Such a model errs by up to so many times as much where a record has other inputs, and nothing has changed."""
 AS_LARGE = 0.5
 """A fault is the same on the reference where it is at least so many times as large there, and goes the same way."""
 
@@ -38,6 +42,13 @@ def why_not_new(compared: Comparison, confirmed: bool) -> str:
         return (
             "errors are not far above those of the reference, which are more than noise, and it does not explain "
             "nearly all of that: what wanders may do that"
+        )
+    most = max((c.before / c.noise for c in verdict.error if c.noise > 0), default=0.0)
+    remains = any(c.after > ABOVE_USUAL * c.noise for c in verdict.error)
+    if (calibration.usual.overall > FAR_OFF * calibration.noise).all() and remains and most <= OTHERWISE:
+        return (
+            "the model is far off on the reference already, and with this it still errs by more than there: with other "
+            "inputs it may do that, though nothing has changed"
         )
     return ""
 

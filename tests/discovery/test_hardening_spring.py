@@ -17,7 +17,7 @@ from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.discovery.verdict.sizes import words_of_effects
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
-DT, ROWS, STEPS, NOISE = 1.0 / 600, 1500, 8, 2e-4
+DT, ROWS, STEPS, NOISE = 1.0 / 600, 900, 8, 2e-4
 GAIN, STIFFNESS, DAMPING = 1.6e5, 1.8e5, 35.0
 
 
@@ -75,7 +75,7 @@ def record(cubic: float, rows: int = ROWS) -> Dataset:
 
 def test_inputs_that_act_a_row_later_than_the_record_says_are_no_effect() -> None:
     """A logger writes an input with what was measured when it was given. A drive that "answers late" was told."""
-    there = record(0.0, 500)
+    there = record(0.0, 300)
     logged = replace(there, inputs=np.vstack([there.inputs[1:], there.inputs[-1:]]))
     verdict = discover(oscillator(), logged).verdict
     assert verdict.word == "none", verdict.reason
@@ -94,7 +94,7 @@ def test_a_hardening_spring_is_a_force_over_the_position_and_nothing_else(cubic:
     told = set(verdict.members) | {(e.effect.site, e.effect.driver) for e in verdict.effects}
     assert ("spring", "position") in told
     assert told <= {("spring", "position"), ("damper", "position"), ("drive", "position")}
-    assert verdict.error[0].after < 1.2 * NOISE
+    assert verdict.error[0].after < 1.25 * NOISE
     # the straight part of the law is the fitted stiffness: the picture shows the bend alone, and its band holds it
     assert found.problem is not None and found.told is not None
     (curve,) = effect_curves(found.problem, found.told, 1)

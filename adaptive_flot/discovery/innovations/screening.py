@@ -66,8 +66,13 @@ class Screening:
         self._values, self._drivers = response.seen()
 
     def all(self, *, events: bool, ramps: bool = False) -> list[Screened]:
-        """Every suspect, the best first; with changes in time or without, and with gradual ones or without."""
+        """Every suspect, the best first; with changes in time or without, and with gradual ones or without.
+
+        None where the filter has run off: nothing can be regressed on it.
+        """
         record = self._response.record
+        if not all(np.isfinite(v).all() for v in (self._left, *self._values.values(), *self._drivers.values())):
+            return []
         by_site: dict[str, list[Suspect]] = {}
         for s in suspects(self.model, self._values, self._drivers, record.dt):
             by_site.setdefault(s.hypothesis.site, []).append(s)
