@@ -6,8 +6,7 @@ number for each state and output the likelihood of a model that is wrong has man
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -22,6 +21,7 @@ COARSE, ROUNDS, MOVES = 7, 8, 8
 """Grid of the first search, most rounds of the two in turn, and most moves of one search."""
 ENOUGH, NARROWEST = 0.5, 0.1
 """Gain of a round that does not count, and the least distance in the logarithm at which one looks."""
+Costs = Callable[[Sequence[tuple[float, float]]], Sequence[float]]
 FIRST_WIDTH = 1.0
 """Distance in the logarithm at which a search from a known size looks first; a third of it in the next round."""
 
@@ -40,29 +40,27 @@ def noise_of(
     )
 
 
-def search_noise(
-    cost: Callable[[float, float], float], start: tuple[float, float] | None = None
-) -> tuple[float, float]:
+def search_noise(costs: Costs, start: tuple[float, float] | None = None) -> tuple[float, float]:
     """Find theta and rho that minimise a cost: on a grid, then each in turn by parabolas in its logarithm.
 
     After each round the step of both is tried once more: one noise may stand for the other (Hooke & Jeeves, *J. ACM* 8
-    (1961) 212). Rounds end when one gains nothing that counts.
+    (1961) 212). Rounds end when one gains nothing that counts. `costs` takes several pairs (theta, rho) at once.
     """
     if start is None:
-        grid = np.geomspace(*THETA, COARSE)
-        values = [cost(float(t), 1.0) for t in grid]
-        at, best = (float(grid[int(np.argmin(values))]), 1.0), min(values)
-        width = float(np.log(grid[1] / grid[0])) / 2
+        grid = [(float(t), 1.0) for t in np.geomspace(*THETA, COARSE)]
+        values = costs(grid)
+        at, best = grid[int(np.argmin(values))], min(values)
+        width = float(np.log(grid[1][0] / grid[0][0])) / 2
     else:
-        at, best, width = start, cost(*start), FIRST_WIDTH
+        at, best, width = start, costs([start])[0], FIRST_WIDTH
     for _ in range(ROUNDS):
         before, first = best, at
-        theta, best = _by_parabolas(partial(_first, cost, at[1]), at[0], best, width, THETA)
-        rho, best = _by_parabolas(partial(cost, theta), at[1], best, min(width, FIRST_WIDTH) / 2, RHO)
+        theta, best = _by_parabolas(_along(costs, rho=at[1]), at[0], best, width, THETA)
+        rho, best = _by_parabolas(_along(costs, theta=theta), at[1], best, min(width, FIRST_WIDTH) / 2, RHO)
         at = theta, rho
         if at != first:
             further = float(np.clip(theta**2 / first[0], *THETA)), float(np.clip(rho**2 / first[1], *RHO))
-            again = cost(*further)
+            (again,) = costs([further])
             at, best = (further, again) if again < best else (at, best)
         if before - best < ENOUGH and width < FIRST_WIDTH:
             break
@@ -70,12 +68,18 @@ def search_noise(
     return at
 
 
-def _first(cost: Callable[[float, float], float], rho: float, theta: float) -> float:
-    return cost(theta, rho)
+def _along(costs: Costs, theta: float | None = None, rho: float | None = None) -> Callable[[list[float]], list[float]]:
+    """The costs along one of the two, the other one being given."""
+
+    def of(values: list[float]) -> list[float]:
+        pairs = [(v if theta is None else theta, v if rho is None else rho) for v in values]
+        return list(costs(pairs)) if pairs else []
+
+    return of
 
 
 def _by_parabolas(
-    cost: Callable[[float], float], at: float, value: float, width: float, ends: tuple[float, float]
+    costs: Callable[[list[float]], list[float]], at: float, value: float, width: float, ends: tuple[float, float]
 ) -> tuple[float, float]:
     """Where a cost is least near a point with a known value, and its value there.
 
@@ -84,23 +88,23 @@ def _by_parabolas(
     1973, chapter 5). An end of the range may be the lowest.
     """
     low, high = (float(np.log(end)) for end in ends)
-    middle, seen = float(np.log(at)), {}
+    middle = float(np.log(at))
+    seen = {middle: value}
 
-    def of(x: float) -> float:
-        if x not in seen:
-            seen[x] = cost(float(np.exp(x)))
-        return seen[x]
+    def look(*points: float) -> None:
+        new = [x for x in dict.fromkeys(points) if x not in seen]
+        seen.update(zip(new, costs([float(np.exp(x)) for x in new]), strict=True))
 
-    seen[middle] = value
     for _ in range(MOVES):
         left, right = max(middle - width, low), min(middle + width, high)
-        lowest = min((middle, left, right), key=of)
+        look(left, right)
+        lowest = min((middle, left, right), key=seen.__getitem__)
         if lowest == middle:
             break
         middle = lowest
     if left < middle < right:
-        a, b = (of(middle) - of(left)) / (middle - left), (of(right) - of(middle)) / (right - middle)
+        a, b = (seen[middle] - seen[left]) / (middle - left), (seen[right] - seen[middle]) / (right - middle)
         if b > a:
-            of(min(max((left + middle) / 2 - a * (right - left) / 2 / (b - a), left), right))
-    best = min(seen, key=of)
+            look(min(max((left + middle) / 2 - a * (right - left) / 2 / (b - a), left), right))
+    best = min(seen, key=seen.__getitem__)
     return float(np.exp(best)), seen[best]

@@ -7,7 +7,7 @@ The steps are those of the prediction error method with the derivatives of the f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.stats import t as student_t
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, stores_at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions, weight_of
-from adaptive_flot.discovery.innovations.noise_fit import noise_of, search_noise
+from adaptive_flot.discovery.innovations.noise_fit import Costs, noise_of, search_noise
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel
 from adaptive_flot.greybox.filtering.likelihood import first_state
@@ -41,8 +41,6 @@ STRETCHES = 5
 """Stretches of a record that are compared for the covariance of a parameter."""
 DIFFERENCE = 0.05
 """Width of a difference of the cost, in standard deviations of a parameter."""
-
-Slopes = Callable[[FloatArray, tuple[float, float], FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -133,7 +131,7 @@ class Refitter:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
         p, first = p.copy(), p[self._where].copy()
         if size is None or not hold_noise:
-            size = search_noise(lambda t, r: self._cost(p, (t, r), first), size)
+            size = search_noise(self._costs_of_noise(p, first), size)
         best = self._cost(p, size, first)
         for i in range(ITERATIONS if self.free else 0):
             q, value = self._moved(p, size, first, best)
@@ -142,7 +140,7 @@ class Refitter:
             if hold_noise and gain < ENOUGH:
                 break
             if not hold_noise and (gain < LARGE or i % 2):
-                again = search_noise(lambda t, r, at=p: self._cost(at, (t, r), first), size)  # type: ignore[misc]
+                again = search_noise(self._costs_of_noise(p, first), size)
                 value = self._cost(p, again, first)
                 improved = best - value
                 if improved > 0:
@@ -155,7 +153,7 @@ class Refitter:
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
         first = p[self._where].copy()
-        size = search_noise(lambda t, r: self._cost(p, (t, r), first))
+        size = search_noise(self._costs_of_noise(p, first))
         noise = self.noise(size)
         return Refit(p.copy(), noise, size, self.run(p, noise), -self._cost(p, size, first))
 
@@ -177,9 +175,22 @@ class Refitter:
             return self._filter.run(self.record, noise, *self.start(noise, p), p)
 
     def _cost(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> float:
-        rows = self.run(p, self.noise(size)).log_likelihood[self.counted]
-        total = -float(rows.sum()) + float(np.sum(self._prior(p[self._where], first) ** 2)) / 2
-        return total if np.isfinite(total) else HOPELESS
+        return self._costs([(p, size)], first)[0]
+
+    def _costs(self, points: Sequence[tuple[FloatArray, tuple[float, float]]], first: FloatArray) -> list[float]:
+        """Costs at several parameters and sizes of the noise, whose filters run side by side."""
+        cases = [(noise := self.noise(size), *self.start(noise, p), p) for p, size in points]
+        with np.errstate(all="ignore"):
+            rows = self._filter.log_likelihoods(self.record, cases)[:, self.counted]
+        totals = [
+            -float(own.sum()) + float(np.sum(self._prior(p[self._where], first) ** 2)) / 2
+            for own, (p, _) in zip(rows, points, strict=True)
+        ]
+        return [total if np.isfinite(total) else HOPELESS for total in totals]
+
+    def _costs_of_noise(self, p: FloatArray, first: FloatArray) -> Costs:
+        """The costs of sizes of the noise at some parameters."""
+        return lambda sizes: self._costs([(p, size) for size in sizes], first)
 
     def _prior(self, x: FloatArray, first: FloatArray) -> FloatArray:
         """Distances from what is known before, in standard deviations (q + c,)."""
@@ -215,14 +226,20 @@ class Refitter:
         The gain moves with the parameters, so that a step at the present gain may lead up: a late sensor beside process
         noise is such a case. Then the slopes of the cost itself show the way.
         """
-        for slopes in (None, self._slopes):
-            step = self._step(p, size, first, slopes)
-            for share in SHARES:
-                q = p.copy()
-                q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
-                value = self._cost(q, size, first)
-                if value < best:
-                    return q, value
+        A, b = self._normal_equations(p, size, first)
+        for of_the_cost in (False, True):
+            if of_the_cost and np.isfinite(A).all() and np.isfinite(b).all():
+                b = -self._slopes(p, size, first, np.sqrt(np.diag(A)))
+            step = self._step(p, A, b)
+            # mostly the whole step is the best, but not where the gain has led up
+            for shares in (SHARES,) if of_the_cost else (SHARES[:1], SHARES[1:]):
+                tried = [p.copy() for _ in shares]
+                for q, share in zip(tried, shares, strict=True):
+                    q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
+                values = self._costs([(q, size) for q in tried], first)
+                better = [(q, value) for q, value in zip(tried, values, strict=True) if value < best]
+                if better:
+                    return better[0]
         return p, best
 
     def _slopes(self, p: FloatArray, size: tuple[float, float], first: FloatArray, root: FloatArray) -> FloatArray:
@@ -231,17 +248,18 @@ class Refitter:
         A difference is a share (DIFFERENCE) of what the normal equations, with diagonal root^2, take for one standard
         deviation.
         """
-        found = np.zeros(len(self._where))
-        for i, (k, scale) in enumerate(zip(self._where, self._scale, strict=True)):
-            ends = np.clip(p[k] + np.array([-1.0, 1.0]) * DIFFERENCE / root[i] * scale, self._lower[i], self._upper[i])
-            costs = []
+        away = DIFFERENCE / root * self._scale
+        low, high = (np.clip(p[self._where] + side * away, self._lower, self._upper) for side in (-1.0, 1.0))
+        points = []
+        for k, *ends in zip(self._where, low, high, strict=True):
             for end in ends:
                 q = p.copy()
                 q[k] = end
-                costs.append(self._cost(q, size, first))
-            if max(costs) < HOPELESS and ends[1] > ends[0]:
-                found[i] = (costs[1] - costs[0]) / (ends[1] - ends[0]) * scale
-        return found
+                points.append((q, size))
+        below, above = np.array(self._costs(points, first)).reshape(-1, 2).T
+        told = (np.maximum(below, above) < HOPELESS) & (high > low)
+        slopes: FloatArray = np.where(told, (above - below) / np.where(told, high - low, 1.0) * self._scale, 0.0)
+        return slopes
 
     def covariance(self, fit: Refit) -> FloatArray:
         """Covariance of the free parameters at a fit (q, q): the inverse of the normal equations."""
@@ -287,20 +305,12 @@ class Refitter:
             D = np.vstack([D, told])
         return (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
 
-    def _step(
-        self, p: FloatArray, size: tuple[float, float], first: FloatArray, slopes: Slopes | None = None
-    ) -> FloatArray:
-        """One step of Gauss and Newton; an unknown that would leave its range is held.
-
-        By the slopes of the innovations at the present gain, or by given ones of the cost.
-        """
-        A, b = self._normal_equations(p, size, first)
+    def _step(self, p: FloatArray, A: FloatArray, b: FloatArray) -> FloatArray:
+        """One step of Gauss and Newton by normal equations in scales; an unknown that would leave its range is held."""
         x = p[self._where]
         held = np.zeros(len(x), dtype=bool)
         if not (np.isfinite(A).all() and np.isfinite(b).all()):
             return held.astype(float)
-        if slopes is not None:
-            b = -slopes(p, size, first, np.sqrt(np.diag(A)))
         while True:
             move = np.zeros(len(x))
             free = ~held

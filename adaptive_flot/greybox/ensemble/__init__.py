@@ -3,7 +3,6 @@
 Map
 ---
 lane_source.py       C source of a function in lanes: one lane of a vector register a member.
-instruction_sets.py  Vector instructions of this machine, chosen at run time.
 lane_library.py      The machine code, called on blocks of members.
 loop_library.py      The same for a function that is too large for lanes: one member after the other.
 lanes.py             A function for many members over many rows; by CasADi's `map` where nothing can be compiled.

@@ -10,13 +10,13 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.ensemble.instruction_sets import InstructionSet
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping import step_functions
 from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import InstructionSet
 
 What = Literal["states", "outputs", "signals"]
 _MATRICES = ("S", "S_next", "dy")

@@ -13,11 +13,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from adaptive_flot.greybox.ensemble.instruction_sets import InstructionSet, supported
 from adaptive_flot.greybox.ensemble.lane_source import lane_source
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiled import CompileError, load_library
 from adaptive_flot.greybox.stepping.rows import worker_threads
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import InstructionSet, supported
 
 PIECES = 4
 """Calls for each thread: one that is held up leaves little to wait for."""

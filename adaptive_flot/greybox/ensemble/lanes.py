@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.ensemble.instruction_sets import InstructionSet
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
 from adaptive_flot.greybox.ensemble.loop_library import LoopLibrary
 from adaptive_flot.greybox.function_cache import FunctionCache
@@ -17,6 +16,7 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiled import CompileError, CompileWarning
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.rows import over_rows
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import InstructionSet
 
 
 class Lanes:

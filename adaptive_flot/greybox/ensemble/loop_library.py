@@ -13,9 +13,9 @@ from functools import partial
 
 import casadi as ca
 
-from adaptive_flot.greybox.ensemble.instruction_sets import SCALAR
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary, opened
 from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, library_of, load_library
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import SCALAR
 
 _SOURCE = """
 #include <math.h>

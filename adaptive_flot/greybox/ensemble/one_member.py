@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
-from adaptive_flot.greybox.ensemble.instruction_sets import SCALAR
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import SCALAR
 
 
 class OneMember:

@@ -15,6 +15,7 @@ from adaptive_flot.greybox.filtering.step import filter_step, first_correction
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
+from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 
 @dataclass(frozen=True)
@@ -98,24 +99,12 @@ class RecordFilter:
             Wrong shapes.
         """
         n, rows = len(self.model.states) + len(self.walking), len(record)
-        if z0.shape != (n,) or P0.shape != (n, n):
-            raise ModelError(f"the filter takes z0 ({n},) and P0 ({n}, {n}); got {z0.shape} and {P0.shape}")
-        y = record.outputs[:, list(self.outputs)]
-        there = np.isfinite(y).astype(float)
-        y = np.where(there > 0, y, 0.0)
-        r, Q = noise.std(self.model)[list(self.outputs)], noise.variances(self.model, self.dt)
-        z, P, predicted, variance, likelihood = self._first(
-            z0, P0, float(record.time[0]), record.inputs[0], p, r, y[0], there[0]
-        )
+        (z, P, predicted, variance, likelihood), each, Q = self._from_first_row(record, noise, z0, P0, p)
         if rows == 1:
             empty = np.empty((0, n, n))
             return Filtered(
                 predicted[None], variance[None], likelihood.ravel(), z[None], P[None], np.empty((0, n)), empty, Q
             )
-        t = record.time[0] + self.dt * np.arange(rows - 1, dtype=float)
-        each = {
-            "t": t[:, None], "u": record.inputs[1:], "p": p, "Q": Q, "r": r, "y": y[1:], "there": there[1:],
-        }  # fmt: skip
         joined = self._many({"z": z, "P": P}, each)
         F = joined["F"].reshape(-1, n, n).transpose(0, 2, 1)  # a matrix comes row by row, transposed
         return Filtered(
@@ -128,6 +117,38 @@ class RecordFilter:
             F,
             Q,
         )
+
+    def log_likelihoods(
+        self, record: Dataset, cases: Sequence[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]]
+    ) -> FloatArray:
+        """Log-densities of the rows (cases, N) for several cases (noise, z0, P0, p), side by side: those of `run`."""
+        if len(cases) < 2 or len(record) == 1 or not isinstance(self._many, TapeRecursion):
+            return np.array([self.run(record, *case).log_likelihood for case in cases]).reshape(-1, len(record))
+        members, found = [], np.empty((len(cases), len(record)))
+        for i, case in enumerate(cases):
+            (z, P, _, _, likelihood), each, _ = self._from_first_row(record, *case)
+            members.append({"z": z, "P": P, **each})
+            found[i, 0] = likelihood.item()
+        found[:, 1:] = self._many.side_by_side(members, "log_likelihood")[:, :, 0]
+        return found
+
+    def _from_first_row(
+        self, record: Dataset, noise: NoiseModel, z0: FloatArray, P0: FloatArray, p: FloatArray
+    ) -> tuple[Sequence[FloatArray], dict[str, FloatArray], FloatArray]:
+        """The correction by the first row, the arguments of all other rows, and the variance of process noise (n,)."""
+        n = len(self.model.states) + len(self.walking)
+        if z0.shape != (n,) or P0.shape != (n, n):
+            raise ModelError(f"the filter takes z0 ({n},) and P0 ({n}, {n}); got {z0.shape} and {P0.shape}")
+        y = record.outputs[:, list(self.outputs)]
+        there = np.isfinite(y).astype(float)
+        y = np.where(there > 0, y, 0.0)
+        r, Q = noise.std(self.model)[list(self.outputs)], noise.variances(self.model, self.dt)
+        first = self._first(z0, P0, float(record.time[0]), record.inputs[0], p, r, y[0], there[0])
+        t = record.time[0] + self.dt * np.arange(len(record) - 1, dtype=float)
+        each = {
+            "t": t[:, None], "u": record.inputs[1:], "p": p, "Q": Q, "r": r, "y": y[1:], "there": there[1:],
+        }  # fmt: skip
+        return first, each, Q
 
 
 def _calls(

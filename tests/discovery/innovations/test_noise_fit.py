@@ -1,5 +1,7 @@
 """Two sizes of noise are found where a likelihood with a known minimum has it, in few runs of the filter."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,6 +17,10 @@ class Likelihood:
 
     def __init__(self, theta: float, rho: float) -> None:
         self.truth, self.runs = (rho**2, rho**2 + 9 * theta**2), 0
+
+    def all(self, sizes: Sequence[tuple[float, float]]) -> list[float]:
+        """Of several sizes."""
+        return [self(*size) for size in sizes]
 
     def __call__(self, theta: float, rho: float) -> float:
         self.runs += 1
@@ -33,7 +39,7 @@ def test_the_least_cost_is_found_to_less_than_what_counts(log_theta: float, log_
     """An effect must gain 12: a search that ends 1.5 above the least decides nothing."""
     theta, rho = float(np.exp(log_theta)), float(np.exp(log_rho))
     cost = Likelihood(theta, rho)
-    found = search_noise(cost, (2 * theta, 0.8 * rho) if near else None)
+    found = search_noise(cost.all, (2 * theta, 0.8 * rho) if near else None)
     runs = cost.runs
     assert cost(*found) - cost.least < 1.5
     assert runs <= (40 if near else 60)
@@ -41,5 +47,5 @@ def test_the_least_cost_is_found_to_less_than_what_counts(log_theta: float, log_
 
 @pytest.mark.parametrize("start", [None, (1e-6, 1.0), (10.0, 10.0)])
 def test_sizes_stay_in_their_range(start: tuple[float, float] | None) -> None:
-    theta, rho = search_noise(lambda t, r: 100 * (np.log(t) + np.log(r)), start)
+    theta, rho = search_noise(lambda sizes: [100 * (np.log(t) + np.log(r)) for t, r in sizes], start)
     assert (theta, rho) == pytest.approx((THETA[0], RHO[0]))

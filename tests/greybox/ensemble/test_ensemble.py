@@ -10,7 +10,6 @@ import pytest
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
-from adaptive_flot.greybox.ensemble.instruction_sets import AVX2, AVX512, InstructionSet, supported
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
 from adaptive_flot.greybox.ensemble.one_member import OneMember
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -18,6 +17,7 @@ from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping import compiled as compiled_functions
 from adaptive_flot.greybox.stepping.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import AVX2, AVX512, InstructionSet, supported
 
 PROBLEM = compiler_problem()
 needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be compiled here: {PROBLEM}")

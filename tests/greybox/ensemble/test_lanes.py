@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.ensemble import lane_library
-from adaptive_flot.greybox.ensemble.instruction_sets import BY_LEVEL, SCALAR, InstructionSet, supported
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiled import CompileError, CompileWarning, compiler_problem
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import BY_LEVEL, SCALAR, InstructionSet, supported
 
 PROBLEM = compiler_problem()
 needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be compiled here: {PROBLEM}")

@@ -81,6 +81,21 @@ def test_gaussian_filter_is_the_kalman_filter() -> None:
     assert filtered.log_likelihood.sum() == pytest.approx(total, rel=1e-6)
 
 
+@pytest.mark.parametrize("rows", [1, 400])
+def test_likelihoods_of_several_cases_are_those_of_each_alone(rows: int) -> None:
+    """To the last bit, with missing outputs, and noise, start and parameters of its own for each."""
+    data, _ = record(rows)
+    own = RecordFilter(first_order(), DT, [0])
+    cases = [
+        (NoiseModel({"x": Q * k}, {"y": R / k}), np.full(1, k - 1.0), k * np.eye(1), np.array([DECAY * k]))
+        for k in np.linspace(0.5, 2.0, 11)
+    ]
+    each = [own.run(data, *case).log_likelihood for case in cases]
+    np.testing.assert_array_equal(own.log_likelihoods(data, cases), each)
+    np.testing.assert_array_equal(own.log_likelihoods(data, cases[:1]), each[:1])
+    assert own.log_likelihoods(data, []).shape == (0, rows)
+
+
 def test_smoother_is_the_least_squares_solution() -> None:
     """Smoothed states are the solution of the whole weighted least-squares problem, solved at once."""
     data, _ = record(rows=60, missing=False)

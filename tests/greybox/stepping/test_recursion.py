@@ -53,6 +53,7 @@ def test_another_number_of_rows_is_refused() -> None:
 
 
 CARRIED = {"x": "x_next", "P": "P_next"}
+NEXT = tuple(CARRIED.values())
 
 
 def _without_compiler(monkeypatch: pytest.MonkeyPatch) -> recursion.RowByRow:
@@ -108,3 +109,33 @@ def test_a_wrong_shape_is_refused_before_anything_is_read() -> None:
             run(given, each)
     with pytest.raises(ValueError, match="x: shape"):
         run(given | {"x": np.ones(3)}, {"u": np.ones((5, 2)), "c": np.ones(3)})
+
+
+@pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
+@given(st.integers(1, 19), st.integers(0, 2**32 - 1))
+@settings(deadline=None)
+def test_members_side_by_side_have_the_numbers_that_each_has_alone(members: int, seed: int) -> None:
+    """To the last bit, whatever the vector instructions: a search by likelihood is the same with and without them."""
+    x, P, u, c = ca.SX.sym("x", 2), ca.SX.sym("P", 2, 2), ca.SX.sym("u", 2), ca.SX.sym("c", 3)
+    x_next = ca.tanh(P @ x) + ca.sqrt(ca.fabs(u)) * ca.exp(-c[0]) + ca.fmin(c[1], x) / (1 + c[2] ** 2)
+    P_next = 0.9 * P + 0.1 * ca.horzcat(ca.if_else(x > 0, x, c[:2]), ca.sign(x) * ca.fabs(x) ** 1.7)
+    f = ca.Function("f", [x, P, u, c], [x_next, P_next, ca.log(1 + x.T @ x)], ["x", "P", "u", "c"], [*NEXT, "y"])
+    recursion = row_by_row(f, CARRIED, ("c",))
+    assert isinstance(recursion, TapeRecursion)
+    rng = np.random.default_rng(seed)
+    shapes = {"x": (2,), "P": (2, 2), "u": (ROWS, 2), "c": (3,)}
+    values = [{name: rng.standard_normal(shape) for name, shape in shapes.items()} for _ in range(members)]
+    values[0]["u"][ROWS // 2, 0] = np.nan  # stays with its member
+    found = recursion.side_by_side(values, "y")
+    for own, each in zip(found, values, strict=True):
+        alone = recursion({k: each[k] for k in CARRIED}, {k: each[k] for k in ("u", "c")})
+        np.testing.assert_array_equal(own, alone["y"])
+
+
+@pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
+def test_members_of_other_shapes_are_refused() -> None:
+    recursion = row_by_row(function(), CARRIED, ("c",))
+    assert isinstance(recursion, TapeRecursion)
+    one = {"x": np.ones(2), "P": np.eye(2), "u": np.ones((ROWS, 2)), "c": np.ones(3)}
+    with pytest.raises(ValueError, match="other shapes"):
+        recursion.side_by_side([one, {**one, "u": np.ones((ROWS - 1, 2))}], "y")

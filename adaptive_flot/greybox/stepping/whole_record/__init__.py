@@ -5,5 +5,6 @@ statements.py      C statements of the scalar operations.
 tape.py            Such a list as numbers, which one library reads for every model; the same as C.
 source.py          The C source of that library: the fast step over states and directions, from row to row.
 library.py         Called with the tapes of a model, or with its compiled equations once it has run often.
-tape_recursion.py  Any function whose results are arguments of its next call, over all rows.
+instruction_sets.py  Vector instructions of this machine, chosen at run time.
+tape_recursion.py  Any function whose results are arguments of its next call, over all rows; several side by side.
 """

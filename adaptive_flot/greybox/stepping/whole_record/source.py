@@ -201,15 +201,46 @@ void recur(const Tape *tape, int64_t rows, int64_t given, int64_t carried, const
 """
 
 
-def _evaluation() -> str:
-    """The function that reads a tape: from one operation it goes straight to the next."""
+_RECURSION_IN_LANES = """
+/* The same for LANES members at once. Member l has its k-th argument at `values[k * LANES + l]`, and the result that is
+   wanted goes to `found[l]`. A place of the memory holds the numbers of all members beside each other. */
+void recur_in_lanes(const Tape *tape, int64_t rows, int64_t given, int64_t carried, const int64_t *sizes,
+                    const double *const *values, const int64_t *strides, int64_t wanted, int64_t width,
+                    double *const *found) {
+    for (int64_t row = 0; row < rows; row++) {
+        for (int64_t k = 0; k < given; k++) {
+            double *to = tape->memory + tape->arguments[k] * LANES;
+            if (row && k < carried) copy(to, tape->memory + tape->results[k] * LANES, sizes[k] * LANES);
+            else if (!row || strides[k])
+                for (int64_t l = 0; l < LANES; l++) {
+                    const double *from = values[k * LANES + l] + row * strides[k];
+                    for (int64_t e = 0; e < sizes[k]; e++) to[e * LANES + l] = from[e];
+                }
+        }
+        if (!row) evaluate(tape->held, tape->memory);
+        evaluate(tape->code, tape->memory);
+        const double *made = tape->memory + tape->results[wanted] * LANES;
+        for (int64_t l = 0; l < LANES; l++)
+            for (int64_t e = 0; e < width; e++) found[l][row * width + e] = made[e * LANES + l];
+    }
+}
+"""
+
+
+def _evaluation(lanes: int = 1) -> str:
+    """The function that reads a tape: from one operation it goes straight to the next; with a lane for each member."""
     jumps = ", ".join(f"&&do_{kind}" for kind in OPERATIONS)
+    one, many = "m[c[1]] = {};", "IN_LANES({})"
+    operands = ("m[c[2]]", "m[c[3]]") if lanes == 1 else ("a[l]", "b[l]")
     cases = [
-        f"do_{kind}: m[c[1]] = {TEMPLATES[kind].format('m[c[2]]', 'm[c[3]]')}; c += 4; goto *go[c[0]];"
+        f"do_{kind}: {(one if lanes == 1 else many).format(TEMPLATES[kind].format(*operands))} c += 4; goto *go[c[0]];"
         for kind in OPERATIONS
         if kind != END
     ]
     return "\n".join([
+        f"#define LANES {lanes}",
+        "#define IN_LANES(value) { const double *a = m + c[2] * LANES, *b = m + c[3] * LANES; double r[LANES]; \\",
+        "    for (int l = 0; l < LANES; l++) r[l] = value; (void)b; memcpy(m + c[1] * LANES, r, sizeof r); }",
         "static void evaluate(const uint16_t *c, double *const m) {",
         f"static const void *const go[] = {{{jumps}}};",
         "goto *go[c[0]];",
@@ -223,6 +254,11 @@ RECORD_SOURCE = "\n".join([_TAPE, _HEAD, HELPERS, _evaluation(), _LOOPS])
 """The whole of it, the same for every model."""
 RECURSION_SOURCE = "\n".join([_TAPE, HELPERS, _evaluation(), _RECURSION])
 """Any function whose results are arguments of its next call."""
+
+
+def recursion_in_lanes(lanes: int) -> str:
+    """The same for so many members at once, each with arguments of its own. Each has the numbers that it has alone."""
+    return "\n".join([_TAPE, HELPERS, _evaluation(lanes), _RECURSION_IN_LANES])
 
 
 def kernel_source(tapes: Mapping[str, Tape]) -> str:

@@ -10,12 +10,23 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiled import load_library
+from adaptive_flot.greybox.stepping.whole_record.instruction_sets import AVX2, AVX512, SCALAR, supported
 from adaptive_flot.greybox.stepping.whole_record.library import LIBRARY_FLAGS, TapeStruct
-from adaptive_flot.greybox.stepping.whole_record.source import RECURSION_SOURCE
+from adaptive_flot.greybox.stepping.whole_record.source import RECURSION_SOURCE, recursion_in_lanes
 from adaptive_flot.greybox.stepping.whole_record.tape import tape_of
+
+LANES = 8
+"""Members side by side: their numbers fill one register of AVX-512, and the time of reading the tape is shared."""
+_VECTORS = {
+    SCALAR.name: (),
+    AVX2.name: ("-mavx2",),
+    AVX512.name: ("-mavx512f", "-mprefer-vector-width=512"),
+}
+"""Sums and products alone are vector instructions, none of which is contracted: the numbers are those of one member."""
 
 
 class TapeRecursion:
@@ -62,12 +73,7 @@ class TapeRecursion:
             Results by name: (K, n), or (K, n, m) of a carried matrix.
         """
         values = {**carried, **each}
-        given = [self._columns(name, values[name]) for name in self._names]
-        rows = max((len(a) for a in given if a.ndim == 2), default=1)
-        for name, size, a in zip(self._names, self._sizes, given, strict=True):
-            if a.shape[-1] != size or (a.ndim == 2 and (len(a) != rows or name in self._held)):
-                raise ValueError(f"{name}: shape {values[name].shape} does not fit {rows} rows of {size}")
-        strides = np.array([a.shape[1] if a.ndim == 2 else 0 for a in given], dtype=np.int64)
+        given, rows, strides = self._given(values)
         made = [np.empty((rows, width)) for width in self._widths]
         memory = self._tape.memory.copy()  # so that threads may run at once
         tape = TapeStruct(self._tape, memory, None, None)
@@ -81,6 +87,54 @@ class TapeRecursion:
                 found[result] = found[result].reshape(rows, shape[1], shape[0]).transpose(0, 2, 1)
         return found
 
+    def side_by_side(self, members: Sequence[Mapping[str, FloatArray]], wanted: str) -> FloatArray:
+        """One result of several members, each as if it had been evaluated alone, to the last bit.
+
+        Parameters
+        ----------
+        members
+            All arguments of each member by name, of the same shapes in all of them.
+        wanted
+            Name of the result.
+
+        Returns
+        -------
+        ndarray
+            (members, K, n).
+
+        Raises
+        ------
+        CompileError
+            The library for several members can not be compiled or loaded.
+        """
+        run, j = _library_in_lanes(), self._results.index(wanted)
+        prepared = [self._given(values) for values in members]
+        rows, strides = prepared[0][1:]
+        if any(each != rows or (other != strides).any() for _, each, other in prepared):
+            raise ValueError("members have arguments of other shapes")
+        found = np.empty((len(members), rows, self._widths[j]))
+        memory = np.empty((len(self._tape.memory), LANES))
+        for first in range(0, len(members), LANES):
+            # a block that is not full has its last member several times
+            block = [min(first + lane, len(members) - 1) for lane in range(LANES)]
+            memory[:] = self._tape.memory[:, None]
+            tape = TapeStruct(self._tape, memory, None, None)
+            values = [prepared[i][0][k] for k in range(len(self._names)) for i in block]
+            run(
+                ctypes.byref(tape), rows, len(self._names), self._carried, self._sizes.ctypes.data, _addresses(values),
+                strides.ctypes.data, j, int(self._widths[j]), _addresses([found[i] for i in block]),
+            )  # fmt: skip
+        return found
+
+    def _given(self, values: Mapping[str, FloatArray]) -> tuple[list[FloatArray], int, NDArray[np.int64]]:
+        """The arguments as the tape has them, the number of rows, and how far apart the rows of each argument are."""
+        given = [self._columns(name, values[name]) for name in self._names]
+        rows = max((len(a) for a in given if a.ndim == 2), default=1)
+        for name, size, a in zip(self._names, self._sizes, given, strict=True):
+            if a.shape[-1] != size or (a.ndim == 2 and (len(a) != rows or name in self._held)):
+                raise ValueError(f"{name}: shape {values[name].shape} does not fit {rows} rows of {size}")
+        return given, rows, np.array([a.shape[1] if a.ndim == 2 else 0 for a in given], dtype=np.int64)
+
     def _columns(self, name: str, value: FloatArray) -> FloatArray:
         """An argument as the tape has it: a carried matrix column by column."""
         flat = value.ravel(order="F") if name in self._names[: self._carried] else value
@@ -93,12 +147,19 @@ def _addresses(arrays: Sequence[FloatArray]) -> Any:
 
 @lru_cache(maxsize=1)
 def _library() -> Any:
-    return load_library("recursion", RECURSION_SOURCE, LIBRARY_FLAGS, _open)
+    return load_library("recursion", RECURSION_SOURCE, LIBRARY_FLAGS, lambda path: _open(path, "recur"))
 
 
-def _open(library: Path) -> Any:
-    recur = ctypes.CDLL(str(library)).recur
+@lru_cache(maxsize=1)
+def _library_in_lanes() -> Any:
+    flags = (*LIBRARY_FLAGS, *_VECTORS[supported()[0].name])
+    return load_library("recursion_in_lanes", recursion_in_lanes(LANES), flags, lambda at: _open(at, "recur_in_lanes"))
+
+
+def _open(library: Path, name: str) -> Any:
+    recur = getattr(ctypes.CDLL(str(library)), name)
     pointer, whole = ctypes.c_void_p, ctypes.c_int64
-    recur.argtypes = [pointer, whole, whole, whole, pointer, pointer, pointer, whole, pointer, pointer]
+    further = (whole, whole, pointer) if name == "recur_in_lanes" else (whole, pointer, pointer)
+    recur.argtypes = [pointer, whole, whole, whole, pointer, pointer, pointer, *further]
     recur.restype = None
     return recur
