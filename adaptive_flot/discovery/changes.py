@@ -212,13 +212,15 @@ def _known_by(told: Told, verdict: Verdict) -> bool:
 def _unless_much_is_left(compared: Comparison) -> Comparison:
     """The comparison, its name or class taken back where it stays far above the errors of the reference.
 
-    By the geometric mean of after / usual over the outputs: a fault may well leave one output of several as it was.
+    A name by the output of which it leaves the most: another part may explain that, too. A class, which says less, by
+    the geometric mean of after / usual over the outputs.
     """
     verdict = compared.verdict
     left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
     if verdict.word not in ("named", "class") or not left:
         return compared
-    if float(np.mean(np.log(list(left.values())))) <= np.log(MUCH_LEFT):
+    logs = np.log(list(left.values()))
+    if float(np.max(logs) if verdict.word == "named" else np.mean(logs)) <= np.log(MUCH_LEFT):
         return compared
     most = max(left, key=lambda name: left[name])
     why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
