@@ -16,6 +16,7 @@ from adaptive_flot.discovery.later_inputs import with_later_inputs
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State, Verdict
 from adaptive_flot.discovery.stages import (
+    NOT_ALL_TRIED,
     allow_for_background,
     check_explained,
     check_sufficient,
@@ -34,7 +35,7 @@ from adaptive_flot.discovery.stages import (
     tell_background,
 )
 from adaptive_flot.discovery.test_design.signals import input_range
-from adaptive_flot.discovery.verdict.conclude import conclude
+from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, conclude
 from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -122,6 +123,7 @@ def discover(
     if later is not None and time.monotonic() < state.search_ends:
         progress("once more, with inputs moved by a row")
         ended, verdict = _run(replace(state, model=ended.model, screening=Screening(later, (), ()), steps_stay=True))
+    verdict = _unless_cut_short(verdict)
     return ended.ended(replace(verdict, seconds=time.perf_counter() - began))
 
 
@@ -150,11 +152,23 @@ def _finer(state: State, verdict: Verdict) -> Model | None:
 
 def _taken_back(verdict: Verdict, finer: Model) -> Verdict:
     """The verdict without its name: the integration errs along what is told."""
+    why = f"the steps of the model are too long for what was found. Set max_step_s={finer.max_step_s:.3g}"
+    return _without_its_name(verdict, why)
+
+
+def _unless_cut_short(verdict: Verdict) -> Verdict:
+    """The verdict, its name taken back where the time ended before further effects were tried, and much is left."""
+    wrong = [c.output.replace("_", " ") for c in verdict.error if c.after > STILL_WRONG * c.noise]
+    if verdict.word != "named" or NOT_ALL_TRIED not in verdict.notes or not wrong:
+        return verdict
+    why = f"the time for the search ended, and with what was found by then {', '.join(wrong)} is still wrong"
+    return _without_its_name(verdict, why)
+
+
+def _without_its_name(verdict: Verdict, why: str) -> Verdict:
+    """The verdict without its name, and why."""
     nearest = verdict.reason[:1].lower() + verdict.reason[1:]
-    reason = (
-        f"Something is missing, and it is not told what: the steps of the model are too long for what was found. "
-        f"Set max_step_s={finer.max_step_s:.3g}. The nearest: {nearest}"
-    )
+    reason = f"Something is missing, and it is not told what: {why}. The nearest: {nearest}"
     return replace(verdict, word="abstain", reason=reason, effects=(), members=())
 
 

@@ -24,13 +24,13 @@ from adaptive_flot.discovery.innovations.search import LEAST_GAIN
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import Discovery, OutputChange, Verdict
-from adaptive_flot.discovery.stages import NONE_FITTED
+from adaptive_flot.discovery.stages import NONE_FITTED, NOT_ALL_TRIED
 from adaptive_flot.discovery.verdict.wording import since_reference
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
 MOST_SECONDS = 60.0
-"""Longest time of the search: where a model is far off, it tries much and tells nothing."""
+"""Longest time of the search: where a model is far off, it tries much. What is cut short tells nothing."""
 BETTER = 0.8
 """What is told already is replaced where errors fall to so many times those with it, by their geometric mean."""
 AT_NOISE = 1.25
@@ -65,8 +65,8 @@ def with_searched_effect(
     limit = min(budget, MOST_SECONDS)
     found = discover(held, record, processes=processes, progress=progress, budget=limit, referred=True)
     verdict = found.verdict
-    if verdict.word not in ("named", "class") or not verdict.effects:
-        return compared
+    if verdict.word not in ("named", "class") or not verdict.effects or NOT_ALL_TRIED in verdict.notes:
+        return compared  # a search that was cut short tells another effect on another machine
     usual = {
         calibration.model.outputs[c].name: float(s)
         for c, s in zip(compared.rows.columns, calibration.usual.overall, strict=True)

@@ -206,6 +206,9 @@ def tell_background(state: State) -> State:
     return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
+NOT_ALL_TRIED = "the time for the search ended: further effects and freer forms were not all tried"
+
+
 def compare_with_common_nuisance(state: State) -> State:
     """Compare the leading alternatives anew, with what all of them lack added to each."""
     problem, result = state.searched
@@ -228,7 +231,7 @@ def judge_alternatives(state: State) -> State:
     judgement = with_certain_part(problem, result, judgement)
     said = state.screening.notes
     if problem.time_is_up:
-        said = (*said, "the time for the search ended: further effects and freer forms were not all tried")
+        said = (*said, NOT_ALL_TRIED)
     if not result.rounds[0].compared:
         judgement = replace(judgement, word="abstain", members=())
     screening = replace(state.screening, notes=said)

@@ -93,14 +93,14 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
         why = "what fits best would have to be larger than such a fault can be"
         return Told("abstain", found[0], (), (), (found[0],), why)
     found = possible or found
-    given_up: list[Hypothesis] = []
+    given_up, everything = list[Hypothesis](), found
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}
         failed = _at_steps_of_an_input(search, best) or _overlapping(base, best, without)
         failed = failed or _contradicted(search, best, without)
         if not failed:
-            return _told(search, base, found, without)
+            return _unless_given_up(_told(search, base, found, without), given_up, everything)
         given_up.append(failed[0])
         if len(best.hypotheses) == 1:
             break
@@ -112,6 +112,21 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
         return Told("abstain", base, (), (), (base,), why)
     return Told("abstain", found[0], (), (), _alike(search, base, found), why)
+
+
+def _unless_given_up(told: Told, given_up: Sequence[Hypothesis], found: Sequence[Explanation]) -> Told:
+    """What is told, unless it is an event, and one that was given up beside another effect explains more alone.
+
+    A leak that opens was given up beside a dependence that takes a part of it, and an event elsewhere named for both.
+    """
+    events = {_name(h) for h in given_up if h.kind in EVENTS}
+    alone = [e for e in found if len(e.hypotheses) == 1 and _name(e.hypotheses[0]) in events]
+    better = max(alone, key=lambda e: e.criterion, default=told.best)
+    is_event = bool(told.effects) and all(h.kind in EVENTS for h in told.effects)
+    if told.word == "abstain" or not is_event or better.criterion < told.best.criterion + LEAST_GAIN:
+        return told
+    why = f"{better.hypotheses[0].label} explains more, and is not certain"
+    return replace(told, word="abstain", certain=(), open=(), why=why)
 
 
 def _why(search: Search, given_up: Sequence[Hypothesis]) -> str:

@@ -157,4 +157,5 @@ def beside_a_part(judgement: Judgement) -> str:
     told = {*judgement.part, *judgement.members}
     sets = [judgement.best, *(a for a in judgement.rivals if judgement.near(a))]
     rests = dict.fromkeys(" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in told) for a in sets)
-    return f"Something else is off beside it, which this record does not tell: {'; or '.join(r for r in rests if r)}. "
+    listed = "; or ".join(r for r in rests if r)
+    return f"Something else is off beside it, which this record does not tell{f': {listed}' if listed else ''}. "
