@@ -281,7 +281,7 @@ def test_an_event_beside_another_effect_explains_what_nothing_else_does(without:
 
 @pytest.mark.parametrize(("alone", "word"), [(300.0, "abstain"), (90.0, "named")])
 def test_an_event_is_not_told_where_one_that_was_given_up_explains_more(alone: float, word: str) -> None:
-    """A leak that opens, beside which a dependence takes a part of it: the pump was named for an event of less worth."""
+    """A leak that opens, of which a dependence takes a part: the pump was named, for an event of less worth."""
     leak, law = event("leak", (250.0, 1e7)), replace(lag("heater"), driver="heat", kind="depends")
     both, other = Given((leak, law), 500.0, 0.9), Given((event("pump", (250.0, 1e7)),), 200.0, 0.8)
     said = told(both, Given((law,), 150.0, 0.4), Given((leak,), alone, 0.9), other)
