@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from adaptive_flot.discovery import changes
 from adaptive_flot.discovery.changes import _unless_contradicted, _unless_much_is_left
 from adaptive_flot.discovery.hypotheses.judgement import Word
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
@@ -118,6 +119,34 @@ def test_a_name_that_leaves_four_times_the_error_of_the_reference_is_not_told(
         assert verdict.reason.startswith("Something has changed, and it is not told what: ")
         assert "the error of amperes is still 4.3 times" in verdict.reason
         assert "The nearest: charger does not go below 1 A." in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("left", "after", "site", "searched"),
+    [
+        (15.0, 1.2, "friction", True),
+        (15.0, 1.2, "encoder", False),  # another place, which the innovations form has not been asked about
+        (15.0, 1.8, "friction", False),
+        (2.0, 1.0, "friction", False),  # little was left
+    ],
+)
+def test_a_short_record_is_searched_for_another_shape_at_the_place_that_is_told(
+    monkeypatch: pytest.MonkeyPatch, left: float, after: float, site: str, searched: bool
+) -> None:
+    """Dry friction was found at its place by a turn of a given width. It left 15 times the noise: nothing was told."""
+
+    def with_error(error: float, place: str) -> Any:
+        effect: Any = SimpleNamespace(effect=SimpleNamespace(site=place, driver="speed"))
+        change = OutputChange("position", "m", 100.0, error, 1.0, (0.5, 0.9))
+        return Compared(Verdict("named", "Friction turns.", (effect,), (), (change,), split="fresh"))
+
+    found = with_error(after, site)
+    monkeypatch.setattr(changes, "with_searched_effect", lambda *given: found)
+    before = with_error(left, "friction")
+    record: Any = None
+    asked = changes._of_another_shape(before, record, 1, lambda stage: None, 60.0)
+    assert asked is (found if searched else before)
+    assert changes._of_another_shape(before, record, 1, lambda stage: None, 0.0) is before
 
 
 @pytest.mark.parametrize(
