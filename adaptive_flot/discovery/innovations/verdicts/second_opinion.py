@@ -43,7 +43,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     unless_it_wanders,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
-from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State
+from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.discovery.verdict.wording import beside_a_part
@@ -170,7 +170,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         return _kept(state, told)
     best = alternative(told.best, after, before, told.best)
     names = best.names
-    judgement = _judgement(told, best)
+    judgement = _judgement(state, told, best)
     error = report_errors(problem, before, after, state.report_record)
     noise = noise_from_row_to_row(problem, before.model, error, state.report_record)
     against = contradiction(judgement, error, noise)
@@ -189,7 +189,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         both = beside_alternatives(state, search, base, told)
         if both is None:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
-        told, judgement = both, _judgement(both, best)
+        told, judgement = both, _judgement(state, both, best)
     _, result = state.searched
     members = [e for e, _ in told.open]
     rivals = others(told.best, members, lambda e: _free_run(state, search, e, before), before)
@@ -207,9 +207,13 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
     )
 
 
-def _judgement(told: Told, best: Alternative) -> Judgement:
+def _judgement(state: State, told: Told, best: Alternative) -> Judgement:
+    """The word for what is told: as in free runs, a dependence that its site has no reason for has no name."""
+    _, result = state.searched
+    nameless = {n for a in result.alternatives for n, known in zip(a.names, a.known, strict=True) if not known}
     members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
-    return Judgement("named" if told.word == "named" else "class", best, members, (), 0.0)
+    word: Word = "class" if told.word != "named" else "unnamed" if nameless & set(best.names) else "named"
+    return Judgement(word, best, members, (), 0.0)
 
 
 def _another_drift(state: State, told: Told) -> bool:

@@ -48,7 +48,7 @@ def verdict(
     monkeypatch.setattr(asking, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
     state: Any = SimpleNamespace(
         judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
-        known_problem=None, refitted=(fit, fit), searched=(None, fit),
+        known_problem=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
     )  # fmt: skip
     search: Any = SimpleNamespace(sizes=lambda explanation: ({}, np.zeros((0, 0))))
     found: Judgement = asking._told(state, search, told.best, told).judgement  # type: ignore[assignment]

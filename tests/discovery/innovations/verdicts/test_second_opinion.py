@@ -212,3 +212,14 @@ def test_much_that_is_found_and_not_confirmed_is_not_nothing(word: str, fall: fl
     result = SimpleNamespace(alternatives=(SimpleNamespace(delta_bic=fall), SimpleNamespace(delta_bic=3.0)))
     given: Any = SimpleNamespace(judged=SimpleNamespace(word=word, best=None), searched=(None, result))
     assert rivals.unconfirmed(given) == asked
+
+
+@pytest.mark.parametrize(("known", "word"), [(True, "named"), (False, "unnamed")])
+def test_a_dependence_that_its_site_has_no_reason_for_has_no_name_here_either(known: bool, word: str) -> None:
+    """A voltmeter by the charge of a cell was named, and the free run would have told a curve without a name."""
+    names = (("voltmeter", "charge"),)
+    found = [SimpleNamespace(names=(("loss", "time"),), known=(True,)), SimpleNamespace(names=names, known=(known,))]
+    state: Any = SimpleNamespace(searched=(None, SimpleNamespace(alternatives=found)))
+    told: Any = SimpleNamespace(word="named", open=(), effects=())
+    best: Any = SimpleNamespace(names=names)
+    assert asking._judgement(state, told, best).word == word
