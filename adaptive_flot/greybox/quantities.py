@@ -14,7 +14,7 @@ from adaptive_flot.errors import ModelError, RangeError
 FloatArray = NDArray[np.float64]
 ParameterRole = Literal["fixed", "estimated"]
 Kind = Literal["states", "inputs", "parameters", "outputs", "signals", "algebraic"]
-DIMENSIONLESS = ("-", "")
+DIMENSIONLESS = ("-", "", "1")
 ROUNDING = 1e-9
 """Share of the end of a range by which a value may lie beyond it and is still at it."""
 ARBITRARY_ZERO = ("K", "degC", "degF")
@@ -61,12 +61,14 @@ class Quantity:
 
     @property
     def column(self) -> str:
-        """Name of the table column: the name, then the unit as a suffix.
+        """Name of the table column: the name, then the unit as a suffix; without one where it has no dimension.
 
         >>> Quantity("air_flow", "m3/s", "air").column
         'air_flow_m3_s'
         """
-        return self.name if self.unit == "-" else f"{self.name}_{self.unit.replace('/', '_').replace(' ', '_')}"
+        return (
+            self.name if self.unit in DIMENSIONLESS else f"{self.name}_{self.unit.replace('/', '_').replace(' ', '_')}"
+        )
 
 
 @dataclass(frozen=True)

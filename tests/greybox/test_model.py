@@ -143,7 +143,8 @@ def test_groups_and_symbols_expand_to_full_names() -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "column"), [("-", "q"), ("m3/s", "q_m3_s"), ("Pa s", "q_Pa_s"), ("V^0.5/s", "q_V^0.5_s")]
+    ("unit", "column"),
+    [("-", "q"), ("1", "q"), ("", "q"), ("m3/s", "q_m3_s"), ("Pa s", "q_Pa_s"), ("V^0.5/s", "q_V^0.5_s")],
 )
 def test_column_name_carries_the_unit(unit: str, column: str) -> None:
     assert Quantity("q", unit, "").column == column
