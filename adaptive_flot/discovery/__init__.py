@@ -20,8 +20,7 @@ discover.py   What is called for one record: the stages, one after the other.
 later_inputs.py  Whether inputs act one row later than a record says.
 stages.py     The stages, from the data to the proposed test.
 fallbacks.py  What is still told where the whole is not: a course, or a part.
-changes.py    What has changed since a reference, events too.
-not_new.py    What is no change: it is on the reference as well, or may be what wanders.
+since_reference/  What has changed since a reference, events too.
 
 Where a statistic is computed
 -----------------------------

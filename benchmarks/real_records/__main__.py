@@ -11,11 +11,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import cascaded_tanks

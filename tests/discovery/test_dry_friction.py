@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery import searched_change
-from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.since_reference import searched_change
+from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, ROWS, STEPS = 0.005, 2500, 20

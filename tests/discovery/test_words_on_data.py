@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.changes import find_changes, unless_an_event
+from adaptive_flot.discovery.since_reference.changes import find_changes, unless_an_event
 from adaptive_flot.greybox.data.dataset import Dataset
 from tests.discovery.heated import NOISE, Truth, heated_tank, tank_record
 

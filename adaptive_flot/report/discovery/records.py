@@ -13,7 +13,7 @@ from adaptive_flot.discovery.hypotheses.comparison import mean_difference
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.wording import words_of
-from adaptive_flot.discovery.searched_change import REPORT_ROWS, SEARCHED
+from adaptive_flot.discovery.since_reference.searched_change import REPORT_ROWS, SEARCHED
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
 from adaptive_flot.report.kit.album import Album

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
 from adaptive_flot.greybox.data.stretches import every_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from adaptive_flot.discovery.not_new import why_not_new
+from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.tank import record, tank
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.innovations import judge as judging
+from adaptive_flot.discovery.innovations import telling_apart
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, worth
 
 ROWS = 240
@@ -29,7 +29,7 @@ def test_each_effect_is_charged_with_what_it_must_gain_in_the_search() -> None:
 def test_a_pair_that_gains_little_more_is_no_rival_of_one_effect(
     monkeypatch: pytest.MonkeyPatch, gain: float, apart: bool
 ) -> None:
-    monkeypatch.setattr(judging, "_adequate", lambda search, e: True)
+    monkeypatch.setattr(telling_apart, "_adequate", lambda search, e: True)
     search: Any = SimpleNamespace()
     one, base = explanation(1, 100.0), explanation(0, 0.0)
-    assert judging.told_apart(search, base, one, explanation(2, gain, seed=1)) == apart
+    assert telling_apart.told_apart(search, base, one, explanation(2, gain, seed=1)) == apart

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.search import Search, numbers_of
+from adaptive_flot.discovery.since_reference.changes import find_changes
 from benchmarks.other_processes.plants.heat_exchanger import make_model as model
 from tests.discovery.innovations.exchanger import BEGINS, ENDS, FOULED, record
 

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, judge, told_apart
+from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.results import State
 
 COMPARED = 6

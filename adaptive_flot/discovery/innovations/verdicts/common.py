@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.innovations.judge import Told, told_apart
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.verdict.certain_part import near_by_least_margin
 

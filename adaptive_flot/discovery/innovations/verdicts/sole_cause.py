@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import STRUCTURE
-from adaptive_flot.discovery.innovations.judge import Told, late_anywhere, told_apart
+from adaptive_flot.discovery.innovations.judge import Told, late_anywhere
 from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.telling_apart import told_apart
 
 
 def sole_cause(search: Search, base: Explanation, found: Sequence[Explanation], told: Told) -> Told | None:

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.changes import find_changes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.hypotheses.telling import verdict_of
+from adaptive_flot.discovery.since_reference.changes import find_changes
 from tests.discovery.innovations.box import DT, LIDS, model, record
 
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery import changes
-from adaptive_flot.discovery.changes import _unless_contradicted, _unless_much_is_left
 from adaptive_flot.discovery.hypotheses.judgement import Word
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST, _too_many_parts
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import OutputChange, Verdict
+from adaptive_flot.discovery.since_reference import changes
+from adaptive_flot.discovery.since_reference.taken_back import unless_contradicted, unless_much_is_left
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_
     told: Any = SimpleNamespace(
         word="named" if sites else "none", effects=found, alike=(SimpleNamespace(hypotheses=found),)
     )
-    assert _unless_contradicted(compared, told).verdict.word == word
+    assert unless_contradicted(compared, told).verdict.word == word
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_name_that_leaves_four_times_the_error_of_the_reference_is_not_told(
     compared: Any = Compared(
         Verdict(word=given, reason="Charger does not go below 1 A.", effects=(), members=(), error=error, split="fresh")
     )
-    verdict = _unless_much_is_left(compared).verdict
+    verdict = unless_much_is_left(compared).verdict
     assert verdict.word == word
     if word == "abstain":
         assert verdict.reason.startswith("Something has changed, and it is not told what: ")

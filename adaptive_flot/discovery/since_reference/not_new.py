@@ -6,7 +6,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
-from adaptive_flot.discovery.searched_change import AT_NOISE, SEARCHED
+from adaptive_flot.discovery.since_reference.searched_change import AT_NOISE, SEARCHED
 
 EXPLAINS = 0.7
 """A fault explains the reference where it leaves at most so much of its criterion: another one takes a few per cent."""

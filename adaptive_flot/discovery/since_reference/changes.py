@@ -13,7 +13,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short
@@ -33,16 +32,20 @@ from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
-from adaptive_flot.discovery.not_new import why_not_new
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
-from adaptive_flot.discovery.results import Verdict
-from adaptive_flot.discovery.searched_change import AT_NOISE, with_searched_effect
+from adaptive_flot.discovery.since_reference.not_new import why_not_new
+from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
+from adaptive_flot.discovery.since_reference.taken_back import (
+    leaves_more,
+    taken_back,
+    unless_contradicted,
+    unless_more_than_noise,
+    unless_much_is_left,
+)
 from adaptive_flot.discovery.verdict.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
-MUCH_LEFT = 4.0
-"""An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
 LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
@@ -86,26 +89,26 @@ def _found(
     compared = compare(model, records, references, adapted=adapted, processes=processes, progress=progress, ends=ends)
     if not compared.complete:
         why = f"the budget ended before all {compared.tried} hypotheses were compared"
-        return _taken_back(compared, why, said="Nothing is told")
+        return taken_back(compared, why, said="Nothing is told")
     if not references or compared.verdict.word == "insufficient":
         return compared
     if len(records) != 1:
-        return _unless_much_is_left(compared)
+        return unless_much_is_left(compared)
     short, left = is_short(records[0], compared.calibration.model), ends - time.monotonic()
     judged: Comparison | None = compared
     if left <= 0:
         judged = None
     elif short:
         judged = _row_by_row(compared, records[0], references, processes, progress, ends)
-    elif _leaves_more(compared.verdict):
-        judged = _unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))
+    elif leaves_more(compared.verdict):
+        judged = unless_more_than_noise(with_searched_effect(compared, records[0], processes, progress, left))
     confirmed = short and judged is not None
     if short and judged is not None:
         judged = _of_another_shape(judged, records[0], processes, progress, ends - time.monotonic())
     if judged is None:
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, SPENT)))
     why = why_not_new(judged, confirmed)
-    return _taken_back(judged, why, said="No change is told") if why else _unless_much_is_left(judged)
+    return taken_back(judged, why, said="No change is told") if why else unless_much_is_left(judged)
 
 
 def _row_by_row(
@@ -131,11 +134,11 @@ def _row_by_row(
             if with_it is compared and compared.verdict.word in ("none", "abstain"):
                 # a model that lacks much may hide an event of some rows from free runs, which usually err as much
                 with_it = with_cause(compared, search, base, told, before, seconds, unusual=True)
-        elif _leaves_more(compared.verdict):
+        elif leaves_more(compared.verdict):
             with_it = with_cause(compared, search, base, told, before, seconds)
             if with_it is compared and sole is not None:
                 with_it = with_cause(compared, search, base, sole, before, seconds)
-    return with_it if with_it is not compared else _unless_contradicted(compared, told)
+    return with_it if with_it is not compared else unless_contradicted(compared, told)
 
 
 def unless_an_event(
@@ -159,7 +162,7 @@ def unless_an_event(
     if alone.word != "named" or not alone.effects or any(e.effect.driver != "time" for e in alone.effects):
         return compared
     said = alone.reason.partition(". ")[0]
-    return _taken_back(compared, f"{longest.name} alone says: {said}. Judge each record by itself", "is missing")
+    return taken_back(compared, f"{longest.name} alone says: {said}. Judge each record by itself", "is missing")
 
 
 def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Dataset], referred: bool) -> Comparison:
@@ -176,59 +179,6 @@ def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Da
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, *said))) if said else compared
 
 
-def _leaves_more(verdict: Verdict) -> bool:
-    """Whether something has changed that is not told, or what is told leaves an error above that of the reference."""
-    left = any(c.after > ABOVE_USUAL * c.noise for c in verdict.error)
-    return verdict.word == "abstain" or (verdict.word in ("named", "class") and left)
-
-
-def _unless_contradicted(compared: Comparison, told: Told) -> Comparison:
-    """The comparison, its name taken back where the innovations form does not know it.
-
-    That is where it leaves more than the reference and another part is named there, or far more and no explanation
-    there has that effect. And it is where the errors are not far above those of the reference: so little may be what
-    wanders.
-    """
-    verdict, found = compared.verdict, told.effects
-    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
-    if verdict.word not in ("named", "class") or sites & {h.site for h in found}:
-        return compared
-    if told.word == "named" and found and _leaves_more(verdict):
-        said = " and ".join(h.label for h in found)
-        why = f"it leaves more than the reference, and with process noise {said} explains more"
-    elif not _known_by(told, verdict) and any(c.after > FAR_ABOVE * c.noise for c in verdict.error):
-        why = "it leaves far more than the reference, and with process noise nothing speaks for it"
-    elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
-        why = "errors are not far above those of the reference, and with process noise it is not confirmed"
-    else:
-        return compared
-    return _taken_back(compared, why)
-
-
-def _known_by(told: Told, verdict: Verdict) -> bool:
-    """Whether an explanation of the innovations form has one of the effects that are told."""
-    said = {(e.effect.site, e.effect.driver) for e in verdict.effects} | set(verdict.members)
-    return bool(said & {(h.site, h.driver) for e in told.alike for h in e.hypotheses})
-
-
-def _unless_much_is_left(compared: Comparison) -> Comparison:
-    """The comparison, its name or class taken back where it stays far above the errors of the reference.
-
-    A name by the output of which it leaves the most: another part may explain that, too. A class, which says less, by
-    the geometric mean of after / usual over the outputs.
-    """
-    verdict = compared.verdict
-    left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
-    if verdict.word not in ("named", "class") or not left:
-        return compared
-    logs = np.log(list(left.values()))
-    if float(np.max(logs) if verdict.word == "named" else np.mean(logs)) <= np.log(MUCH_LEFT):
-        return compared
-    most = max(left, key=lambda name: left[name])
-    why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
-    return _taken_back(compared, f"{why}, so it may stand in for something else")
-
-
 def _of_another_shape(
     compared: Comparison, record: Dataset, processes: int, progress: Callable[[str], None], left: float
 ) -> Comparison:
@@ -237,52 +187,13 @@ def _of_another_shape(
     Dry friction is found at its place by a turn of a given width, which leaves fifteen times the noise of an encoder. A
     shape at another place is not taken: the search of a long record has no innovations form to contradict it.
     """
-    if left <= 0 or _unless_much_is_left(compared) is compared:
+    if left <= 0 or unless_much_is_left(compared) is compared:
         return compared
     nearest = {e.effect.site for e in compared.verdict.effects} | {site for site, _ in compared.verdict.members}
     searched = with_searched_effect(compared, record, processes, progress, left)
     told = {e.effect.site for e in searched.verdict.effects} | {site for site, _ in searched.verdict.members}
     usual = all(c.after <= ABOVE_USUAL * c.noise for c in searched.verdict.error)
     return searched if usual and told and told <= nearest else compared
-
-
-def _unless_more_than_noise(compared: Comparison) -> Comparison:
-    """The comparison, its name or class taken back where the model is right on its reference, and not with the name.
-
-    Where it errs by no more than noise there, the right name leaves no more in any output.
-    """
-    verdict = compared.verdict
-    level = _noise_where_right(compared)
-    left = {c.output: c.after / level[c.output] for c in verdict.error if c.output in level}
-    most = max(left, key=lambda name: left[name], default="")
-    if verdict.word not in ("named", "class") or not most or left[most] <= FAR_ABOVE:
-        return compared
-    why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times its noise"
-    return _taken_back(compared, f"{why}, which is all that the model errs by on the reference")
-
-
-def _noise_where_right(compared: Comparison) -> dict[str, float]:
-    """Noise from row to row of each output in the new records and the reference; none where the model errs by more."""
-    calibration, columns = compared.calibration, compared.rows.columns
-    if (calibration.usual.overall > AT_NOISE * calibration.noise).any():
-        return {}
-    level = np.maximum(noise_floor(compared.rows.records, columns), calibration.usual.overall)
-    return {calibration.model.outputs[c].name: float(s) for c, s in zip(columns, level, strict=True)}
-
-
-def _taken_back(compared: Comparison, why: str, changed: str = "has changed", said: str = "") -> Comparison:
-    """The comparison without its name, and why."""
-    word: Literal["abstain"] = "abstain"
-    verdict = compared.verdict
-    nearest = verdict.reason[:1].lower() + verdict.reason[1:]
-    said = said or f"Something {changed}, and it is not told what"
-    reason = f"{said}: {why}. The nearest: {nearest}"
-    return replace(
-        compared,
-        verdict=replace(verdict, word=word, reason=reason, effects=(), members=()),
-        judged=replace(compared.judged, word=word),
-        model=compared.calibration.model,
-    )
 
 
 def _with_process_noise(

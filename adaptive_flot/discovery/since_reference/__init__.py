@@ -1,0 +1,7 @@
+"""What has changed since a reference: hypotheses of the whole record, events, and effects of other shapes.
+
+changes.py          What is called: the comparison first, then what it does not see.
+searched_change.py  Effects of other shapes and two effects, by the search of a single record with constants held.
+not_new.py          What is no change: it is on the reference as well, or may be what wanders.
+taken_back.py       When what is told is taken back: it leaves too much, or another form contradicts it.
+"""

@@ -1,0 +1,110 @@
+"""What is told since a reference, and when it is taken back: it leaves too much, or another form contradicts it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
+from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
+from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.since_reference.searched_change import AT_NOISE
+
+MUCH_LEFT = 4.0
+"""An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
+
+
+def leaves_more(verdict: Verdict) -> bool:
+    """Whether something has changed that is not told, or what is told leaves an error above that of the reference."""
+    left = any(c.after > ABOVE_USUAL * c.noise for c in verdict.error)
+    return verdict.word == "abstain" or (verdict.word in ("named", "class") and left)
+
+
+def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
+    """The comparison, its name taken back where the innovations form does not know it.
+
+    That is where it leaves more than the reference and another part is named there, or far more and no explanation
+    there has that effect. And it is where the errors are not far above those of the reference: so little may be what
+    wanders.
+    """
+    verdict, found = compared.verdict, told.effects
+    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    if verdict.word not in ("named", "class") or sites & {h.site for h in found}:
+        return compared
+    if told.word == "named" and found and leaves_more(verdict):
+        said = " and ".join(h.label for h in found)
+        why = f"it leaves more than the reference, and with process noise {said} explains more"
+    elif not _known_by(told, verdict) and any(c.after > FAR_ABOVE * c.noise for c in verdict.error):
+        why = "it leaves far more than the reference, and with process noise nothing speaks for it"
+    elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
+        why = "errors are not far above those of the reference, and with process noise it is not confirmed"
+    else:
+        return compared
+    return taken_back(compared, why)
+
+
+def _known_by(told: Told, verdict: Verdict) -> bool:
+    """Whether an explanation of the innovations form has one of the effects that are told."""
+    said = {(e.effect.site, e.effect.driver) for e in verdict.effects} | set(verdict.members)
+    return bool(said & {(h.site, h.driver) for e in told.alike for h in e.hypotheses})
+
+
+def unless_much_is_left(compared: Comparison) -> Comparison:
+    """The comparison, its name or class taken back where it stays far above the errors of the reference.
+
+    A name by the output of which it leaves the most: another part may explain that, too. A class, which says less, by
+    the geometric mean of after / usual over the outputs.
+    """
+    verdict = compared.verdict
+    left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
+    if verdict.word not in ("named", "class") or not left:
+        return compared
+    logs = np.log(list(left.values()))
+    if float(np.max(logs) if verdict.word == "named" else np.mean(logs)) <= np.log(MUCH_LEFT):
+        return compared
+    most = max(left, key=lambda name: left[name])
+    why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
+    return taken_back(compared, f"{why}, so it may stand in for something else")
+
+
+def unless_more_than_noise(compared: Comparison) -> Comparison:
+    """The comparison, its name or class taken back where the model is right on its reference, and not with the name.
+
+    Where it errs by no more than noise there, the right name leaves no more in any output.
+    """
+    verdict = compared.verdict
+    level = _noise_where_right(compared)
+    left = {c.output: c.after / level[c.output] for c in verdict.error if c.output in level}
+    most = max(left, key=lambda name: left[name], default="")
+    if verdict.word not in ("named", "class") or not most or left[most] <= FAR_ABOVE:
+        return compared
+    why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times its noise"
+    return taken_back(compared, f"{why}, which is all that the model errs by on the reference")
+
+
+def _noise_where_right(compared: Comparison) -> dict[str, float]:
+    """Noise from row to row of each output in the new records and the reference; none where the model errs by more."""
+    calibration, columns = compared.calibration, compared.rows.columns
+    if (calibration.usual.overall > AT_NOISE * calibration.noise).any():
+        return {}
+    level = np.maximum(noise_floor(compared.rows.records, columns), calibration.usual.overall)
+    return {calibration.model.outputs[c].name: float(s) for c, s in zip(columns, level, strict=True)}
+
+
+def taken_back(compared: Comparison, why: str, changed: str = "has changed", said: str = "") -> Comparison:
+    """The comparison without its name, and why."""
+    word: Literal["abstain"] = "abstain"
+    verdict = compared.verdict
+    nearest = verdict.reason[:1].lower() + verdict.reason[1:]
+    said = said or f"Something {changed}, and it is not told what"
+    reason = f"{said}: {why}. The nearest: {nearest}"
+    return replace(
+        compared,
+        verdict=replace(verdict, word=word, reason=reason, effects=(), members=()),
+        judged=replace(compared.judged, word=word),
+        model=compared.calibration.model,
+    )
