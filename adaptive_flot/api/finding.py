@@ -246,8 +246,8 @@ def discover(
     processes
         Fits that run at once; default as many as there are cores.
     budget
-        Seconds after which the search in a single record ends with what it has come to. With references the simple
-        hypotheses of the whole record are compared in any case.
+        Seconds after which the search ends with what it has come to. With references or several records nothing is
+        named where it ends before all simple hypotheses are compared.
     compiled
         Whether long runs are machine code, where this system has a C compiler. The numbers agree to rounding.
     progress

@@ -45,7 +45,7 @@ def discover_records(
     progress
         Called with a word for each stage and each fit.
     budget
-        Seconds after which nothing more is searched for in one record with a reference.
+        Seconds after which nothing more is searched for, see `find_changes`.
 
     Raises
     ------
