@@ -82,6 +82,7 @@ bench-measured: $(READY) ## Discovery on measured records and shared examples in
 	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)
 	@$(BIN)/python -m benchmarks.mining_plant
 	@$(BIN)/python -m benchmarks.real_records
+	@$(BIN)/python -m benchmarks.real_records.unchanged
 
 lock: ## Pin the dependencies again in requirements.lock (uv, in a throw-away environment)
 	@$(require_python)

@@ -37,6 +37,7 @@ from adaptive_flot.discovery.stages import (
 from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, conclude
 from adaptive_flot.discovery.verdict.heed_report import heed_report
+from adaptive_flot.discovery.verdict.sizes import spaced
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -158,7 +159,7 @@ def _taken_back(verdict: Verdict, finer: Model) -> Verdict:
 
 def _unless_cut_short(verdict: Verdict) -> Verdict:
     """The verdict, its name taken back where the time ended before further effects were tried, and much is left."""
-    wrong = [c.output.replace("_", " ") for c in verdict.error if c.after > STILL_WRONG * c.noise]
+    wrong = [spaced(c.output) for c in verdict.error if c.after > STILL_WRONG * c.noise]
     if verdict.word != "named" or NOT_ALL_TRIED not in verdict.notes or not wrong:
         return verdict
     why = f"the time for the search ended, and with what was found by then {', '.join(wrong)} is still wrong"

@@ -56,6 +56,7 @@ from adaptive_flot.greybox.rescaled import factors_of, rescaled
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5
 """How long the last fits, and the proposed test, take: about so many times what the fit of the model as it is took."""
 
+NOT_ALL_TRIED = "the time for the search ended: further effects and freer forms were not all tried"
 NONE_FITTED = "no parameter has the role 'estimated': all keep the values of the model"
 
 
@@ -204,9 +205,6 @@ def tell_background(state: State) -> State:
         return replace(state, background=background_words(background, units))
     said = f"{subject(background)} estimated beside every alternative; beside the best one it is not needed"
     return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
-
-
-NOT_ALL_TRIED = "the time for the search ended: further effects and freer forms were not all tried"
 
 
 def compare_with_common_nuisance(state: State) -> State:

@@ -7,5 +7,7 @@ electric_drives.py     Five records of two drives whose counter does not see the
 heat_exchanger.py      A steam heat exchanger whose gain falls with the flow; judged by running on.
 lamp.py                A lamp over a plate: a negative example.
 asked.py               The figures that were asked for, with targets and what was measured.
+folder.py              Where the records are.
+unchanged.py           False alarms: two records of a plant that nobody changed.
 __main__.py            Every verdict beside the truth; the cascaded tanks of the package too.
 """

@@ -21,8 +21,8 @@ from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import cascaded_tanks
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
 from benchmarks.real_records.asked import Judged, of_measured_records, of_simulated_records, table_of
+from benchmarks.real_records.folder import SHARED, has_records
 
-SHARED = Path(__file__).parents[2].parent / "shared" / "data"
 LARGEST_CLASS = 2
 TANK_SITES = {"upper_outflow", "lower_inflow", "lower_outflow", "level_sensor"}
 """Where the spill of the tanks acts, and the sensor, which ends at the rim of the lower one."""
@@ -101,8 +101,7 @@ def tanks(folder: Path) -> Iterator[Judged]:
 
 def main(folder: Path) -> int:
     """Judge, print and count; 2 where there is nothing to judge."""
-    if not (folder / "air-handling-unit").is_dir():
-        print(f"no measured records in {folder}; give the folder that holds them", file=sys.stderr)
+    if not has_records(folder):
         return 2
     console, judged = Console(width=160), []
     table = Table(title="Verdicts on real records", title_justify="left")

@@ -7,6 +7,7 @@ are right, and a name or a class is a false alarm. Command: `python -m benchmark
 from __future__ import annotations
 
 import itertools
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,8 +20,8 @@ from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model
 from adaptive_flot.processes import cascaded_tanks
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
+from benchmarks.real_records.folder import SHARED, has_records
 
-SHARED = Path(__file__).parents[2].parent / "shared" / "data"
 QUARTERS = 4
 FALSE_ALARM = ("named", "class", "unnamed")
 
@@ -52,11 +53,13 @@ def _neighbours(name: str, model: Model, record: Dataset, count: int) -> Iterato
         yield f"{name}, part {i + 1} -> {j + 1} of {count}", model, parts[i], parts[j]
 
 
-def main() -> None:
-    """Print a table of every pair with its verdict; exit code 0 whatever was told."""
+def main(folder: Path) -> int:
+    """Print a table of every pair with its verdict; 2 where there is nothing to judge."""
+    if not has_records(folder):
+        return 2
     console, alarms, count = Console(), 0, 0
     table = Table("reference -> record", "verdict", "seconds", "what was told")
-    for name, model, old, new in pairs(SHARED):
+    for name, model, old, new in pairs(folder):
         began = time.perf_counter()
         verdict = find_changes(model, [new], [old], processes=available_processes()).verdict
         alarm = verdict.word in FALSE_ALARM
@@ -66,7 +69,8 @@ def main() -> None:
         console.print(f"{name}: {word}", soft_wrap=True)
     console.print(table)
     console.print(f"False alarms: {alarms} of {count}.")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else SHARED))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.results import Verdict, Word
 from adaptive_flot.greybox import Dataset, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
-from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
+from benchmarks.real_records import __main__ as judging
+from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp, unchanged
 from benchmarks.real_records.__main__ import worth_of
 from benchmarks.real_records.asked import Judged, of_measured_records, of_simulated_records
 
@@ -85,3 +88,25 @@ def test_published_figures_are_those_of_the_docs() -> None:
     assert len(figures) == 7
     assert figures["the 300: told"].measured.endswith("(135/160)")
     assert figures["plant-like: told"].measured.endswith("(45/67)")
+
+
+def test_each_part_of_an_unchanged_record_is_asked_about_once_and_is_a_reference_once() -> None:
+    """With the part before it as the reference, the first with the last; no row is left out or used twice."""
+    n = 10
+    whole = Dataset("whole", np.arange(n, dtype=np.float64), 1.0, np.zeros((n, 1)), np.zeros((n, 1)))
+    found = list(unchanged._neighbours("whole", lamp.make_model(), whole, 3))
+    assert [name for name, *_ in found] == [
+        "whole, part 1 -> 2 of 3",
+        "whole, part 2 -> 3 of 3",
+        "whole, part 3 -> 1 of 3",
+    ]
+    for parts in ([old for *_, old, _ in found], [new for *_, new in found]):
+        np.testing.assert_array_equal(np.sort(np.concatenate([part.time for part in parts])), whole.time)
+    assert all(old.time[0] != new.time[0] for *_, old, new in found)
+
+
+@pytest.mark.parametrize("main", [judging.main, unchanged.main])
+def test_without_the_records_one_line_says_so(main: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(tmp_path) == 2  # type: ignore[operator]
+    said = capsys.readouterr()
+    assert said.out == "" and len(said.err.splitlines()) == 1 and str(tmp_path) in said.err

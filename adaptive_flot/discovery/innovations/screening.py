@@ -68,7 +68,7 @@ class Screening:
     def all(self, *, events: bool, ramps: bool = False) -> list[Screened]:
         """Every suspect, the best first; with changes in time or without, and with gradual ones or without.
 
-        None where the filter has run off: nothing can be regressed on it.
+        Empty where the filter has run off: nothing can be regressed on it.
         """
         record = self._response.record
         if not all(np.isfinite(v).all() for v in (self._left, *self._values.values(), *self._drivers.values())):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering.noise_model import STUDENT, NoiseModel
 from adaptive_flot.greybox.filtering.step import filter_step, first_correction
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.compiled import CompileError
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
@@ -122,14 +124,23 @@ class RecordFilter:
         self, record: Dataset, cases: Sequence[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]]
     ) -> FloatArray:
         """Log-densities of the rows (cases, N) for several cases (noise, z0, P0, p), side by side: those of `run`."""
-        if len(cases) < 2 or len(record) == 1 or not isinstance(self._many, TapeRecursion):
-            return np.array([self.run(record, *case).log_likelihood for case in cases]).reshape(-1, len(record))
+        if len(cases) > 1 and len(record) > 1 and isinstance(self._many, TapeRecursion):
+            with suppress(CompileError):  # without the library for several they are run one by one
+                return self._side_by_side(self._many, record, cases)
+        return np.array([self.run(record, *case).log_likelihood for case in cases]).reshape(-1, len(record))
+
+    def _side_by_side(
+        self,
+        many: TapeRecursion,
+        record: Dataset,
+        cases: Sequence[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]],
+    ) -> FloatArray:
         members, found = [], np.empty((len(cases), len(record)))
         for i, case in enumerate(cases):
             (z, P, _, _, likelihood), each, _ = self._from_first_row(record, *case)
             members.append({"z": z, "P": P, **each})
             found[i, 0] = likelihood.item()
-        found[:, 1:] = self._many.side_by_side(members, "log_likelihood")[:, :, 0]
+        found[:, 1:] = many.side_by_side(members, "log_likelihood")[:, :, 0]
         return found
 
     def _from_first_row(

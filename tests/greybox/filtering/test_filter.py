@@ -8,6 +8,8 @@ import pytest
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Dataset, Effect, FloatArray, Model, Parameter, Quantity, Scope, Stepper
 from adaptive_flot.greybox.filtering import NoiseModel, RecordFilter, maximise, prediction_errors, smooth
+from adaptive_flot.greybox.stepping.compiled import CompileError
+from adaptive_flot.greybox.stepping.whole_record import tape_recursion
 
 DT, DECAY = 2.0, 0.05
 Q, R = 0.3, 0.5
@@ -81,9 +83,17 @@ def test_gaussian_filter_is_the_kalman_filter() -> None:
     assert filtered.log_likelihood.sum() == pytest.approx(total, rel=1e-6)
 
 
-@pytest.mark.parametrize("rows", [1, 400])
-def test_likelihoods_of_several_cases_are_those_of_each_alone(rows: int) -> None:
+@pytest.mark.parametrize(("rows", "library"), [(1, True), (400, True), (400, False)])
+def test_likelihoods_of_several_cases_are_those_of_each_alone(
+    monkeypatch: pytest.MonkeyPatch, rows: int, library: bool
+) -> None:
     """To the last bit, with missing outputs, and noise, start and parameters of its own for each."""
+
+    def none() -> None:
+        raise CompileError("the disk is full")
+
+    if not library:
+        monkeypatch.setattr(tape_recursion, "_library_in_lanes", none)
     data, _ = record(rows)
     own = RecordFilter(first_order(), DT, [0])
     cases = [
