@@ -88,7 +88,7 @@ class Model(Checks, Described):
     compiled
         Whether steppers and estimators turn what they call in a loop into machine code.
     record_code
-        Whether runs of whole records that take many steps are machine code where that can be had; see
+        Whether runs of whole records that take many steps are machine code where a compiler is; see
         `stepping/whole_record`. Their numbers agree with the plain ones to rounding.
 
     Raises
@@ -115,7 +115,7 @@ class Model(Checks, Described):
     edges: tuple[str, ...] = ()
     effects: tuple[Effect, ...] = ()
     compiled: bool = False
-    record_code: bool = False
+    record_code: bool = True
     _functions: FunctionCache[Any] = field(default_factory=FunctionCache, init=False, repr=False, compare=False)
     _extended: FunctionCache[Model] = field(
         default_factory=lambda: FunctionCache(MOST_EXTENDED), init=False, repr=False, compare=False
