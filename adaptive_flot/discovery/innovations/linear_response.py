@@ -13,7 +13,7 @@ Trans. Automatic Control* 21 (1976) 108, on jumps; Basseville & Nikiforov, *Dete
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.linear_run import linear_run
+from adaptive_flot.greybox.stepping.recursion import row_by_row
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CLIP = 100.0
@@ -63,9 +64,8 @@ class ResponseFunctions:
         self.extended = model.with_effects(effects) if effects else model
         self.filter = RecordFilter(self.extended, dt, columns, (), degrees_of_freedom)
         self.wrt = (*(e.parameter(e.terms[0].name) for e in effects), *constants)
-        self._step = Stepper(self.extended, dt).one_step_jacobians(list(self.wrt))
+        self._each_row = row_by_row(Stepper(self.extended, dt).one_step_jacobians(list(self.wrt)), {}, ("p",))
         self.degrees_of_freedom = degrees_of_freedom
-        self._rows: dict[int, Any] = {}
 
     def at(
         self, record: Dataset, noise: NoiseModel, p: FloatArray, start: tuple[FloatArray, FloatArray]
@@ -89,19 +89,16 @@ class ResponseFunctions:
         return LinearResponse(self, record, noise, p, filtered, self._jacobians(record, filtered, values))
 
     def _jacobians(self, record: Dataset, filtered: Filtered, p: FloatArray) -> Jacobians:
-        count, nx = len(record) - 1, len(self.extended.states)
-        if count not in self._rows:
-            self._rows[count] = self._step.map(count)
-        found = self._rows[count](
-            filtered.z[:-1].T, record.time[None, :-1], record.inputs[1:].T, np.tile(p[:, None], count)
+        each = {"x": filtered.z[:-1], "t": record.time[:-1, None], "u": record.inputs[1:], "p": p}
+        found, count, rows = self._each_row({}, each), len(record) - 1, list(self.columns)
+        heights = {"dx": len(self.extended.states), "dy": len(self.extended.outputs)}
+        widths = {"dx": len(self.extended.states), "dtheta": len(self.wrt)}
+        fx, fp, hx, hp = (  # a matrix comes column by column
+            found[f"{of}_{by}"].reshape(count, width, height).transpose(0, 2, 1)
+            for of, height in heights.items()
+            for by, width in widths.items()
         )
-        _, _, fx, fp, hx, hp = (np.array(part) for part in found)
-
-        def by_row(table: FloatArray, width: int) -> FloatArray:
-            return table.reshape(len(table), count, width).transpose(1, 0, 2)
-
-        rows, w = list(self.columns), len(self.wrt)
-        return Jacobians(by_row(fx, nx), by_row(fp, w), by_row(hx, nx)[:, rows], by_row(hp, w)[:, rows])
+        return Jacobians(fx, fp, hx[:, rows], hp[:, rows])
 
 
 class Jacobians(NamedTuple):

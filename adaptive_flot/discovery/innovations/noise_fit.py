@@ -6,9 +6,11 @@ number for each state and output the likelihood of a model that is wrong has man
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from adaptive_flot.greybox.filtering import NoiseModel
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -17,13 +19,26 @@ THETA = (1e-6, 10.0)
 """Range of process noise, in scales of the states per square root of the time that the record samples."""
 RHO = (0.3, 10.0)
 """Range of measurement noise, in that from row to row."""
-COARSE, ROUNDS, MOVES = 7, 8, 8
-"""Grid of the first search, most rounds of the two in turn, and most moves of one search."""
-ENOUGH, NARROWEST = 0.5, 0.1
-"""Gain of a round that does not count, and the least distance in the logarithm at which one looks."""
+THETAS, RHOS = (1e-4, 1e-3, 4e-3, 0.02, 0.05, 0.15, 0.4, 1.5), (0.6, 1.0, 1.6)
+"""Sizes that a search looks at first. Without process noise the cost is a plain that leads nowhere."""
+ELSEWHERE = 0.25
+"""Change of the logarithm of rho after which it looks at all of theta again."""
+ROUNDS = 10
+"""Most steps."""
+NEAR = np.array([0.1, 0.05])
+STENCIL = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1)], dtype=float)
+"""Distances in the logarithms of theta and rho for differences, and the points that these take beside the middle."""
+LONGEST = 20.0
+"""Longest step along a direction, in near distances."""
+SHARES = (1.0, 0.5, 0.25, 2.0)
+"""Shares of a step that are tried."""
+ENOUGH = 0.3
+"""Gain of a step that does not count."""
+FLAT, TINY = 1e-3, 1e-9
+"""Least curvature that counts, as a share of the largest, and in itself."""
 Costs = Callable[[Sequence[tuple[float, float]]], Sequence[float]]
-FIRST_WIDTH = 1.0
-"""Distance in the logarithm at which a search from a known size looks first; a third of it in the next round."""
+Point = tuple[float, float]
+"""Logarithms of theta and rho."""
 
 
 def noise_of(
@@ -40,71 +55,82 @@ def noise_of(
     )
 
 
-def search_noise(costs: Costs, start: tuple[float, float] | None = None) -> tuple[float, float]:
-    """Find theta and rho that minimise a cost: on a grid, then each in turn by parabolas in its logarithm.
+def search_noise(
+    costs: Costs, start: tuple[float, float] | None = None, cost: float | None = None
+) -> tuple[tuple[float, float], float]:
+    """Find theta and rho that minimise a cost: steps of Newton in their logarithms, by differences.
 
-    After each round the step of both is tried once more: one noise may stand for the other (Hooke & Jeeves, *J. ACM* 8
-    (1961) 212). Rounds end when one gains nothing that counts. `costs` takes several pairs (theta, rho) at once.
+    Where the cost is no bowl, curvatures count by their size (Nocedal & Wright, *Numerical Optimization*, 2006, 3.4).
+    Shares of the step are tried, and each noise alone. A step looks at up to eight points at once, twice: filters run
+    side by side, so that eight cost little more than one.
+
+    Parameters
+    ----------
+    costs
+        Takes several pairs (theta, rho) at once.
+    start
+        Where to begin; default the best of a grid.
+    cost
+        The cost there, where it is known.
+
+    Returns
+    -------
+    tuple
+        The pair, and its cost.
     """
+    search = _Search(costs)
     if start is None:
-        grid = [(float(t), 1.0) for t in np.geomspace(*THETA, COARSE)]
-        values = costs(grid)
-        at, best = grid[int(np.argmin(values))], min(values)
-        width = float(np.log(grid[1][0] / grid[0][0])) / 2
+        middle = search.least_of(np.log(list(product(THETAS, RHOS))))
     else:
-        at, best, width = start, costs([start])[0], FIRST_WIDTH
+        middle = search.inside(np.log(start))
+        search.seen.update({middle: cost} if cost is not None else {})
+    looked, gain = np.inf, np.inf
     for _ in range(ROUNDS):
-        before, first = best, at
-        theta, best = _by_parabolas(_along(costs, rho=at[1]), at[0], best, width, THETA)
-        rho, best = _by_parabolas(_along(costs, theta=theta), at[1], best, min(width, FIRST_WIDTH) / 2, RHO)
-        at = theta, rho
-        if at != first:
-            further = float(np.clip(theta**2 / first[0], *THETA)), float(np.clip(rho**2 / first[1], *RHO))
-            (again,) = costs([further])
-            at, best = (further, again) if again < best else (at, best)
-        if before - best < ENOUGH and width < FIRST_WIDTH:
+        if abs(middle[1] - looked) > ELSEWHERE:
+            looked, middle = middle[1], search.least_of([middle, *((theta, middle[1]) for theta in np.log(THETAS))])
+        elif gain < ENOUGH:
             break
-        width = max(width / 3, NARROWEST)
-    return at
+        before, at = search.seen[middle], search.off_the_ends(middle)
+        search.least_of([at, *(at + NEAR * STENCIL)])
+        middle = search.least_of(search.steps_from(at))
+        gain = before - search.seen[middle]
+    return (float(np.exp(middle[0])), float(np.exp(middle[1]))), search.seen[middle]
 
 
-def _along(costs: Costs, theta: float | None = None, rho: float | None = None) -> Callable[[list[float]], list[float]]:
-    """The costs along one of the two, the other one being given."""
+class _Search:
+    """The points (log theta, log rho) that were tried, with their costs."""
 
-    def of(values: list[float]) -> list[float]:
-        pairs = [(v if theta is None else theta, v if rho is None else rho) for v in values]
-        return list(costs(pairs)) if pairs else []
+    def __init__(self, costs: Costs) -> None:
+        self._costs, self._ends = costs, np.log([THETA, RHO]).T
+        self.seen: dict[Point, float] = {}
 
-    return of
+    def inside(self, point: ArrayLike) -> Point:
+        """The nearest point in range; rounded, so that what is tried by two ways is one point."""
+        theta, rho = np.clip(np.round(np.asarray(point, dtype=float), 9), *self._ends).tolist()
+        return theta, rho
 
+    def off_the_ends(self, point: Point) -> FloatArray:
+        """The nearest point from which differences stay in range."""
+        return np.asarray(self.inside(np.clip(point, self._ends[0] + NEAR, self._ends[1] - NEAR)))
 
-def _by_parabolas(
-    costs: Callable[[list[float]], list[float]], at: float, value: float, width: float, ends: tuple[float, float]
-) -> tuple[float, float]:
-    """Where a cost is least near a point with a known value, and its value there.
+    def least_of(self, points: Iterable[ArrayLike]) -> Point:
+        """Where the cost is least so far, when these points were tried too."""
+        new = [at for at in dict.fromkeys(self.inside(point) for point in points) if at not in self.seen]
+        if new:
+            found = self._costs([(float(np.exp(theta)), float(np.exp(rho))) for theta, rho in new])
+            self.seen.update(zip(new, found, strict=True))
+        return min(self.seen, key=self.seen.__getitem__)
 
-    The lowest of three points a `width` of the logarithm apart is moved on to, until it is the middle one. Then the
-    parabola through the three says where to look once more (Brent, *Algorithms for Minimization without Derivatives*,
-    1973, chapter 5). An end of the range may be the lowest.
-    """
-    low, high = (float(np.log(end)) for end in ends)
-    middle = float(np.log(at))
-    seen = {middle: value}
-
-    def look(*points: float) -> None:
-        new = [x for x in dict.fromkeys(points) if x not in seen]
-        seen.update(zip(new, costs([float(np.exp(x)) for x in new]), strict=True))
-
-    for _ in range(MOVES):
-        left, right = max(middle - width, low), min(middle + width, high)
-        look(left, right)
-        lowest = min((middle, left, right), key=seen.__getitem__)
-        if lowest == middle:
-            break
-        middle = lowest
-    if left < middle < right:
-        a, b = (seen[middle] - seen[left]) / (middle - left), (seen[right] - seen[middle]) / (right - middle)
-        if b > a:
-            look(min(max((left + middle) / 2 - a * (right - left) / 2 / (b - a), left), right))
-    best = min(seen, key=seen.__getitem__)
-    return float(np.exp(best)), seen[best]
+    def steps_from(self, at: FloatArray) -> list[FloatArray]:
+        """Where steps of Newton from a point may lead, from the differences about it."""
+        east, west, north, south, both, neither = (self.seen[self.inside(at + NEAR * move)] for move in STENCIL)
+        middle = self.seen[self.inside(at)]
+        slope = np.array([east - west, north - south]) / 2
+        across = (both + neither - east - west - north - south) / 2 + middle
+        bends = np.array([[east + west - 2 * middle, across], [across, north + south - 2 * middle]])
+        curvature, directions = np.linalg.eigh(bends)
+        size = np.maximum(np.abs(curvature), max(FLAT * np.abs(curvature).max(), TINY))
+        parts = directions * np.clip(-(directions.T @ slope) / size, -LONGEST, LONGEST)
+        alone = np.diag(np.clip(-slope / np.maximum(np.abs(np.diag(bends)), TINY), -LONGEST, LONGEST))
+        whole = parts.sum(axis=1)
+        return [at + NEAR * move for move in (*(share * whole for share in SHARES), *parts.T, *alone)]

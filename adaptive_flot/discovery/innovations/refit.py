@@ -131,8 +131,9 @@ class Refitter:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
         p, first = p.copy(), p[self._where].copy()
         if size is None or not hold_noise:
-            size = search_noise(self._costs_of_noise(p, first), size)
-        best = self._cost(p, size, first)
+            size, best = search_noise(self._costs_of_noise(p, first), size)
+        else:
+            best = self._cost(p, size, first)
         for i in range(ITERATIONS if self.free else 0):
             q, value = self._moved(p, size, first, best)
             gain = best - value
@@ -140,8 +141,7 @@ class Refitter:
             if hold_noise and gain < ENOUGH:
                 break
             if not hold_noise and (gain < LARGE or i % 2):
-                again = search_noise(self._costs_of_noise(p, first), size)
-                value = self._cost(p, again, first)
+                again, value = search_noise(self._costs_of_noise(p, first), size, best)
                 improved = best - value
                 if improved > 0:
                     size, best = again, value
@@ -153,9 +153,9 @@ class Refitter:
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
         first = p[self._where].copy()
-        size = search_noise(self._costs_of_noise(p, first))
+        size, cost = search_noise(self._costs_of_noise(p, first))
         noise = self.noise(size)
-        return Refit(p.copy(), noise, size, self.run(p, noise), -self._cost(p, size, first))
+        return Refit(p.copy(), noise, size, self.run(p, noise), -cost)
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
         """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside.

@@ -19,6 +19,9 @@ from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
+LEAST_MEMBERS = 3
+"""Cases that are worth running side by side: one or two take as long as all places of a register."""
+
 
 @dataclass(frozen=True)
 class Filtered:
@@ -124,7 +127,7 @@ class RecordFilter:
         self, record: Dataset, cases: Sequence[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]]
     ) -> FloatArray:
         """Log-densities of the rows (cases, N) for several cases (noise, z0, P0, p), side by side: those of `run`."""
-        if len(cases) > 1 and len(record) > 1 and isinstance(self._many, TapeRecursion):
+        if len(cases) >= LEAST_MEMBERS and len(record) > 1 and isinstance(self._many, TapeRecursion):
             with suppress(CompileError):  # without the library for several they are run one by one
                 return self._side_by_side(self._many, record, cases)
         return np.array([self.run(record, *case).log_likelihood for case in cases]).reshape(-1, len(record))

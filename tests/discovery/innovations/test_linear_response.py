@@ -53,5 +53,5 @@ def test_the_noise_search_finds_the_minimum_of_a_known_cost() -> None:
     def cost(theta: float, rho: float) -> float:
         return math.log(theta / 0.02) ** 2 + math.log(rho / 1.5) ** 2
 
-    theta, rho = search_noise(lambda sizes: [cost(*size) for size in sizes])
+    (theta, rho), _ = search_noise(lambda sizes: [cost(*size) for size in sizes])
     assert theta == pytest.approx(0.02, rel=0.1) and rho == pytest.approx(1.5, rel=0.1)

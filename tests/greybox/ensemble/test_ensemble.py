@@ -44,7 +44,7 @@ def cell_members(model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
 def test_records_of_the_cell(model: Model, compiled: bool) -> None:
     x, u, p = cell_members(model)
     run = Ensemble(replace(model, compiled=compiled), 1.0).simulate(x, u, p, 7.0)
-    plain = Stepper(model, 1.0)
+    plain = Stepper(replace(model, record_code=False), 1.0)
     for m in range(MEMBERS):
         expected = plain.simulate(x[m], u[m], p[m], 7.0)
         np.testing.assert_array_equal(run.time, expected.time)
@@ -92,7 +92,7 @@ def test_sensitivities_of_the_cell(model: Model, compiled: bool) -> None:
     start = np.zeros((MEMBERS, len(model.states), q))
     start[:, 2, -1] = np.arange(1, MEMBERS + 1)
     found = Ensemble(replace(model, compiled=compiled), 1.0).simulate_sensitivities(x, u, p, NAMES, start)
-    plain = Stepper(model, 1.0)
+    plain = Stepper(replace(model, record_code=False), 1.0)
     for m in range(MEMBERS):
         expected = plain.simulate_sensitivities(x[m], u[m], p[m], NAMES, start[m])
         np.testing.assert_allclose(found.outputs[m], expected.outputs, rtol=1e-12)
@@ -109,7 +109,7 @@ def test_intervals_of_several_steps_and_parameters_that_change(clock: Model, sub
     u, x = np.linspace(-1, 1, 20)[:, None], np.array([[1.0], [2.0], [3.0]])
     p = np.linspace(1, 2, 60).reshape(3, 20, 1) if varying else np.array([[0.5], [1.5], [2.5]])
     run = Ensemble(clock, 0.5, substeps=substeps).simulate(x, u, p, 0.3)
-    plain = Stepper(clock, 0.5, substeps=substeps)
+    plain = Stepper(replace(clock, record_code=False), 0.5, substeps=substeps)
     for m in range(3):
         expected = plain.simulate(x[m], u, p[m], 0.3)
         np.testing.assert_allclose(run.states[m], expected.states, rtol=1e-12)
@@ -135,7 +135,7 @@ def test_one_interval_at_a_time_gives_the_record(clock: Model) -> None:
 def test_only_what_is_asked_for_is_kept(clock: Model) -> None:
     run = Ensemble(clock, 0.5).simulate(np.array([[1.0], [2.0]]), np.ones((4, 1)), keep=["outputs"])
     assert (run.outputs.shape, run.states.shape, run.signals.shape) == ((2, 4, 1), (2, 0, 1), (2, 0, 0))
-    expected = Stepper(clock, 0.5).simulate(np.array([2.0]), np.ones((4, 1)))
+    expected = Stepper(replace(clock, record_code=False), 0.5).simulate(np.array([2.0]), np.ones((4, 1)))
     np.testing.assert_allclose(run.last_state[1], expected.states[-1])
 
 

@@ -13,6 +13,7 @@ from adaptive_flot.greybox.stepping import recursion
 from adaptive_flot.greybox.stepping.compiled import CompileError, compiler_problem
 from adaptive_flot.greybox.stepping.fastcall import FastCall
 from adaptive_flot.greybox.stepping.recursion import Recursion, row_by_row
+from adaptive_flot.greybox.stepping.whole_record import tape_recursion
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 ROWS = 30
@@ -66,11 +67,13 @@ def _without_compiler(monkeypatch: pytest.MonkeyPatch) -> recursion.RowByRow:
 
 
 @pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
+@pytest.mark.parametrize("worth", [0, tape_recursion.WORTH_COMPILING])
 @pytest.mark.parametrize("rows", [1, 99, 100, 101, 250])
 def test_with_and_without_a_compiler_it_has_the_same_numbers_to_the_bit(
-    rows: int, monkeypatch: pytest.MonkeyPatch
+    rows: int, worth: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For any number of rows; the tape by one call, CasADi by as many as it takes."""
+    """For any number of rows; the tape by one call, read or compiled, CasADi by as many as it takes."""
+    monkeypatch.setattr(tape_recursion, "WORTH_COMPILING", worth)
     rng = np.random.default_rng(rows)
     given = {"x": rng.standard_normal(2), "P": rng.standard_normal((2, 2))}
     each = {"u": rng.standard_normal((rows, 2)), "c": rng.standard_normal(3)}
@@ -112,10 +115,13 @@ def test_a_wrong_shape_is_refused_before_anything_is_read() -> None:
 
 
 @pytest.mark.skipif(compiler_problem() is not None, reason="no compiler")
-@given(st.integers(1, 19), st.integers(0, 2**32 - 1))
+@given(st.integers(1, 19), st.integers(0, 2**32 - 1), st.booleans())
 @settings(deadline=None)
-def test_members_side_by_side_have_the_numbers_that_each_has_alone(members: int, seed: int) -> None:
-    """To the last bit, whatever the vector instructions: a search by likelihood is the same with and without them."""
+def test_members_side_by_side_have_the_numbers_that_each_has_alone(members: int, seed: int, compiled: bool) -> None:
+    """To the last bit, whatever the vector instructions: a search by likelihood is the same with and without them.
+
+    Read or compiled.
+    """
     x, P, u, c = ca.SX.sym("x", 2), ca.SX.sym("P", 2, 2), ca.SX.sym("u", 2), ca.SX.sym("c", 3)
     x_next = ca.tanh(P @ x) + ca.sqrt(ca.fabs(u)) * ca.exp(-c[0]) + ca.fmin(c[1], x) / (1 + c[2] ** 2)
     P_next = 0.9 * P + 0.1 * ca.horzcat(ca.if_else(x > 0, x, c[:2]), ca.sign(x) * ca.fabs(x) ** 1.7)
@@ -126,7 +132,10 @@ def test_members_side_by_side_have_the_numbers_that_each_has_alone(members: int,
     shapes = {"x": (2,), "P": (2, 2), "u": (ROWS, 2), "c": (3,)}
     values = [{name: rng.standard_normal(shape) for name, shape in shapes.items()} for _ in range(members)]
     values[0]["u"][ROWS // 2, 0] = np.nan  # stays with its member
-    found = recursion.side_by_side(values, "y")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tape_recursion, "WORTH_COMPILING", 0 if compiled else 10**9)
+        patch.setattr(tape_recursion, "is_kept", lambda *given: False)
+        found = recursion.side_by_side(values, "y")
     for own, each in zip(found, values, strict=True):
         alone = recursion({k: each[k] for k in CARRIED}, {k: each[k] for k in ("u", "c")})
         np.testing.assert_array_equal(own, alone["y"])

@@ -21,7 +21,7 @@ from adaptive_flot.greybox.stepping.whole_record.tape import Tape, tape_of
 
 LIBRARY_FLAGS = ("-O2", "-ftree-vectorize", "-fno-gcse", "-fno-crossjumping", "-ffp-contract=off", "-fPIC", "-shared")
 """Without `gcse` and `crossjumping` each operation keeps a jump of its own, which the processor then foresees."""
-_KERNEL_FLAGS = (*FLAGS, "-fno-builtin-pow")
+KERNEL_FLAGS = (*FLAGS, "-fno-builtin-pow")
 """A compiler that knows a power writes it as a product, whose last bit may be another."""
 WORTH_COMPILING = 12_000
 """Steps of a model from which its own equations are compiled. A step by tape takes some 1 ns an operation longer, and
@@ -191,9 +191,9 @@ class WholeRecord:
         self._steps += rows * self._substeps
         if self._compiled is None and (first or self._steps >= WORTH_COMPILING):
             source = kernel_source(self._tapes)
-            if self._steps >= WORTH_COMPILING or is_kept("kernels", source, _KERNEL_FLAGS):
+            if self._steps >= WORTH_COMPILING or is_kept("kernels", source, KERNEL_FLAGS):
                 try:
-                    self._compiled = load_library("kernels", source, _KERNEL_FLAGS, _open_kernels)
+                    self._compiled = load_library("kernels", source, KERNEL_FLAGS, _open_kernels)
                 except CompileError:
                     self._compiled = {}
         return self._compiled or {}

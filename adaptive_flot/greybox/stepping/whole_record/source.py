@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adaptive_flot.greybox.stepping.whole_record.statements import HELPERS
-from adaptive_flot.greybox.stepping.whole_record.tape import END, OPERATIONS, TEMPLATES, Tape
+from adaptive_flot.greybox.stepping.whole_record.tape import END, ON_VECTORS, OPERATIONS, TEMPLATES, Tape
 
 _TAPE = """
 #include <math.h>
@@ -35,22 +35,28 @@ typedef struct {
 } Kernels;
 """
 
-_LOOPS = """
-/* Inputs and parameters of a row: they stay where rates and ends read them, with what depends on them alone. */
-static void hold(const Tape *tape, const Kernels *k, const double *u, const double *p) {
-    copy(argument(tape, 2), u, k->nu);
-    copy(argument(tape, 3), p, k->np);
+_RUN = """
+static void run_held(const Tape *tape) {
     if (tape->compiled_held) tape->compiled_held(tape->memory, tape->memory);
     else evaluate(tape->held, tape->memory);
-}
-
-static int same(const double *one, const double *other, int64_t n) {
-    return memcmp(one, other, (size_t)n * sizeof(double)) == 0;
 }
 
 static void run_tape(const Tape *tape) {
     if (tape->compiled) tape->compiled(tape->memory, tape->memory);
     else evaluate(tape->code, tape->memory);
+}
+"""
+
+_LOOPS = """
+/* Inputs and parameters of a row: they stay where rates and ends read them, with what depends on them alone. */
+static void hold(const Tape *tape, const Kernels *k, const double *u, const double *p) {
+    copy(argument(tape, 2), u, k->nu);
+    copy(argument(tape, 3), p, k->np);
+    run_held(tape);
+}
+
+static int same(const double *one, const double *other, int64_t n) {
+    return memcmp(one, other, (size_t)n * sizeof(double)) == 0;
 }
 
 static void evaluate_at(const Tape *tape, const Kernels *k, const double *x, double t) {
@@ -193,8 +199,8 @@ void recur(const Tape *tape, int64_t rows, int64_t given, int64_t carried, const
             if (row && k < carried) copy(argument(tape, k), result(tape, k), sizes[k]);
             else if (!row || strides[k]) copy(argument(tape, k), values[k] + row * strides[k], sizes[k]);
         }
-        if (!row) evaluate(tape->held, tape->memory);
-        evaluate(tape->code, tape->memory);
+        if (!row) run_held(tape);
+        run_tape(tape);
         for (int64_t j = 0; j < made; j++) copy(found[j] + row * widths[j], result(tape, j), widths[j]);
     }
 }
@@ -217,8 +223,8 @@ void recur_in_lanes(const Tape *tape, int64_t rows, int64_t given, int64_t carri
                     for (int64_t e = 0; e < sizes[k]; e++) to[e * LANES + l] = from[e];
                 }
         }
-        if (!row) evaluate(tape->held, tape->memory);
-        evaluate(tape->code, tape->memory);
+        if (!row) run_held(tape);
+        run_tape(tape);
         const double *made = tape->memory + tape->results[wanted] * LANES;
         for (int64_t l = 0; l < LANES; l++)
             for (int64_t e = 0; e < width; e++) found[l][row * width + e] = made[e * LANES + l];
@@ -250,17 +256,40 @@ def _evaluation(lanes: int = 1) -> str:
     ])  # fmt: skip
 
 
-RECORD_SOURCE = "\n".join([_TAPE, _HEAD, HELPERS, _evaluation(), _LOOPS])
+RECORD_SOURCE = "\n".join([_TAPE, _HEAD, HELPERS, _evaluation(), _RUN, _LOOPS])
 """The whole of it, the same for every model."""
-RECURSION_SOURCE = "\n".join([_TAPE, HELPERS, _evaluation(), _RECURSION])
+RECURSION_SOURCE = "\n".join([_TAPE, HELPERS, _evaluation(), _RUN, _RECURSION])
 """Any function whose results are arguments of its next call."""
 
 
 def recursion_in_lanes(lanes: int) -> str:
     """The same for so many members at once, each with arguments of its own. Each has the numbers that it has alone."""
-    return "\n".join([_TAPE, HELPERS, _evaluation(lanes), _RECURSION_IN_LANES])
+    return "\n".join([_TAPE, HELPERS, _evaluation(lanes), _RUN, _RECURSION_IN_LANES])
 
 
 def kernel_source(tapes: Mapping[str, Tape]) -> str:
     """C source of tapes as functions of their names, for a model that runs many times."""
     return "\n".join(["#include <math.h>", HELPERS, *(tape.c_functions(name) for name, tape in tapes.items())])
+
+
+def kernel_source_in_lanes(name: str, tape: Tape, lanes: int) -> str:
+    """C source of one tape for so many members, whose numbers lie beside each other in the memory.
+
+    Sums, products and the like are operations on vectors. The others are called for each member. The numbers are those
+    of one member, to the bit.
+    """
+    kinds = sorted({OPERATIONS[kind] for part in (tape.held, tape.code) for kind in part[:, 0].tolist()} - {END})
+    calls = [
+        f"static CALLED V do_{kind}(const V x, const V y) {{ V r; "
+        f"for (int l = 0; l < {lanes}; l++) r[l] = {TEMPLATES[kind].format('x[l]', 'y[l]')}; return r; }}"
+        for kind in kinds
+        if kind not in ON_VECTORS
+    ]
+    return "\n".join([
+        "#include <math.h>",
+        "#define CALLED __attribute__((noinline, unused))",
+        f"typedef double V __attribute__((vector_size({8 * lanes}), aligned(8)));",
+        HELPERS,
+        *calls,
+        tape.c_functions(name, in_lanes=True),
+    ])  # fmt: skip

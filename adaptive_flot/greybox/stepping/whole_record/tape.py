@@ -26,6 +26,8 @@ END = "END"
 TEMPLATES = {**UNARY, **BINARY}
 OPERATIONS = (*TEMPLATES, END)
 """Kinds of operations; the place of each is its number on a tape."""
+ON_VECTORS = frozenset({"ASSIGN", "NEG", "SQ", "TWICE", "INV", "ADD", "SUB", "MUL", "DIV"})
+"""Kinds that C has for vectors of numbers as well as for numbers."""
 STRUCTURAL = (0.0, 1.0, -1.0, 2.0, 0.5)
 """Numbers that are part of the form of an equation."""
 MOST_PLACES = 2**16
@@ -58,25 +60,27 @@ class Tape:
     results: NDArray[np.int64]
     numbers: tuple[int, int]
 
-    def c_functions(self, name: str) -> str:
+    def c_functions(self, name: str, *, in_lanes: bool = False) -> str:
         """The same as C functions `void NAME(const double *i, double *o)` and `NAME_held`: both are the memory.
 
         Numbers stand in the memory, so that two models of the same structure have the same code; but those that are
-        part of the form of an equation.
+        part of the form of an equation. In lanes a place of the memory is a vector `V` of numbers, and what C has not
+        for vectors is a call `do_KIND` of two vectors.
         """
         first, beyond = self.numbers
         numbers = self.memory[first:beyond]
         form = np.where(np.isin(numbers, STRUCTURAL), numbers, np.nan).tobytes()
         parts = (f"{name}_held", self.held, True), (name, self.code, False)
-        return "\n".join(_c_function(title, code.tobytes(), form, first, holds) for title, code, holds in parts)
+        return "\n".join(_c_function(to, code.tobytes(), form, first, holds, in_lanes) for to, code, holds in parts)
 
 
 @lru_cache(maxsize=512)
-def _c_function(name: str, code: bytes, form: bytes, first: int, holds: bool) -> str:
+def _c_function(name: str, code: bytes, form: bytes, first: int, holds: bool, in_lanes: bool) -> str:
     """One of them, from the bytes of its operations and of its numbers; NaN where a number is not part of the form.
 
     Many variants of a model have the same operations, and each asks whether its code was compiled before.
     """
+    of = "V" if in_lanes else "double"
     operations = np.frombuffer(code, dtype=np.uint16).reshape(-1, 4)[:-1].tolist()
     numbers = np.frombuffer(form).tolist()
     beyond = first + len(numbers)
@@ -86,11 +90,13 @@ def _c_function(name: str, code: bytes, form: bytes, first: int, holds: bool) ->
     def read(place: int) -> str:
         if place in made:
             return f"a{place}"
-        value = numbers[place - first] if first <= place < beyond else np.nan
+        value = numbers[place - first] if first <= place < beyond and not in_lanes else np.nan
         return f"i[{place}]" if value != value else repr(value)
 
-    for kind, to, one, other in operations:
-        value = TEMPLATES[OPERATIONS[kind]].format(read(one), read(other))
+    for number, to, one, other in operations:
+        kind = OPERATIONS[number]
+        template = TEMPLATES[kind] if kind in ON_VECTORS or not in_lanes else f"do_{kind}({{0}},{{1}})"
+        value = template.format(read(one), read(other))
         if to < beyond:
             body.append(f"o[{to}]={value};")
             continue
@@ -99,8 +105,8 @@ def _c_function(name: str, code: bytes, form: bytes, first: int, holds: bool) ->
         if holds:
             body.append(f"o[{to}]=a{to};")
     places = ", ".join(f"a{place}" for place in declared)
-    lines = [f"double {places};" if places else "", *body, "}"]
-    return "\n".join([f"void {name}(const double *restrict i, double *restrict o) {{", *lines])
+    lines = [f"{of} {places};" if places else "", *body, "}"]
+    return "\n".join([f"void {name}(const {of} *restrict i, {of} *restrict o) {{", *lines])
 
 
 def tape_of(function: ca.Function, held: Sequence[int] = ()) -> Tape:

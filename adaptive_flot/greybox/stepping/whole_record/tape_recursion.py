@@ -13,11 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import load_library
+from adaptive_flot.greybox.stepping.compiled import CompileError, is_kept, load_library
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import AVX2, AVX512, SCALAR, supported
-from adaptive_flot.greybox.stepping.whole_record.library import LIBRARY_FLAGS, TapeStruct
-from adaptive_flot.greybox.stepping.whole_record.source import RECURSION_SOURCE, recursion_in_lanes
-from adaptive_flot.greybox.stepping.whole_record.tape import tape_of
+from adaptive_flot.greybox.stepping.whole_record.library import KERNEL_FLAGS, LIBRARY_FLAGS, TapeStruct
+from adaptive_flot.greybox.stepping.whole_record.source import (
+    RECURSION_SOURCE,
+    kernel_source,
+    kernel_source_in_lanes,
+    recursion_in_lanes,
+)
+from adaptive_flot.greybox.stepping.whole_record.tape import Tape, tape_of
 
 LANES = 8
 """Members side by side: their numbers fill one register of AVX-512, and the time of reading the tape is shared."""
@@ -27,6 +32,11 @@ _VECTORS = {
     AVX512.name: ("-mavx512f", "-mprefer-vector-width=512"),
 }
 """Sums and products alone are vector instructions, none of which is contracted: the numbers are those of one member."""
+WORTH_COMPILING = 50_000
+"""Rows from which a function is compiled, for one member or for several. By tape a row takes some 2 ns an operation
+longer, with several members 5 ns, and the compiler takes 100 to 250 us an operation."""
+_QUICK = ("-Og", "-fno-tree-slp-vectorize", "-ffp-contract=off", "-fno-builtin-pow", "-Wno-psabi", "-fPIC", "-shared")
+"""Vectors gain little by a compiler that takes longer."""
 
 
 class TapeRecursion:
@@ -56,6 +66,8 @@ class TapeRecursion:
         self._carried, self._held = carried, frozenset(held)
         self._tape = tape_of(function, [i for i, name in enumerate(self._names) if name in held])
         self._run = _library()
+        self._rows: dict[int, int] = {}
+        self._compiled: dict[int, tuple[int | None, int | None]] = {}
 
     def __call__(self, carried: Mapping[str, FloatArray], each: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Evaluate.
@@ -76,7 +88,7 @@ class TapeRecursion:
         given, rows, strides = self._given(values)
         made = [np.empty((rows, width)) for width in self._widths]
         memory = self._tape.memory.copy()  # so that threads may run at once
-        tape = TapeStruct(self._tape, memory, None, None)
+        tape = TapeStruct(self._tape, memory, *self._machine_code(rows, 1))
         self._run(
             ctypes.byref(tape), rows, len(given), self._carried, self._sizes.ctypes.data, _addresses(given),
             strides.ctypes.data, len(made), self._widths.ctypes.data, _addresses(made),
@@ -118,13 +130,30 @@ class TapeRecursion:
             # a block that is not full has its last member several times
             block = [min(first + lane, len(members) - 1) for lane in range(LANES)]
             memory[:] = self._tape.memory[:, None]
-            tape = TapeStruct(self._tape, memory, None, None)
+            tape = TapeStruct(self._tape, memory, *self._machine_code(rows, LANES))
             values = [prepared[i][0][k] for k in range(len(self._names)) for i in block]
             run(
                 ctypes.byref(tape), rows, len(self._names), self._carried, self._sizes.ctypes.data, _addresses(values),
                 strides.ctypes.data, j, int(self._widths[j]), _addresses([found[i] for i in block]),
             )  # fmt: skip
         return found
+
+    def _machine_code(self, rows: int, lanes: int) -> tuple[int | None, int | None]:
+        """Where the compiled tape is, for one member or several; none before it was read for so many rows.
+
+        What was compiled before, and is kept, is loaded at once.
+        """
+        before = self._rows.get(lanes, 0)
+        self._rows[lanes] = before + rows
+        worth = before + rows >= WORTH_COMPILING
+        if lanes not in self._compiled and (worth or not before):
+            name, source, flags = _kernel(self._tape, lanes)
+            if worth or is_kept(name, source, flags):
+                try:
+                    self._compiled[lanes] = load_library(name, source, flags, _open_kernel)
+                except CompileError:
+                    self._compiled[lanes] = None, None
+        return self._compiled.get(lanes, (None, None))
 
     def _given(self, values: Mapping[str, FloatArray]) -> tuple[list[FloatArray], int, NDArray[np.int64]]:
         """The arguments as the tape has them, the number of rows, and how far apart the rows of each argument are."""
@@ -154,6 +183,19 @@ def _library() -> Any:
 def _library_in_lanes() -> Any:
     flags = (*LIBRARY_FLAGS, *_VECTORS[supported()[0].name])
     return load_library("recursion_in_lanes", recursion_in_lanes(LANES), flags, lambda at: _open(at, "recur_in_lanes"))
+
+
+def _kernel(tape: Tape, lanes: int) -> tuple[str, str, Sequence[str]]:
+    """Name, source and options of a compiled tape."""
+    if lanes == 1:
+        return "step", kernel_source({"step": tape}), KERNEL_FLAGS
+    return "step_in_lanes", kernel_source_in_lanes("step", tape, lanes), (*_QUICK, *_VECTORS[supported()[0].name])
+
+
+def _open_kernel(library: Path) -> tuple[int | None, int | None]:
+    kernels = ctypes.CDLL(str(library))  # kept open: nothing closes a library that ctypes has opened
+    held, each = (ctypes.cast(getattr(kernels, name), ctypes.c_void_p).value for name in ("step_held", "step"))
+    return held, each
 
 
 def _open(library: Path, name: str) -> Any:
