@@ -88,7 +88,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     given_up, everything = list[Hypothesis](), found
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
-        without = {h.label: search.without(best, h) if len(best.hypotheses) > 1 else base for h in best.hypotheses}
+        without = _without_each(search, best) if len(best.hypotheses) > 1 else {best.hypotheses[0].label: base}
         failed = _at_steps_of_an_input(search, best) or _overlapping(base, best, without)
         failed = failed or _contradicted(search, best, without)
         if not failed:
@@ -104,6 +104,13 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
         return Told("abstain", base, (), (), (base,), why)
     return Told("abstain", found[0], (), (), _alike(search, base, found), why)
+
+
+def _without_each(search: Search, explanation: Explanation) -> dict[str, Explanation]:
+    """An explanation of several effects without each of them, by its label."""
+    effects = explanation.hypotheses
+    left = parallel_map(lambda k: search.without(explanation, effects[k]), range(len(effects)), search.processes)
+    return {h.label: e for h, e in zip(effects, left, strict=True)}
 
 
 def _unless_given_up(told: Told, given_up: Sequence[Hypothesis], found: Sequence[Explanation]) -> Told:

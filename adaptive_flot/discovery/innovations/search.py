@@ -159,7 +159,8 @@ class Search:
             further = [e for start in beam for e in self._further(start)]
             ranked = _distinct(further)
             if count > 1:
-                ranked = _distinct([*map(self.settled, ranked[: 2 * BEAM]), *ranked[2 * BEAM :]])
+                best_few = parallel_map(self.settled, ranked[: 2 * BEAM], self.processes)
+                ranked = _distinct([*best_few, *ranked[2 * BEAM :]])
             found += ranked
             if not ranked or ranked[0].criterion < best.criterion + LEAST_GAIN:
                 break
