@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -95,6 +95,28 @@ class Screening:
         if site.role in BALANCE and not amounts:
             found.append(self._switch(site, "offset"))
         return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
+
+    def at_times_of(self, switch: Hypothesis, site: Site) -> Screened | None:
+        """A switch at the times of another one, at a site, whatever it gains; None where the record says nothing of it.
+
+        A regression takes an event for small. Half of a fan's air is not: its own event may not even come in sight.
+        """
+        record, by = self._response.record, self._course(site, site.mode)
+        if by is None:
+            return None
+        late = {s.name: _late(s, record.dt) for s in self.model.sites}
+        told = dict(switch.effect.coefficients)
+        begins = [name for name in told if name.startswith("on_")]
+        mask = np.zeros(len(by), dtype=bool)
+        for name in begins:
+            told[name] += late[site.name] - late[switch.site]
+            length = told[name.replace("on_", "for_")]
+            mask |= (record.time[1:] > told[name]) & (record.time[1:] <= told[name] + length)
+        numbers = sum(1 + (told[name.replace("on_", "for_")] < FOREVER) for name in begins)
+        effect = replace(switch.effect, site=site.name, coefficients=told, mode=site.mode)
+        hypothesis = Hypothesis(site.name, "time", "switch", effect, switch.free, ({},))
+        suspect = Suspect(hypothesis, (by * mask)[:, None], switch.free, numbers)
+        return next(iter(self._regressions(site.name, [suspect])), None)
 
     def _course(self, site: Site, mode: Mode) -> FloatArray | None:
         """Change of a site's value by an event of size 1 (N - 1,); None where the record says nothing of the site."""
@@ -210,9 +232,13 @@ def _ramp(site: Site, by: FloatArray, record: Dataset, begin: int, end: int) -> 
     return Suspect(hypothesis, (by * share)[:, None], ("amplitude",), 2)
 
 
+def _late(site: Site, dt: float) -> float:
+    """How long after a row a switch is [s]: a sensor's is between two, what acts on a state begins with an interval."""
+    return dt / 2 if site.role == "sensor" else 0.0
+
+
 def _switch_effect(site: Site, mode: Mode, switch: Switch, time: FloatArray, dt: float) -> Effect:
-    """A sensor's switch lies between two rows; what acts on a state begins with an interval."""
-    late = dt / 2 if site.role == "sensor" else 0.0
+    late = _late(site, dt)
     coefficients: dict[str, float] = {"amplitude": 0.0}
     for k, (a, b) in enumerate(switch.pulses, 1):
         coefficients[f"on_{k}"] = float(time[a] + late)

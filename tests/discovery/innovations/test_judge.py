@@ -41,6 +41,7 @@ class Stand:
         "", np.arange(0, 10.0 * ROWS, 10.0), 10.0, np.sign(np.arange(ROWS) // 20 % 2.0)[:, None], np.zeros((ROWS, 1))
     )
     """An input that is switched every 200 s."""
+    processes = 1
 
     def __init__(self, *known: Given) -> None:
         self.known = {tuple(h.site for h in e.hypotheses): e for e in known}

@@ -1,0 +1,82 @@
+"""An event that one site explains is tried at every other one: a regression takes it for small, and may not see it.
+
+The record is of a room with a fan, simulated here by Euler's rule. From a time on the fan moves half of its air.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.greybox import Dataset
+from benchmarks.other_processes.plants.room_air import DT, make_model
+
+ROWS, BEGINS, LEFT, FINE = 700, 520, 0.45, 10
+FAN_AIR, LEAKS, BREATH, VOLUME = 380.0, 55.0, 0.019, 180.0
+"""Of fan and leaks [m3/h], of one person [m3/h], and of the room [m3]."""
+NOISE = 6.0
+"""Standard deviation of the sensor [ppm]."""
+
+
+def record(left: float, seed: int = 2) -> Dataset:
+    """Carbon dioxide in the room; the fan moves a share `left` of its air from row BEGINS on, and the wind wanders."""
+    rng = np.random.default_rng(seed)
+    inputs = np.zeros((ROWS, 2))
+    for column, choices in ((0, (0.1, 0.3, 0.6, 1.0)), (1, np.arange(9.0))):
+        k = 0
+        while k < ROWS:
+            held = int(rng.integers(20, 80))
+            inputs[k : k + held, column] = rng.choice(choices)
+            k += held
+    level, wind, shown, h = 600.0, 0.0, np.zeros(ROWS), DT / FINE
+    for k in range(ROWS):
+        fan, people = inputs[k]
+        wind += -wind * DT / 5000.0 + 0.1 * np.sqrt(2 * DT / 5000.0) * rng.normal()
+        air = FAN_AIR * fan * (left if k >= BEGINS else 1.0) + LEAKS * (1 + wind)
+        for _ in range(FINE if k else 0):
+            level += h * (1e6 * BREATH * people - air * (level - 420.0)) / (3600.0 * VOLUME)
+        shown[k] = level + NOISE * rng.normal()
+    return Dataset("room", DT * np.arange(ROWS, dtype=float), DT, inputs, shown[:, None])
+
+
+def search(left: float) -> Search:
+    model = make_model()
+    free = tuple(p.name for p in model.parameters)
+    return Search(model, record(left), (0,), np.array([NOISE]), free)
+
+
+@pytest.fixture(scope="module")
+def halved() -> Search:
+    return search(LEFT)
+
+
+def test_a_switch_at_its_own_site_is_the_one_that_was_found(halved: Search) -> None:
+    base = halved.base(halved.model.parameter_values)
+    screening = halved.screening(base, [s.name for s in halved.model.sites])
+    found = {site.name: one for site in halved.model.sites if (one := screening.switch(site)) is not None}
+    assert found
+    for site in halved.model.sites:
+        if site.name in found and found[site.name].suspect.hypothesis.effect.mode == site.mode:
+            own = found[site.name]
+            again = screening.at_times_of(own.suspect.hypothesis, site)
+            assert again is not None
+            assert again.gain == pytest.approx(own.gain, rel=1e-9)
+            np.testing.assert_allclose(again.size, own.size, rtol=1e-9)
+
+
+def test_the_site_of_a_large_event_explains_more_than_one_that_the_regression_prefers(halved: Search) -> None:
+    base = halved.base(halved.model.parameter_values)
+    best = halved.run(base)[0]
+    (event,) = (h for h in best.hypotheses if h.kind == "switch")
+    assert event.site == "fan"
+    assert event.effect.coefficients["on_1"] == pytest.approx(DT * BEGINS, abs=20 * DT)
+    fitted = halved.model_of(best)
+    p = fitted.parameters[fitted.index("parameters", event.effect.parameter("amplitude"))]
+    assert np.exp(p.value) == pytest.approx(LEFT, abs=0.1)
+
+
+def test_where_nothing_happens_there_is_no_event_at_any_site() -> None:
+    quiet = search(1.0)
+    best = quiet.run(quiet.base(quiet.model.parameter_values))[0]
+    assert all(h.kind != "switch" for h in best.hypotheses)
