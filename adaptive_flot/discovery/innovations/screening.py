@@ -106,13 +106,12 @@ class Screening:
             return None
         late = {s.name: _late(s, record.dt) for s in self.model.sites}
         told = dict(switch.effect.coefficients)
-        begins = [name for name in told if name.startswith("on_")]
+        lengths = {name: told[name.replace("on_", "for_")] for name in told if name.startswith("on_")}
         mask = np.zeros(len(by), dtype=bool)
-        for name in begins:
+        for name, length in lengths.items():
             told[name] += late[site.name] - late[switch.site]
-            length = told[name.replace("on_", "for_")]
             mask |= (record.time[1:] > told[name]) & (record.time[1:] <= told[name] + length)
-        numbers = sum(1 + (told[name.replace("on_", "for_")] < FOREVER) for name in begins)
+        numbers = sum(1 + (length < FOREVER) for length in lengths.values())
         effect = replace(switch.effect, site=site.name, coefficients=told, mode=site.mode)
         hypothesis = Hypothesis(site.name, "time", "switch", effect, switch.free, ({},))
         suspect = Suspect(hypothesis, (by * mask)[:, None], switch.free, numbers)
