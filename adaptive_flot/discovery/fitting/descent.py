@@ -177,8 +177,8 @@ class Descent:
     ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
         """Steps for one noise model: what they come to, its predictions, their derivatives, and if these are exact.
 
-        Derivatives cost ten times what a prediction does. While a step gains about what it promised they are kept, and
-        corrected by what the step has shown (Broyden 1965, *Math. Comp.* 19:577); only exact ones may end the search.
+        Derivatives cost three times what a prediction does. While a step gains about what it promised they are kept,
+        and corrected by what the step has shown (Broyden 1965, *Math. Comp.* 19:577). Only exact ones end the search.
         """
         value = first = self._objective(z, predicted, noise)
         shaped = self.unknowns.shaped
@@ -225,14 +225,18 @@ class Descent:
     def _tried(
         self, z: FloatArray, value: float, noise: Noise, step_of: Callable[[float], FloatArray], damping: float
     ) -> tuple[FloatArray, FloatArray, float, float] | None:
-        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next."""
-        while damping < MOST_DAMPING:
-            trial = np.clip(z + step_of(damping), self.unknowns.lower, self.unknowns.upper)
+        """The first step of rising damping that gains: where it ends, predictions, criterion, damping for the next.
+
+        The next starts lower only where the first try gained: else it would fail where this one just did.
+        """
+        tried = damping
+        while tried < MOST_DAMPING:
+            trial = np.clip(z + step_of(tried), self.unknowns.lower, self.unknowns.upper)
             there = self._predict(trial)
             new = self._objective(trial, there, noise)
             if new < value:
-                return trial, there, new, max(damping / 10, LEAST_DAMPING)
-            damping *= 10
+                return trial, there, new, max(tried / 10, LEAST_DAMPING) if tried == damping else tried
+            tried *= 10
         return None
 
     def _step(self, z: FloatArray, A: FloatArray, b: FloatArray) -> Callable[[float], FloatArray]:

@@ -90,18 +90,25 @@ class Screening:
         What enters or leaves a balance may also change by an amount, whatever else it depends on: people who are not
         counted, while nobody is. A model with a site for such amounts has that already.
         """
-        found = [self._switch(site, site.mode)]
-        amounts = any(s.mode == "offset" for s in self.model.sites if s.role in BALANCE)
-        if site.role in BALANCE and not amounts:
-            found.append(self._switch(site, "offset"))
+        found = [self._switch(site, mode) for mode in self._modes_of_switch(site)]
         return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
 
-    def at_times_of(self, switch: Hypothesis, site: Site) -> Screened | None:
-        """A switch at the times of another one, at a site, whatever it gains; None where the record says nothing of it.
+    def _modes_of_switch(self, site: Site) -> tuple[Mode, ...]:
+        amounts = any(s.mode == "offset" for s in self.model.sites if s.role in BALANCE)
+        return (site.mode,) if site.role not in BALANCE or amounts else (site.mode, "offset")
+
+    def at_times_of(self, switch: Hypothesis, site: Site) -> list[Screened]:
+        """A switch at the times of another one, at a site, whatever it gains: by a factor, by an amount, or either.
 
         A regression takes an event for small. Half of a fan's air is not: its own event may not even come in sight.
+        None of what the record says nothing of, and not the switch itself.
         """
-        record, by = self._response.record, self._course(site, site.mode)
+        own = switch.site, switch.effect.mode
+        modes = (mode for mode in self._modes_of_switch(site) if (site.name, mode) != own)
+        return [x for mode in modes if (x := self._at_times_of(switch, site, mode)) is not None]
+
+    def _at_times_of(self, switch: Hypothesis, site: Site, mode: Mode) -> Screened | None:
+        record, by = self._response.record, self._course(site, mode)
         if by is None:
             return None
         late = {s.name: _late(s, record.dt) for s in self.model.sites}
@@ -112,7 +119,7 @@ class Screening:
             told[name] += late[site.name] - late[switch.site]
             mask |= (record.time[1:] > told[name]) & (record.time[1:] <= told[name] + length)
         numbers = sum(1 + (length < FOREVER) for length in lengths.values())
-        effect = replace(switch.effect, site=site.name, coefficients=told, mode=site.mode)
+        effect = replace(switch.effect, site=site.name, coefficients=told, mode=mode)
         hypothesis = Hypothesis(site.name, "time", "switch", effect, switch.free, ({},))
         suspect = Suspect(hypothesis, (by * mask)[:, None], switch.free, numbers)
         return next(iter(self._regressions(site.name, [suspect])), None)

@@ -180,8 +180,7 @@ class Search:
         switched = [e for e in refits if e.hypotheses[-1].kind == "switch"]
         if switched:
             switch = max(switched, key=lambda e: e.criterion).hypotheses[-1]
-            others = (site for site in self.model.sites if site.name != switch.site)
-            there = [s for site in others if (s := screening.at_times_of(switch, site)) is not None]
+            there = [s for site in self.model.sites for s in screening.at_times_of(switch, site)]
             refits += self._all_with(start, there)
         return refits
 

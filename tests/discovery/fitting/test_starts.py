@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from adaptive_flot.discovery.fitting.descent import START_FRACTIONS, Descent
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.fitter import SETTLED, Fitter
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.results import Alternative
@@ -75,7 +75,7 @@ def test_a_start_with_which_the_model_can_not_run_is_nothing_at_all(base: tuple[
     assert Fitter(problem).fit(model, (slope,), {slope: -1e9}, fit) is None
     found = Fitter(problem).fit(model, (slope,), {slope: -1e9}, fit, shrink=(slope,))
     assert found is not None
-    assert found.loss <= fit.loss
+    assert found.loss <= fit.loss + SETTLED  # a fit rests where a restart would gain no more
 
 
 LATE = (
