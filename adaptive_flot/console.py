@@ -71,8 +71,8 @@ def print_sentences(sentences: Iterable[str]) -> None:
     console.file.flush()
 
 
-def print_verdict(verdict: Verdict) -> None:
-    """Print the verdict in words and the error of each output before and after."""
+def print_verdict(verdict: Verdict, level: str = "noise") -> None:
+    """Print the verdict in words and the error of each output before and after; `level` heads what it is beside."""
     console = standard_output()
     console.print(Text.assemble((verdict.word, "bold"), f": {verdict.reason}"), highlight=False)
     for note in verdict.notes:
@@ -85,7 +85,7 @@ def print_verdict(verdict: Verdict) -> None:
             low, high = (number(100 * r, ".0f") for r in c.reduction95)
             errors = (f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
             rows.append((c.output, c.unit, *errors))
-        header = ("output", "unit", "before", "after", "noise", "reduction [%], 95 % interval")
+        header = ("output", "unit", "before", "after", level, "reduction [%], 95 % interval")
         print_table(console, Content("", header, tuple(rows), words=2), title)
     if verdict.experiment is not None:
         console.print(f"{verdict.experiment}", highlight=False)

@@ -87,7 +87,7 @@ def discover(
             verdict = searched.verdict
     for target in filter(None, (folder / "verdict.json", json)):
         write_json(target, verdict.as_dict())
-    print_verdict(verdict)
+    print_verdict(verdict, "usual" if references else "noise")
     if save_model is not None:
         if several:
             saved = save_extended(compared, name, save_model, base=model, cell=cell, folder=first.parent)

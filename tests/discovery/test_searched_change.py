@@ -28,7 +28,7 @@ FOLLOWS = Effect("heat_loss", "power", "linear", {"slope": 0.4}, {"reference": 1
 @pytest.fixture
 def long_records(monkeypatch: pytest.MonkeyPatch) -> None:
     """Records are taken to be too long for the innovations form."""
-    monkeypatch.setattr(changes, "is_short", lambda *given: False)
+    monkeypatch.setattr(changes, "is_short_since_reference", lambda *given: False)
 
 
 @cache
@@ -72,7 +72,7 @@ def test_a_budget_that_ends_after_the_single_faults_leaves_them_and_says_so(
         return found
 
     monkeypatch.setattr(changes, "compare", all_compared)
-    monkeypatch.setattr(changes, "is_short", lambda *given: short)
+    monkeypatch.setattr(changes, "is_short_since_reference", lambda *given: short)
     verdict = find_changes(tank(), [record("new", 1, FOLLOWS)], [record("old", 2)], budget=0.05).verdict
     assert len(ended) == 1 and np.isfinite(ended[0])
     assert verdict.word == "abstain" and changes.SPENT in verdict.notes

@@ -43,11 +43,14 @@ class UsualLoss:
         Number of constants that have a prior.
     rows
         Rows of the reference that count.
+    errors
+        Root mean square error of each measured output (m,).
     """
 
     losses: FloatArray
     constants: int
     rows: int
+    errors: FloatArray
 
     def exceeded(self, tested: Tested, count: int, blocks: int) -> str | None:
         """What is larger on new rows than it would be by chance, in words; None where nothing is.
@@ -138,7 +141,8 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
         if usual.exceeded(null, count, len(blocks.edges)) is None:
             return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
     ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
-    standing = [t for t in ranked if stands(rows, blocks, null, t)]
+    errors = None if usual is None else usual.errors
+    standing = [t for t in ranked if stands(rows, blocks, null, t, errors)]
     if not standing:
         why = "no single hypothesis makes the errors smaller on rows that did not fit it"
         return Judged("abstain", None, tuple(ranked[:3]), why, float("nan")), blocks

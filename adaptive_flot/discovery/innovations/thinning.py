@@ -15,6 +15,10 @@ from adaptive_flot.greybox.model import Model
 
 MOST_WORK = 4_000
 """Rows times states up to which a record is taken as it is."""
+MOST_SINCE_REFERENCE = 9_000
+"""The same where a reference tells the constants: half a minute on two cores."""
+USUAL_STATES = 3
+"""States up to which each costs as much as the first."""
 USUAL_STEPS = 8
 """Integration steps a row up to which these make little difference."""
 FEWEST_ROWS = 500
@@ -25,6 +29,14 @@ def is_short(record: Dataset, model: Model) -> bool:
     """Whether a record is short enough for the innovations form as it is; that of a stiff model takes longer."""
     stiff = max(1.0, model.steps_in(record.dt) / USUAL_STEPS)
     return len(record) * len(model.states) * stiff <= MOST_WORK
+
+
+def is_short_since_reference(record: Dataset, model: Model) -> bool:
+    """Whether a record with a reference is short enough for the innovations form; it is never thinned."""
+    many = max(1.0, len(model.states) / USUAL_STATES)
+    stiff = max(1.0, model.steps_in(record.dt) / USUAL_STEPS)
+    within = len(record) * len(model.states) * many * stiff <= MOST_SINCE_REFERENCE
+    return within or is_short(record, model)
 
 
 def searchable(record: Dataset, model: Model) -> Dataset | None:

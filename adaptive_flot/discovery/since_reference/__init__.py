@@ -3,5 +3,6 @@
 changes.py          What is called: the comparison first, then what it does not see.
 searched_change.py  Effects of other shapes and two effects, by the search of a single record with constants held.
 not_new.py          What is no change: it is on the reference as well, or may be what wanders.
+supported.py        Whether the innovations form has any use for what free runs tell.
 taken_back.py       When what is told is taken back: it leaves too much, or another form contradicts it.
 """

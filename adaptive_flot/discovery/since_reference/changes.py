@@ -27,7 +27,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
-from adaptive_flot.discovery.innovations.thinning import is_short
+from adaptive_flot.discovery.innovations.thinning import is_short_since_reference
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
@@ -35,6 +35,7 @@ from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
+from adaptive_flot.discovery.since_reference.supported import unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
     leaves_more,
     taken_back,
@@ -69,11 +70,13 @@ def find_changes(
     Events, and causes beside what wanders, are looked for where there are one record and a reference. What is wrong
     with the data is among the notes.
     """
-    ends = float("inf") if budget is None else time.monotonic() + budget
+    began = time.monotonic()
+    ends = float("inf") if budget is None else began + budget
     compared = _found(model, records, references, adapted, processes, progress, ends)
     if not references and len(records) > 1:
         compared = unless_an_event(compared, model, records, adapted, processes, progress, ends)
-    return _with_words_on_data(compared, model, records, bool(references))
+    compared = _with_words_on_data(compared, model, records, bool(references))
+    return replace(compared, verdict=replace(compared.verdict, seconds=time.monotonic() - began))
 
 
 def _found(
@@ -94,7 +97,7 @@ def _found(
         return compared
     if len(records) != 1:
         return unless_much_is_left(compared)
-    short, left = is_short(records[0], compared.calibration.model), ends - time.monotonic()
+    short, left = is_short_since_reference(records[0], compared.calibration.model), ends - time.monotonic()
     judged: Comparison | None = compared
     if left <= 0:
         judged = None
@@ -138,7 +141,10 @@ def _row_by_row(
             with_it = with_cause(compared, search, base, told, before, seconds)
             if with_it is compared and sole is not None:
                 with_it = with_cause(compared, search, base, sole, before, seconds)
-    return with_it if with_it is not compared else unless_contradicted(compared, told)
+        if with_it is not compared:
+            return with_it
+        kept = unless_contradicted(compared, told)
+        return kept if kept is not compared else unless_unsupported(compared, search, base)
 
 
 def unless_an_event(
@@ -176,6 +182,10 @@ def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Da
             said += [f"{note}." for note in suspect_notes([e.effect for e in verdict.effects], suspects, record.dt)]
     if referred and len(records) > 1:
         said.append("Events in time were not looked for: that takes one record without a gap, and a reference.")
+    if referred and len(records) == 1 and not is_short_since_reference(records[0], model):
+        said.append(
+            f"Events in time were looked for in free runs alone: {len(records[0])} rows are many for this model."
+        )
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, *said))) if said else compared
 
 

@@ -42,6 +42,7 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
         why = "it leaves far more than the reference, and with process noise nothing speaks for it"
     elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
         why = "errors are not far above those of the reference, and with process noise it is not confirmed"
+        return taken_back(compared, why, said="No change is told")
     else:
         return compared
     return taken_back(compared, why)

@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.innovations.thinning import FEWEST_ROWS, MOST_WORK, is_short, searchable, thinned
+from adaptive_flot.discovery.innovations.thinning import (
+    FEWEST_ROWS,
+    MOST_WORK,
+    is_short,
+    is_short_since_reference,
+    searchable,
+    thinned,
+)
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.innovations.box import DT, model, record
@@ -59,3 +66,17 @@ def test_a_stiff_model_makes_a_record_long() -> None:
     """Each row then takes many integration steps, and the innovations form as many times as long."""
     assert is_short(long(1200), of_states(3, steps=8))
     assert not is_short(long(1200), of_states(3, steps=18))
+
+
+def test_a_reference_allows_for_more_rows_but_not_with_many_states() -> None:
+    """3,000 rows of three states; a day of an air handling unit, of five, stays one for free runs."""
+    assert is_short_since_reference(long(3000), of_states(3)) and not is_short(long(3000), of_states(3))
+    assert not is_short_since_reference(long(3001), of_states(3))
+    assert not is_short_since_reference(long(1440), of_states(5))
+    assert not is_short_since_reference(long(1500), of_states(3, steps=17))
+
+
+@pytest.mark.parametrize("states", range(1, 12))
+def test_what_is_short_is_short_with_a_reference_too(states: int) -> None:
+    rows = MOST_WORK // states
+    assert is_short(long(rows), of_states(states)) and is_short_since_reference(long(rows), of_states(states))
