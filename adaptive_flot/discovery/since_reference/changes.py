@@ -144,7 +144,7 @@ def _row_by_row(
         if with_it is not compared:
             return with_it
         kept = unless_contradicted(compared, told)
-        return kept if kept is not compared else unless_unsupported(compared, search, base)
+        return kept if kept is not compared else unless_unsupported(compared, search, base, told)
 
 
 def unless_an_event(

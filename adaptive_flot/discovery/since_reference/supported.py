@@ -11,6 +11,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.since_reference.taken_back import taken_back
 
@@ -19,19 +20,25 @@ SUPPORT = 30.0
 drift, and wandering alone, have given wrong ones up to 23."""
 
 
-def unless_unsupported(compared: Comparison, search: Search, base: Explanation) -> Comparison:
+def unless_unsupported(compared: Comparison, search: Search, base: Explanation, told: Told) -> Comparison:
     """The comparison, its name or class taken back where with process noise none of it gains SUPPORT.
 
     Parameters
     ----------
     compared
         The comparison of free runs.
-    search, base
-        The search in innovations form, and the model as it is there.
+    search, base, told
+        The search in innovations form, the model as it is there, and what was judged.
     """
-    if compared.verdict.word not in ("named", "class"):
+    verdict, best = compared.verdict, compared.judged.best
+    if verdict.word not in ("named", "class") or best is None:
         return compared
-    if any(_gain(search, base, part) > SUPPORT for part in compared.judged.parts):
+    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    found = (e for e in told.alike if sites & {h.site for h in e.hypotheses})
+    if any(e.criterion - base.criterion > SUPPORT for e in found):
+        return compared
+    # each form is asked: what starts where a free run has it may rest there, as a limit that nothing reaches
+    if any(_gain(search, base, each) > SUPPORT for each in (best, *compared.judged.alike)):
         return compared
     why = "with process noise too little speaks for it, so that whatever drifts or wanders may be behind it"
     return taken_back(compared, why)
