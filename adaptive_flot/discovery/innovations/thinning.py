@@ -27,16 +27,17 @@ FEWEST_ROWS = 500
 
 def is_short(record: Dataset, model: Model) -> bool:
     """Whether a record is short enough for the innovations form as it is; that of a stiff model takes longer."""
-    stiff = max(1.0, model.steps_in(record.dt) / USUAL_STEPS)
-    return len(record) * len(model.states) * stiff <= MOST_WORK
+    return _work(record, model) <= MOST_WORK
 
 
 def is_short_since_reference(record: Dataset, model: Model) -> bool:
     """Whether a record with a reference is short enough for the innovations form; it is never thinned."""
     many = max(1.0, len(model.states) / USUAL_STATES)
-    stiff = max(1.0, model.steps_in(record.dt) / USUAL_STEPS)
-    within = len(record) * len(model.states) * many * stiff <= MOST_SINCE_REFERENCE
-    return within or is_short(record, model)
+    return many * _work(record, model) <= MOST_SINCE_REFERENCE or is_short(record, model)
+
+
+def _work(record: Dataset, model: Model) -> float:
+    return len(record) * len(model.states) * max(1.0, model.steps_in(record.dt) / USUAL_STEPS)
 
 
 def searchable(record: Dataset, model: Model) -> Dataset | None:

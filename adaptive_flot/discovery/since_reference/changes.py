@@ -182,10 +182,8 @@ def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Da
             said += [f"{note}." for note in suspect_notes([e.effect for e in verdict.effects], suspects, record.dt)]
     if referred and len(records) > 1:
         said.append("Events in time were not looked for: that takes one record without a gap, and a reference.")
-    if referred and len(records) == 1 and not is_short_since_reference(records[0], model):
-        said.append(
-            f"Events in time were looked for in free runs alone: {len(records[0])} rows are many for this model."
-        )
+    if referred and len(records) == 1 and not is_short_since_reference(records[0], compared.calibration.model):
+        said.append(f"Events in time were not looked for row by row: {len(records[0])} rows are many for this model.")
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, *said))) if said else compared
 
 

@@ -1,6 +1,6 @@
 """Whether the innovations form has any use for what free runs tell.
 
-Over hours a free run adds up whatever is not quite balanced. A tank has no other outflow than its level makes: a gauge
+Over hours a free run adds up whatever is not quite balanced. Where nothing depends on the level of a vessel, a gauge
 that drifts, a wandering supply and a pump that is worn all look alike there. With process noise each row counts, and a
 pump that is worn shows whenever it is moved. Where that brings nothing, the free runs have named what happened to fit.
 """
@@ -51,7 +51,7 @@ def _gain(search: Search, base: Explanation, tested: Tested) -> float:
         return float("inf")
     model = model_with(search.model, h)
     there, own = (list(m.indices("parameters", search.free)) for m in (model, search.model))
-    p = np.array([q.value for q in model.parameters])
+    p = model.parameter_values
     p[list(model.indices("parameters", h.parameters))] = [tested.fit.value(name) for name in h.parameters]
     p[there] = base.fit.p[own]
     gain = search.added(base, h, p).criterion - base.criterion
