@@ -19,6 +19,10 @@ from adaptive_flot.greybox.model import FloatArray, Model
 
 ROUNDS = 2
 """How often the usual sizes are taken from a fit and the fit is made again."""
+RATIO = 0.5
+"""Largest standard deviation, as a share of its value, of a constant that is known by its ratio."""
+FACTOR = 1.0
+"""Largest standard deviation of the logarithm of that ratio."""
 FIRST_SIZE = 0.1
 """First guess of the size of the errors, as a share of the spread of an output."""
 
@@ -109,7 +113,7 @@ def calibrate(
     rows = rows.with_sizes(rows.sizes, memory_of(rows, best.errors))
     fitted = model.with_parameters(best.values)
     seen, drivers = seen_values(fitted, best, records)
-    return Calibration(fitted, best, rows, usual, _told(loose, best, rows), floor, seen, drivers)
+    return Calibration(fitted, best, rows, usual, _told(model, loose, best, rows), floor, seen, drivers)
 
 
 def _fit_from(model: Model, rows: Rows, loose: Constants, start: FloatArray) -> JointFit:
@@ -119,22 +123,30 @@ def _fit_from(model: Model, rows: Rows, loose: Constants, start: FloatArray) -> 
     return fitter.fit(z)
 
 
-def _told(loose: Constants, fit: JointFit, rows: Rows) -> Constants:
+def _told(model: Model, loose: Constants, fit: JointFit, rows: Rows) -> Constants:
     """Constants and covariance after a fit: the inverse of the curvature of the criterion, with its priors.
 
     ::
 
         covariance = (J^T J / tau + I)^-1
 
-    A direction of which no row speaks stays as loose as it was.
+    Known by its ratio is a constant that is positive, may not be negative or has no bound, and would be uncertain by
+    less than half (RATIO) were all others known.
+    The logarithm of the ratio has a standard deviation of at most FACTOR: records that tell constants up to a common
+    factor tell nothing of it, and a fit would drift along it to where a constant has its bound. A direction of which
+    no row speaks else stays as loose as it was.
     """
     c, count = len(loose.names), len(fit.unknowns)
     data = fit.jacobian[: len(fit.jacobian) - count]
     memory = np.tile(np.broadcast_to(rows.memory, len(rows.columns)), len(data) // len(rows.columns))
-    covariance = np.linalg.inv((data.T / memory) @ data + np.eye(count))[:c, :c]
-    values, vectors = np.linalg.eigh(covariance)
-    mean = loose.mean + loose.root @ fit.unknowns[:c]
-    return Constants(loose.names, mean, loose.root @ (vectors * np.sqrt(np.maximum(values, 0.0))))
+    information = (data.T / memory) @ data + np.eye(count)
+    mean, unit = loose.at(fit.unknowns[:c]), np.diag(loose.root)
+    lower = np.array([model.parameters[i].lower for i in model.indices("parameters", loose.names)])
+    by_ratio = ((lower >= 0) | np.isinf(lower)) & (unit / np.sqrt(np.diag(information)[:c]) < RATIO * mean)
+    information[range(c), range(c)] += np.where(by_ratio, unit / (FACTOR * np.where(by_ratio, mean, 1.0)), 0.0) ** 2
+    values, vectors = np.linalg.eigh(np.linalg.inv(information)[:c, :c])
+    root = loose.root @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    return Constants(loose.names, mean, root, frozenset(n for n, r in zip(loose.names, by_ratio, strict=True) if r))
 
 
 def memory_of(rows: Rows, errors: Sequence[FloatArray]) -> FloatArray:

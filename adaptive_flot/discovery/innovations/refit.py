@@ -197,26 +197,27 @@ class Refitter:
         loose = (x - first) / (self._scale * LOOSE)
         if self.known is None:
             return loose
-        told: FloatArray = self._root @ (x[self._constants] - self.known.mean)
+        told: FloatArray = self._root @ self.known.distances(x[self._constants])
         return np.concatenate([loose, told])
 
     def known_rows(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What is known before of the constants as further rows of a regression on innovations, at parameters (np,).
 
-        With the covariance S of what is known and its mean m, and L L' = S::
+        With the covariance S of what is known, the distances d(p) from its mean (see `Constants`), and L L' = S::
 
-            0 = L^-1 (p - m) + L^-1 dp
+            0 = L^-1 d(p) + L^-1 d'(p) dp
 
         Returns
         -------
         tuple
-            L^-1 by the free parameters (c, q), and -L^-1 (p - m) (c,); no rows where nothing is known.
+            L^-1 d' by the free parameters (c, q), and -L^-1 d (c,); no rows where nothing is known.
         """
         rows = np.zeros((len(self._root), len(self.free)))
         if self.known is None:
             return rows, np.empty(0)
-        rows[:, self._constants] = self._root
-        return rows, -self._root @ (p[self._where][self._constants] - self.known.mean)
+        now = p[self._where][self._constants]
+        rows[:, self._constants] = self._root * self.known.slopes(now)
+        return rows, -self._root @ self.known.distances(now)
 
     def _moved(
         self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float
@@ -301,7 +302,8 @@ class Refitter:
         D = np.eye(len(x)) / LOOSE
         if self.known is not None:
             told = np.zeros((len(self.known.names), len(x)))
-            told[:, self._constants] = self._root * self._scale[self._constants]
+            slopes = self.known.slopes(x[self._constants])
+            told[:, self._constants] = self._root * slopes * self._scale[self._constants]
             D = np.vstack([D, told])
         return (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
 

@@ -21,7 +21,6 @@ from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_words
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
-from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
@@ -228,7 +227,7 @@ def _with_process_noise(
     explanation = lacking.best if lacking.word == "named" else start
     extended = before.model_of(explanation)
     where = extended.indices("parameters", constants.names)
-    known = Constants(constants.names, extended.parameter_values[list(where)], constants.root)
+    known = constants.about(extended.parameter_values[list(where)])
     progress("events in the new record")
     search = Search(extended, record, columns, floor, constants.names, known, processes, ramps=True, ends=ends)
     base = search.base(extended.parameter_values)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady_state import steady_state
+
+BoolArray = NDArray[np.bool_]
 
 LOOSE = 50.0
 """Standard deviation of the prior of a constant that no reference tells, in its scale: next to nothing."""
@@ -22,9 +25,21 @@ STARTS = 3
 """Starts of the constants: their own values, then each scattered by a log-normal factor of this spread."""
 
 
+FAR = 20.0
+"""Natural logarithm of the largest factor by which a constant differs from its mean: beyond, none is told from more."""
+
+
 @dataclass(frozen=True)
 class Constants:
-    """What is known of a model's constants before a fit: normal, with this mean and covariance.
+    """What is known of a model's constants before a fit: normal, some of them in their logarithms.
+
+    With the mean m, the root L, and u of independent standard normal numbers, a constant x is::
+
+        x_i = m_i + (L u)_i                  or, where it is known by its ratio,
+        x_i = m_i exp((L u)_i / m_i)
+
+    Both have the same slope at the mean. Records often tell constants up to a common factor. Then a ratio of two is as
+    certain at every size in the second form, while in the first it opens as both become small.
 
     Attributes
     ----------
@@ -34,11 +49,48 @@ class Constants:
         Their values (c,).
     root
         A matrix (c, c) whose product with its transpose is their covariance.
+    ratios
+        Which of them are known by their ratio to the mean; these are positive.
     """
 
     names: tuple[str, ...]
     mean: FloatArray
     root: FloatArray
+    ratios: frozenset[str] = frozenset()
+
+    def at(self, u: FloatArray) -> FloatArray:
+        """The constants (c,) at standard normal numbers u (c,)."""
+        moved: FloatArray = self.root @ u
+        if not self.ratios:
+            return self.mean + moved
+        share = np.clip(moved / self._divisor, -FAR, FAR)
+        return np.where(self._by_ratio, self.mean * np.exp(share), self.mean + moved)
+
+    def distances(self, values: FloatArray) -> FloatArray:
+        """L u of values (c,): the difference to the mean m, or m times the logarithm of the ratio to it."""
+        straight: FloatArray = values - self.mean
+        if not self.ratios:
+            return straight
+        ratio = np.where(self._by_ratio, values / self._divisor, 1.0)
+        return np.where(self._by_ratio, self.mean * np.log(np.clip(ratio, np.exp(-FAR), np.exp(FAR))), straight)
+
+    def slopes(self, values: FloatArray) -> FloatArray:
+        """Derivatives of the distances by the values (c,): one, or the mean over the value."""
+        smallest = np.exp(-FAR) * np.abs(self.mean)
+        return np.where(self._by_ratio, self.mean / np.where(self._by_ratio, np.maximum(values, smallest), 1.0), 1.0)
+
+    def about(self, mean: FloatArray) -> Constants:
+        """The same about another mean (c,): as far in units, or in per cent where known by ratio."""
+        share = np.where(self._by_ratio, mean / self._divisor, 1.0)
+        return replace(self, mean=mean, root=self.root * share[:, None])
+
+    @property
+    def _by_ratio(self) -> BoolArray:
+        return np.array([n in self.ratios for n in self.names], dtype=bool)
+
+    @property
+    def _divisor(self) -> FloatArray:
+        return np.where(self._by_ratio, self.mean, 1.0)
 
 
 def loose_constants(model: Model, names: Sequence[str]) -> Constants:
@@ -56,7 +108,7 @@ def scattered_starts(model: Model, constants: Constants) -> list[FloatArray]:
     starts = []
     for k in range(STARTS):
         factors = np.exp(np.random.default_rng(k).normal(0.0, SPREAD, len(own))) if k else np.ones(len(own))
-        starts.append(np.linalg.solve(constants.root, own * factors - constants.mean))
+        starts.append(np.linalg.solve(constants.root, constants.distances(own * factors)))
     return starts
 
 

@@ -59,7 +59,7 @@ class JointUnknowns:
         root = np.diag(self.constants.root)
         ends[:, :q] = self._ends[:, self._own] / self._scale
         if np.array_equal(self.constants.root, np.diag(root)) and (root > 0).all():
-            ends[:, q : q + c] = (self._ends[:, self._shared] - self.constants.mean) / root
+            ends[:, q : q + c] = [self.constants.distances(end) / root for end in self._ends[:, self._shared]]
         return ends[0], ends[1]
 
     def prior(self, z: FloatArray) -> FloatArray:
@@ -104,8 +104,7 @@ class JointUnknowns:
         return inside
 
     def _constants(self, z: FloatArray) -> FloatArray:
-        found: FloatArray = self.constants.mean + self.constants.root @ z[self.q : self.q + self.c]
-        return found
+        return self.constants.at(z[self.q : self.q + self.c])
 
     def _beyond(self, z: FloatArray) -> float:
         """How far coefficients and constants lie outside their bounds: a difference there would show nothing."""
