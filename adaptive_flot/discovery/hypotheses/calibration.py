@@ -21,7 +21,7 @@ ROUNDS = 2
 """How often the usual sizes are taken from a fit and the fit is made again."""
 RATIO = 0.5
 """Largest standard deviation, as a share of its value, of a constant that is known by its ratio."""
-FACTOR = 1.0
+FACTOR = 3.0
 """Largest standard deviation of the logarithm of that ratio."""
 FIRST_SIZE = 0.1
 """First guess of the size of the errors, as a share of the spread of an output."""

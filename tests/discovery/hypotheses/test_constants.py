@@ -117,12 +117,12 @@ def test_a_heater_that_has_aged_is_told_and_no_thermometer(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_fits_do_not_drift_where_nothing_is_told(seed: int) -> None:
-    """All constants of every fit stay within a factor of two of those of the reference, far from their bounds."""
+    """All constants of every fit stay within a factor of eight of those of the reference; their bounds are at about twenty."""
     compared = compare(tank(), [record(10 + seed, AGED)], [record(seed)])
     before = compared.calibration.fit.values
     for fit in (compared.null.fit, *(t.fit for t in compared.tested)):
         for name in compared.calibration.constants.names:
-            assert 0.5 < fit.value(name) / before[name] < 2.0, (name, fit.value(name), before[name])
+            assert 1 / 8 < fit.value(name) / before[name] < 8, (name, fit.value(name), before[name])
 
 
 @pytest.mark.parametrize("seed", range(3))
