@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,8 @@ WATCHING = "no move"
 
 ENOUGH = 0.8
 """Share of simulated tests that must tell the truth for a test to be worth its price."""
+LISTED, HARDLY = 4, 0.05
+"""Alternatives that are always listed; of more, those that are told in fewer tests than this share count together."""
 
 Names = tuple[tuple[str, str], ...]
 
@@ -93,7 +96,7 @@ class Experiment:
         closest = self.pairs[0]
         said = "A test that would tell" if self.tells else "No test tried would tell them all apart; the best"
         said += f": {self.name}, {self.dt * len(self.inputs):g} s"
-        told = ", ".join(f"{_words(n)} in {100 * p:.0f} %" for n, p in zip(self.compared, self.power, strict=True))
+        told = _powers(self.compared, self.power)
         alone = f" Left alone: {', '.join(f'{n} ({why})' for n, why in self.held)}." if self.held else ""
         pair = f"{_words(closest.one)} and {_words(closest.other)}"
         return (
@@ -127,6 +130,16 @@ class Experiment:
             ],
             "tried": [{"test": t.name, "separation_of_closest": round(t.separation, 1)} for t in self.tried],
         }
+
+
+def _powers(compared: Sequence[Names], power: Sequence[float]) -> str:
+    """How often each alternative is told; of many, those that are told at all, and the rest in one."""
+    each = [(f"{_words(n)} in {100 * p:.0f} %", p) for n, p in zip(compared, power, strict=True)]
+    hardly = [p for _, p in each if p < HARDLY]
+    if len(each) <= LISTED or len(hardly) < 2:
+        return ", ".join(words for words, _ in each)
+    rest = f"{'each of the other' if len(hardly) < len(each) else 'each of all'} {len(hardly)}"
+    return ", ".join([words for words, p in each if p >= HARDLY] + [f"{rest} in at most {100 * max(hardly):.0f} %"])
 
 
 def _words(names: Names) -> str:

@@ -122,24 +122,23 @@ def _row_by_row(
     ends: float,
 ) -> Comparison | None:
     """The comparison with what the innovations form tells, and without what it does not know; None without the time."""
-    began, reference = time.perf_counter(), max(references, key=len)
+    reference = max(references, key=len)
     with np.errstate(all="ignore"):
         known = _with_process_noise(compared, record, reference, processes, progress, ends)
         if known is None:
             return None
         search, base, told, sole, before = known
-        seconds = compared.verdict.seconds + time.perf_counter() - began
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         with_it = compared
         if _has_event(told):
-            with_it = with_event(compared, search, told, seconds)
+            with_it = with_event(compared, search, told)
             if with_it is compared and compared.verdict.word in ("none", "abstain"):
                 # a model that lacks much may hide an event of some rows from free runs, which usually err as much
-                with_it = with_cause(compared, search, base, told, before, seconds, unusual=True)
+                with_it = with_cause(compared, search, base, told, before, unusual=True)
         elif leaves_more(compared.verdict):
-            with_it = with_cause(compared, search, base, told, before, seconds)
+            with_it = with_cause(compared, search, base, told, before)
             if with_it is compared and sole is not None:
-                with_it = with_cause(compared, search, base, sole, before, seconds)
+                with_it = with_cause(compared, search, base, sole, before)
         if with_it is not compared:
             return with_it
         kept = unless_contradicted(compared, told)

@@ -29,7 +29,7 @@ from adaptive_flot.discovery.verdict.wording import since_reference
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
-MOST_SECONDS = 60.0
+MOST_SECONDS = 45.0
 """Longest time of the search: where a model is far off, it tries much. What is cut short tells nothing."""
 BETTER = 0.8
 """What is told already is replaced where errors fall to so many times those with it, by their geometric mean."""

@@ -35,7 +35,6 @@ def with_cause(
     base: Explanation,
     told: Told,
     reference: tuple[Search, Explanation],
-    seconds: float,
     *,
     unusual: bool = False,
 ) -> Comparison:
@@ -49,8 +48,6 @@ def with_cause(
         The search in innovations form, the model as it is in the new record, and what was judged.
     reference
         The search in the reference, and the model as it is there.
-    seconds
-        How long it took.
     unusual
         Whether errors over stretches without the cause must be above those of the reference.
     """
@@ -70,7 +67,9 @@ def with_cause(
         return compared
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))
     calibration = replace(compared.calibration, model=search.model)
-    verdict = verdict_of(calibration, compared.rows, compared.blocks, compared.null, judged, True, seconds)
+    verdict = verdict_of(
+        calibration, compared.rows, compared.blocks, compared.null, judged, True, compared.verdict.seconds
+    )
     said = ", ".join(c.words for c in error)
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
     alone = f"By free runs alone, which what wanders spoils: {compared.verdict.reason}"

@@ -21,7 +21,7 @@ from adaptive_flot.discovery.innovations.search import Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 
 
-def with_event(compared: Comparison, search: Search, told: Told, seconds: float) -> Comparison:
+def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     """The comparison with the event told; unchanged where free runs do not get better by it, or need not.
 
     Where no output's error without the event is above what is usual on the reference, there is nothing to explain.
@@ -34,8 +34,6 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
         The comparison of the whole record.
     search, told
         The search in innovations form, and what was judged: events, and nothing else.
-    seconds
-        How long it took.
     """
     model, rows = search.model, compared.rows
     constants = search.known or compared.calibration.constants
@@ -55,7 +53,7 @@ def with_event(compared: Comparison, search: Search, told: Told, seconds: float)
     word = "class" if told.word == "class" and len(found) > 1 else "named"
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))  # type: ignore[arg-type]
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
-    verdict = verdict_of(calibration, rows, blocks, null, judged, True, seconds)
+    verdict = verdict_of(calibration, rows, blocks, null, judged, True, compared.verdict.seconds)
     if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or hardly_explained(verdict.error, ABOVE_USUAL):
         return compared
     said = compared.verdict.word in ("named", "class")  # what is not told over the whole record says nothing beside it
