@@ -1,0 +1,22 @@
+"""Protects: how often a test tells each alternative is said in one short sentence, however many there are."""
+
+from adaptive_flot.discovery.results.experiment import _powers
+
+
+def sites(count: int) -> list[tuple[tuple[str, str], ...]]:
+    return [((f"site_{i}", "time"),) for i in range(count)]
+
+
+def test_a_few_are_all_listed() -> None:
+    assert _powers(sites(3), (0.9, 0.0, 0.0)) == "site_0 by time in 90 %, site_1 by time in 0 %, site_2 by time in 0 %"
+
+
+def test_of_many_those_that_are_hardly_told_count_together() -> None:
+    power = (0.9, 0.0, 0.03, 0.0, 0.2, 0.01)
+    said = _powers(sites(6), power)
+    assert said == "site_0 by time in 90 %, site_4 by time in 20 %, each of the other 4 in at most 3 %"
+
+
+def test_where_none_is_told_that_is_said_once() -> None:
+    assert _powers(sites(6), (0.0,) * 6) == "each of all 6 in at most 0 %"
+    assert _powers(sites(6), (0.9,) * 5 + (0.0,)).count("site_") == 6
