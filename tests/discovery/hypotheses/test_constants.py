@@ -117,7 +117,7 @@ def test_a_heater_that_has_aged_is_told_and_no_thermometer(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_fits_do_not_drift_where_nothing_is_told(seed: int) -> None:
-    """All constants of every fit stay within a factor of eight of those of the reference; their bounds are at about twenty."""
+    """Constants of every fit stay within a factor of eight of those of the reference; their bounds are at about 20."""
     compared = compare(tank(), [record(10 + seed, AGED)], [record(seed)])
     before = compared.calibration.fit.values
     for fit in (compared.null.fit, *(t.fit for t in compared.tested)):

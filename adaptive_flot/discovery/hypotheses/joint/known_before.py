@@ -105,7 +105,7 @@ def scattered_starts(model: Model, constants: Constants) -> list[FloatArray]:
     if not constants.names:
         return [np.empty(0)]
     own = np.array([model.parameters[i].value for i in model.indices("parameters", constants.names)])
-    starts = []
+    starts: list[FloatArray] = []
     for k in range(STARTS):
         factors = np.exp(np.random.default_rng(k).normal(0.0, SPREAD, len(own))) if k else np.ones(len(own))
         starts.append(np.linalg.solve(constants.root, constants.distances(own * factors)))
