@@ -111,7 +111,7 @@ def test_a_heater_that_has_aged_is_told_and_no_thermometer(seed: int) -> None:
     compared = compare(tank(), [record(10 + seed, AGED)], [record(seed)])
     assert compared.calibration.constants.ratios == {"power", "conductance", "store"}
     assert compared.verdict.word == "named", compared.verdict.reason
-    assert [t.hypothesis.label for t in compared.judged.parts] == ["heater gain"]
+    assert [t.hypothesis and t.hypothesis.label for t in compared.judged.parts] == ["heater gain"]
     assert compared.tested[0].fit.values["heater_by_constant.amplitude"] == pytest.approx(-0.15, abs=0.01)
 
 

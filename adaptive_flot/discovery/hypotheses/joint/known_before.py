@@ -108,8 +108,8 @@ def scattered_starts(model: Model, constants: Constants) -> list[FloatArray]:
     starts: list[FloatArray] = []
     for k in range(STARTS):
         factors = np.exp(np.random.default_rng(k).normal(0.0, SPREAD, len(own))) if k else np.ones(len(own))
-        start: FloatArray = np.linalg.solve(constants.root, constants.distances(own * factors))
-        starts.append(start)
+        away = np.linalg.solve(constants.root, constants.distances(own * factors))
+        starts.append(np.asarray(away, dtype=np.float64))
     return starts
 
 
