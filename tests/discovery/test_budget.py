@@ -6,9 +6,11 @@ import time
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State
 from adaptive_flot.discovery.stages import plan_test
@@ -47,3 +49,21 @@ def test_a_test_is_proposed_only_where_time_is_left_for_it(draught: Discovery) -
     assert said == []
     plan_test(replace(state, base_seconds=1.0))
     assert said == ["plan a test"]
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_name_that_process_noise_may_deny_is_not_told_unasked(
+    monkeypatch: pytest.MonkeyPatch, draught: Discovery, wanted: bool
+) -> None:
+    """On a measured air handling unit a search that was cut short there named a damper for a heating valve."""
+    monkeypatch.setattr(asking, "is_asked", lambda state: wanted)
+    screening = Screening(tank_record(), (), ())
+    state = State(heated_tank(), (), None, None, 1, print, screening, problem=draught.problem)
+    state = replace(state, before=draught.before, after=draught.after, search=draught.search)
+    state = replace(state, judgement=draught.judgement, ends=time.monotonic() - 1.0)
+    assert state.judged.word == "named"
+    asked = asking.second_opinion(state)
+    if wanted:
+        assert asked.judged.word == "abstain" and "before it could be compared" in asked.contradiction
+    else:
+        assert asked is state

@@ -86,6 +86,27 @@ def test_a_budget_that_ends_after_the_single_faults_leaves_them_and_says_so(
         assert verdict.word == "abstain" and changes.SPENT in verdict.notes
 
 
+@pytest.mark.parametrize("short", [True, False])
+def test_a_name_that_process_noise_was_to_be_asked_about_is_not_told_without(
+    monkeypatch: pytest.MonkeyPatch, short: bool
+) -> None:
+    """A long record is not searched row by row: there the free runs alone have always told."""
+    named = replace(compared(), verdict=replace(compared().verdict, word="named"), complete=True)
+
+    def in_time(*given: object, ends: float, **more: object) -> Comparison:
+        while time.monotonic() < ends:
+            time.sleep(0.01)
+        return named
+
+    monkeypatch.setattr(changes, "compare", in_time)
+    monkeypatch.setattr(changes, "is_short_since_reference", lambda *given: short)
+    monkeypatch.setattr(changes, "why_not_new", lambda *given: "")
+    monkeypatch.setattr(changes, "unless_much_is_left", lambda compared: compared)
+    verdict = find_changes(tank(), [record("new", 1, FOLLOWS)], [record("old", 2)], budget=0.05).verdict
+    assert verdict.word == ("abstain" if short else "named") and changes.SPENT in verdict.notes
+    assert (changes.NOT_ASKED in verdict.reason) == short
+
+
 @pytest.mark.usefixtures("long_records")
 def test_nothing_is_told_where_nothing_has_changed() -> None:
     assert find_changes(tank(), [record("new", 1)], [record("old", 2)]).verdict.word == "none"

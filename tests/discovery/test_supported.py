@@ -6,12 +6,14 @@ The records are simulated here by Euler's rule. The level is controlled by the g
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.since_reference import changes
+from adaptive_flot.discovery.since_reference import changes, supported
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
@@ -82,3 +84,21 @@ def test_a_gauge_that_drifts_is_not_told_as_a_pump(monkeypatch: pytest.MonkeyPat
 def test_a_worn_pump_is_told() -> None:
     found = find_changes(vessel(), [record("new", 3, pump=WORN)], [old()])
     assert "pump" in told(found), found.verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("kind", "gain", "stays"),
+    [("gain", 100.0, True), ("gain", 20.0, False), ("lag", 100.0, False), ("switch", 100.0, False)],
+)
+def test_only_what_is_there_all_the_time_speaks_for_a_name(
+    monkeypatch: pytest.MonkeyPatch, kind: str, gain: float, stays: bool
+) -> None:
+    """A battery with a hidden load for some hours: "the charger gives 0.1 A too little" had a late charger for it."""
+    monkeypatch.setattr(supported, "_gain", lambda *given: 0.0)
+    monkeypatch.setattr(supported, "taken_back", lambda compared, why: None)
+    verdict = SimpleNamespace(word="named", effects=(SimpleNamespace(effect=SimpleNamespace(site="pump")),), members=())
+    compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
+    base: Any = SimpleNamespace(criterion=10.0)
+    there = SimpleNamespace(site="pump", kind=kind)
+    found: Any = SimpleNamespace(alike=(SimpleNamespace(hypotheses=(there,), criterion=10.0 + gain),))
+    assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]

@@ -47,6 +47,8 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
+NOT_ASKED = "the budget ended before it could be compared with process noise, which may explain as much"
+TOLD = ("named", "class")
 LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
 
@@ -109,6 +111,8 @@ def _found(
         judged = _of_another_shape(judged, records[0], processes, progress, ends - time.monotonic())
     if judged is None:
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, SPENT)))
+        if short and judged.verdict.word in TOLD:
+            return taken_back(judged, NOT_ASKED)
     why = why_not_new(judged, confirmed)
     return taken_back(judged, why, said="No change is told") if why else unless_much_is_left(judged)
 

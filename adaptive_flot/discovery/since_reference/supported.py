@@ -10,11 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
+from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.since_reference.taken_back import taken_back
 
+LATE = "lag"
 SUPPORT = 30.0
 """Gain of the criterion that speaks for a name. Of 17 right ones of other processes the least gained 49. Gauges that
 drift, and wandering alone, have given wrong ones up to 23."""
@@ -34,7 +36,8 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     if verdict.word not in ("named", "class") or best is None:
         return compared
     sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
-    found = (e for e in told.alike if sites & {h.site for h in e.hypotheses})
+    # an event there, or a part that is late, is another cause: it does not speak for one that is there all the time
+    found = (e for e in told.alike if sites & {h.site for h in e.hypotheses if h.kind not in (*EVENTS, LATE)})
     if any(e.criterion - base.criterion > SUPPORT for e in found):
         return compared
     # each form is asked: what starts where a free run has it may rest there, as a limit that nothing reaches

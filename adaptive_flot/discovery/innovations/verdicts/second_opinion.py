@@ -64,8 +64,10 @@ def second_opinion(state: State) -> State:
     problem, (before, _) = state.known_problem, state.refitted
     given = replace(problem.record, initial_state=before.initial_state)
     record = searchable(given, before.model) if is_asked(state) else None
-    if record is None or time.monotonic() > state.ends:  # a budget that is spent has no time for it
+    if record is None:
         return state
+    if time.monotonic() > state.ends:
+        return _not_asked(state)
     state.progress("ask the innovations form")
     start = {q.name: q.value for q in state.model.parameters}
     search = Search(
@@ -82,7 +84,7 @@ def second_opinion(state: State) -> State:
         base = search.base(before.model.parameter_values)
         found = search.run(base, state.progress)
         if search.time_is_up:
-            return state
+            return _not_asked(state)
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = _by_the_rules(state, search, base, told)
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
@@ -106,6 +108,15 @@ def is_asked(state: State) -> bool:
     """Whether the free run leaves something open (see `second_opinion`)."""
     silent = state.judged.word in ("abstain", "unnamed")
     return silent or follows_time(state) or unexpected_drift(state) or unconfirmed(state) or leaves_too_much(state)
+
+
+def _not_asked(state: State) -> State:
+    """The verdict where a budget was spent before the innovations form could be asked: no name that it may deny."""
+    if state.judged.word not in TELLS:
+        return state
+    return _taken_back(
+        state, "the time ended before it could be compared with process noise, which may explain as much"
+    )
 
 
 def _kept(state: State, told: Told) -> State:
