@@ -176,15 +176,15 @@ class Search:
         events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
         screened = screening.all(events=events, ramps=events and self.ramps)
         chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
-        refits = self._all_with(start, chosen)
+        refits = self.all_with(start, chosen)
         switched = [e for e in refits if e.hypotheses[-1].kind == "switch"]
         if switched:
             switch = max(switched, key=lambda e: e.criterion).hypotheses[-1]
             there = [s for site in self.model.sites for s in screening.at_times_of(switch, site)]
-            refits += self._all_with(start, there)
+            refits += self.all_with(start, there)
         return refits
 
-    def _all_with(self, start: Explanation, chosen: Sequence[Screened]) -> list[Explanation]:
+    def all_with(self, start: Explanation, chosen: Sequence[Screened]) -> list[Explanation]:
         """The explanations with one of some effects more each, those that are worth their numbers."""
         refits = parallel_map(lambda s: None if self.time_is_up else self._with(start, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]

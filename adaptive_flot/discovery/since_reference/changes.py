@@ -27,6 +27,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short_since_reference
+from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
@@ -133,6 +134,9 @@ def _row_by_row(
             return None
         search, base, told, sole, before = known
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
+        on_sites = unless_on_a_balance(search, base, told)
+        if on_sites is not told:
+            told, compared = on_sites, _with_words_of_a_balance(compared, on_sites.why)
         with_it = compared
         if _has_event(told):
             with_it = with_event(compared, search, told)
@@ -147,6 +151,16 @@ def _row_by_row(
             return with_it
         kept = unless_contradicted(compared, told)
         return kept if kept is not compared else unless_unsupported(compared, search, base, told)
+
+
+def _with_words_of_a_balance(compared: Comparison, why: str) -> Comparison:
+    """The comparison with what acts on the balance of a state: first where nothing else is told, else as a note."""
+    verdict = compared.verdict
+    if verdict.word == "abstain":
+        changed = replace(verdict, reason=f"Something has changed: {why}.", notes=(*verdict.notes, verdict.reason))
+    else:
+        changed = replace(verdict, notes=(*verdict.notes, f"With process noise {why}."))
+    return replace(compared, verdict=changed)
 
 
 def unless_an_event(

@@ -21,6 +21,7 @@ from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives, beside_alternatives
+from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance
 from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near, one_that_all_have
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
@@ -87,6 +88,9 @@ def second_opinion(state: State) -> State:
             return _not_asked(state)
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = _by_the_rules(state, search, base, told)
+        on_sites = unless_on_a_balance(search, base, told)
+    if on_sites is not told:
+        state, told = _noted(state, on_sites.why), on_sites
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
     if asked.judged.word in TELLS or time.monotonic() > state.ends:
         return asked
@@ -96,6 +100,12 @@ def second_opinion(state: State) -> State:
     if among is None or among.word not in TELLS:
         return asked
     return _told(state, search, base, among, among=True)
+
+
+def _noted(state: State, why: str) -> State:
+    """The state with what process noise says among the notes on the record."""
+    said = f"with process noise {why}"
+    return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
 def _by_the_rules(state: State, search: Search, base: Explanation, told: Told) -> Told:
