@@ -20,7 +20,7 @@ from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_words
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE, Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
@@ -143,14 +143,23 @@ def _row_by_row(
             if with_it is compared and compared.verdict.word in ("none", "abstain"):
                 # a model that lacks much may hide an event of some rows from free runs, which usually err as much
                 with_it = with_cause(compared, search, base, told, before, unusual=True)
-        elif leaves_more(compared.verdict):
+        elif leaves_more(compared.verdict) and not _is_structure(told):
             with_it = with_cause(compared, search, base, told, before)
-            if with_it is compared and sole is not None:
+            if with_it is compared and sole is not None and not _is_structure(sole):
                 with_it = with_cause(compared, search, base, sole, before)
         if with_it is not compared:
             return with_it
         kept = unless_contradicted(compared, told)
         return kept if kept is not compared else unless_unsupported(compared, search, base, told)
+
+
+def _is_structure(told: Told) -> bool:
+    """Whether all that is told is what a plant has or has not, and what does not come between two records of it.
+
+    A constant that has changed looks like a dependence on whatever input has moved otherwise. Where a dependence is new
+    all the same, the search of other shapes finds it.
+    """
+    return bool(told.effects) and all(h.kind in STRUCTURE for h in told.effects)
 
 
 def _with_words_of_a_balance(compared: Comparison, why: str) -> Comparison:

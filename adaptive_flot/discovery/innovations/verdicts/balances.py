@@ -79,12 +79,13 @@ def _at(screening: Screening, site: Site, event: Hypothesis) -> Sequence[Screene
 
 
 def _words(balanced: Search, explanation: Explanation) -> str:
+    """What acts where and when; how much, where the constants are known by which a rate is measured."""
     h, model = explanation.hypotheses[-1], balanced.model_of(explanation)
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
     name = h.site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit
     amount = model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value
+    rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if balanced.known is not None else ""
     does, where = ("adds", "to") if amount > 0 else ("takes", "from")
-    rate = f"{abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s"
     words = name.replace("_", " ")
-    return f"something {does} {rate} {where} the balance of {words} ({when}), and the model has no site for that"
+    return f"something {does}{rate} {where} the balance of {words} ({when}), and the model has no site for that"

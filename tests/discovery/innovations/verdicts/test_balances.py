@@ -1,0 +1,103 @@
+"""Protects: what acts on a balance, where a model has no site for it, is not told as a probe; and a probe still is.
+
+A basin through which water with a measured concentration flows. The records are simulated here by Euler's rule.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
+from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance, with_balances
+from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+
+ROWS, DT, VOLUME = 600, 10.0, 1500.0
+ON = slice(200, 400)
+NOISE, WANDERS = 0.03, 0.002
+
+
+def basin() -> Model:
+    """What flows through, and what the probe shows."""
+
+    def equations(m: Scope) -> None:
+        salt = m.state("salt")
+        share = m.site("mixed", m.parameter("share"), "process", unit="-")
+        m.derivative("salt", share * m.input("flow") * (m.input("feed") - salt) / m.parameter("volume"))
+        m.output("probe", m.site("probe", salt, "sensor", unit="g/L"))
+
+    return Model(
+        name="basin",
+        states=(Quantity("salt", "g/L", "", -100.0, 100.0, scale=1.0),),
+        inputs=(Quantity("flow", "L/s", "", 0.0, 50.0), Quantity("feed", "g/L", "", 0.0, 20.0)),
+        parameters=(
+            Parameter("volume", 1200.0, "L", "", lower=100.0, upper=1e4, scale=300.0, role="estimated"),
+            Parameter("share", 1.0, "-", ""),
+        ),
+        outputs=(Quantity("probe", "g/L", "", scale=1.0),),
+        equations=equations,
+        max_step_s=DT,
+        initial_guess={"salt": 3.0},
+        starts_steady=False,
+    )
+
+
+def record(seed: int, *, fresh: float = 0.0, probe: float = 1.0) -> Dataset:
+    """Salt that is taken out by unmeasured fresh water [g/s], or a probe that shows a share of what is there."""
+    rng = np.random.default_rng(seed)
+    flow = np.repeat(rng.uniform(8.0, 16.0, ROWS // 20), 20)
+    feed = np.repeat(rng.uniform(2.0, 4.0, ROWS // 30), 30)
+    taken, shows = np.zeros(ROWS), np.ones(ROWS)
+    taken[ON], shows[ON] = fresh, probe
+    salt, seen = 3.0, np.zeros(ROWS)
+    for k in range(ROWS):
+        seen[k] = shows[k] * salt + NOISE * rng.normal()
+        if k + 1 < ROWS:
+            salt += DT * (flow[k + 1] * (feed[k + 1] - salt) - taken[k]) / VOLUME
+            salt += WANDERS * np.sqrt(DT) * rng.normal()
+    return Dataset("basin", DT * np.arange(ROWS, dtype=float), DT, np.column_stack([flow, feed]), seen[:, None])
+
+
+def judged(data: Dataset) -> tuple[Search, Explanation, Told]:
+    model = basin()
+    search = Search(model, data, (0,), noise_floor([data], (0,)), ("volume",))
+    with np.errstate(all="ignore"):
+        base = search.base(model.parameter_values)
+        return search, base, judge(search, base, search.run(base))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
+    search, base, told = judged(record(seed, fresh=6.0))
+    assert any(h.kind == "switch" for h in told.effects), "without the rule an event at a site is told"
+    kept = unless_on_a_balance(search, base, told)
+    assert kept.word == "abstain" and not kept.effects
+    assert kept.why.startswith("something takes from the balance of salt (")
+    begins, ends = (float(t) for t in kept.why.split("(")[1].split(" s)")[0].split("-"))
+    assert abs(begins - 2000.0) < 100.0 and abs(ends - 4000.0) < 100.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_probe_that_shows_less_stays_one(seed: int) -> None:
+    search, base, told = judged(record(seed, probe=0.85))
+    assert [h.site for h in told.effects] == ["probe"]
+    assert unless_on_a_balance(search, base, told) is told
+
+
+def test_what_is_no_event_is_not_asked() -> None:
+    search, base, told = judged(record(3))
+    assert not any(h.kind == "switch" for h in told.effects)
+    assert unless_on_a_balance(search, base, told) is told
+
+
+def test_a_model_with_balances_is_the_same_model() -> None:
+    """Reduction: with nothing added it gives the same run."""
+    data, plain = record(4), basin()
+    balanced = with_balances(plain)
+    assert [s.name for s in balanced.sites][-1] == "balance of salt"
+    x0 = np.array([3.0])
+    one, two = (RecordSimulator(m, DT).outputs(data, x0, plain.parameter_values) for m in (plain, balanced))
+    np.testing.assert_allclose(one, two, rtol=1e-12)
