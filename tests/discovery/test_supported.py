@@ -102,3 +102,29 @@ def test_only_what_is_there_all_the_time_speaks_for_a_name(
     there = SimpleNamespace(site="pump", kind=kind)
     found: Any = SimpleNamespace(alike=(SimpleNamespace(hypotheses=(there,), criterion=10.0 + gain),))
     assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("usual", "kind", "sites", "stays"),
+    [
+        (5.0, "span", ("pump", "gauge"), False),
+        (1.5, "span", ("pump", "gauge"), True),
+        (5.0, "switch", ("pump", "gauge"), True),
+        (5.0, "span", ("pump", "draw"), True),
+        (5.0, "span", ("gauge", "gauge"), True),
+    ],
+)
+def test_a_class_lacks_no_part_that_process_noise_takes_for_as_good(
+    monkeypatch: pytest.MonkeyPatch, usual: float, kind: str, sites: tuple[str, str], stays: bool
+) -> None:
+    """A vessel whose gauge was off by 7 %: free runs told the valve or a leak, by what had wandered over hours.
+
+    What is told has to be among what process noise takes for alike: else another rule has its say.
+    """
+    monkeypatch.setattr(supported, "taken_back", lambda compared, why: None)
+    verdict = SimpleNamespace(word="class", effects=(), members=(("pump", "constant"), ("draw", "constant")))
+    calibration = SimpleNamespace(usual=SimpleNamespace(overall=np.array([usual])), noise=np.array([1.0]))
+    compared: Any = SimpleNamespace(verdict=verdict, calibration=calibration)
+    one, other = (SimpleNamespace(site=s, kind=k, label=s) for s, k in zip(sites, ("gain", kind), strict=True))
+    told: Any = SimpleNamespace(alike=tuple(SimpleNamespace(hypotheses=(h,)) for h in (one, other)))
+    assert (supported.unless_alike(compared, told) is compared) == stays

@@ -35,7 +35,7 @@ from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
-from adaptive_flot.discovery.since_reference.supported import unless_unsupported
+from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
     leaves_more,
     taken_back,
@@ -150,7 +150,8 @@ def _row_by_row(
         if with_it is not compared:
             return with_it
         kept = unless_contradicted(compared, told)
-        return kept if kept is not compared else unless_unsupported(compared, search, base, told)
+        kept = kept if kept is not compared else unless_unsupported(compared, search, base, told)
+        return kept if kept is not compared else unless_alike(compared, told)
 
 
 def _is_structure(told: Told) -> bool:

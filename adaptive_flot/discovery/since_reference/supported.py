@@ -1,4 +1,4 @@
-"""Whether the innovations form has any use for what free runs tell.
+"""Whether the innovations form has any use for what free runs tell, and tells it from other parts.
 
 Over hours a free run adds up whatever is not quite balanced. Where nothing depends on the level of a vessel, a gauge
 that drifts, a wandering supply and a pump that is worn all look alike there. With process noise each row counts, and a
@@ -12,6 +12,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.since_reference.taken_back import taken_back
@@ -47,6 +48,12 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     return taken_back(compared, why)
 
 
+def _wanders(compared: Comparison) -> bool:
+    """Whether an error of the reference is far above its noise from row to row."""
+    calibration = compared.calibration
+    return bool((calibration.usual.overall > FAR_ABOVE * calibration.noise).any())
+
+
 def _gain(search: Search, base: Explanation, tested: Tested) -> float:
     """Gain of the criterion by a hypothesis, fitted from where free runs have it; infinite where it has no fit."""
     h = tested.hypothesis
@@ -59,3 +66,30 @@ def _gain(search: Search, base: Explanation, tested: Tested) -> float:
     p[there] = base.fit.p[own]
     gain = search.added(base, h, p).criterion - base.criterion
     return gain if np.isfinite(gain) else float("inf")
+
+
+def unless_alike(compared: Comparison, told: Told) -> Comparison:
+    """The comparison, its name or class taken back where with process noise a part that it leaves out is as good.
+
+    Free runs over hours tell parts apart by what wanders as well. Where the errors of the reference are far more than
+    noise, the innovations form must tell a part that is named from others, too: one effect of another site that it
+    takes for about as good, and that is there all the time, is a member that the class lacks.
+
+    Parameters
+    ----------
+    compared
+        The comparison of free runs.
+    told
+        What the innovations form has judged.
+    """
+    verdict = compared.verdict
+    if verdict.word not in ("named", "class") or not _wanders(compared):
+        return compared
+    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    single = (e.hypotheses[0] for e in told.alike if len(e.hypotheses) == 1)
+    alone = [h for h in single if h.kind not in (*EVENTS, LATE)]
+    others = [h for h in alone if h.site not in sites]
+    if not others or len(others) == len(alone):
+        return compared
+    said = ", ".join(h.label for h in others)
+    return taken_back(compared, f"with process noise {said} explains about as much")
