@@ -135,6 +135,8 @@ def _row_by_row(
         search, base, told, sole, before = known
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         on_sites = unless_on_a_balance(search, base, told)
+        if search.time_is_up:
+            return None
         if on_sites is not told:
             told, compared = on_sites, _with_words_of_a_balance(compared, on_sites.why)
         with_it = compared

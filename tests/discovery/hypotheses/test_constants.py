@@ -54,6 +54,12 @@ def test_a_ratio_is_as_certain_at_every_size(u: FloatArray) -> None:
     np.testing.assert_allclose(moved.at(u)[2], KNOWN.at(u)[2])
 
 
+def test_what_is_known_by_ratio_stays_so_where_a_fit_ended_at_zero() -> None:
+    at_bound = KNOWN.about(np.array([0.0, 3.0, 0.0]))
+    assert (at_bound.mean[:2] > 0).all() and at_bound.mean[2] == 0.0
+    assert np.isfinite(np.linalg.inv(at_bound.root)).all()
+
+
 def test_nothing_is_infinite_at_zero_and_far_away() -> None:
     assert np.isfinite(KNOWN.distances(np.array([0.0, -1.0, 0.0]))).all()
     assert np.isfinite(KNOWN.slopes(np.array([0.0, -1.0, 0.0]))).all()

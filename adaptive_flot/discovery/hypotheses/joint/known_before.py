@@ -29,6 +29,10 @@ FAR = 20.0
 """Natural logarithm of the largest factor by which a constant differs from its mean: beyond, none is told from more."""
 
 
+LEAST_SHARE = 1e-3
+"""Least share of its mean at which what is known of a constant by its ratio may be told about another mean."""
+
+
 @dataclass(frozen=True)
 class Constants:
     """What is known of a model's constants before a fit: normal, some of them in their logarithms.
@@ -80,9 +84,13 @@ class Constants:
         return np.where(self._by_ratio, self.mean / np.where(self._by_ratio, np.maximum(values, smallest), 1.0), 1.0)
 
     def about(self, mean: FloatArray) -> Constants:
-        """The same about another mean (c,): as far in units, or in per cent where known by ratio."""
-        share = np.where(self._by_ratio, mean / self._divisor, 1.0)
-        return replace(self, mean=mean, root=self.root * share[:, None])
+        """The same about another mean (c,): as far in units, or in per cent where known by ratio.
+
+        The mean of such a constant stays positive, though a fit may have it at a bound of zero.
+        """
+        share = np.where(self._by_ratio, np.maximum(mean / self._divisor, LEAST_SHARE), 1.0)
+        about = np.where(self._by_ratio, share * self.mean, mean)
+        return replace(self, mean=about, root=self.root * share[:, None])
 
     @property
     def _by_ratio(self) -> BoolArray:

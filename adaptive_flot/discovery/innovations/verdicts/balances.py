@@ -52,7 +52,7 @@ def unless_on_a_balance(search: Search, base: Explanation, told: Told) -> Told:
         What was judged.
     """
     event = next((h for h in told.best.hypotheses if h.kind in EVENTS), None)
-    if told.word not in ("named", "class") or event is None or search.time_is_up:
+    if told.word not in ("named", "class") or event is None:
         return told
     balanced = replace(search, model=with_balances(search.model))
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)

@@ -89,6 +89,8 @@ def second_opinion(state: State) -> State:
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = _by_the_rules(state, search, base, told)
         on_sites = unless_on_a_balance(search, base, told)
+        if search.time_is_up:
+            return _not_asked(state)
     if on_sites is not told:
         state, told = _noted(state, on_sites.why), on_sites
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
