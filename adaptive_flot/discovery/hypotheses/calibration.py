@@ -23,6 +23,8 @@ RATIO = 0.5
 """Largest standard deviation, as a share of its value, of a constant that is known by its ratio."""
 FACTOR = 3.0
 """Largest standard deviation of the logarithm of that ratio."""
+EXCLUDED = 20.0
+"""Drop of minus two log-likelihood of the reference beyond what its covariance charges, from which that misleads."""
 FIRST_SIZE = 0.1
 """First guess of the size of the errors, as a share of the spread of an output."""
 
@@ -147,6 +149,32 @@ def _told(model: Model, loose: Constants, fit: JointFit, rows: Rows) -> Constant
     values, vectors = np.linalg.eigh(np.linalg.inv(information)[:c, :c])
     root = loose.root @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     return Constants(loose.names, mean, root, frozenset(n for n, r in zip(loose.names, by_ratio, strict=True) if r))
+
+
+def excluded_by(calibration: Calibration, fit: JointFit) -> bool:
+    """Whether the records of a calibration exclude the constants of another fit, though what is told of them does not.
+
+    What is told is a covariance, in constants or in their logarithms. Where records tell a difference of two constants
+    over a third, neither holds far away. So the records are asked themselves: their criterion with these constants,
+    initial states fitted anew, less that of the calibration, is about the squared distance u'u that the covariance
+    charges. It is more by EXCLUDED where the covariance misleads.
+    """
+    names = calibration.constants.names
+    if not names:
+        return False
+    held = calibration.model.with_parameters({name: fit.value(name) for name in names})
+    nothing = Constants((), np.empty(0), np.empty((0, 0)))
+    fitter = JointFitter(held, calibration.rows, nothing, (), calibration.fit.initial)
+    with np.errstate(all="ignore"):
+        there = fitter.fit(fitter.unknowns.start())
+    lost = _criterion(calibration.rows, there) - _criterion(calibration.rows, calibration.fit)
+    first = len(fit.coefficients)
+    charged = float(np.sum(fit.unknowns[first : first + len(names)] ** 2))
+    return not lost <= charged + EXCLUDED  # a run that fails excludes them as well
+
+
+def _criterion(rows: Rows, fit: JointFit) -> float:
+    return float(sum(loss.sum() for loss in rows.losses(fit.errors)))
 
 
 def memory_of(rows: Rows, errors: Sequence[FloatArray]) -> FloatArray:

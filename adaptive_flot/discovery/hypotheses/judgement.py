@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -110,7 +110,13 @@ def _site(tested: Tested) -> str:
     return tested.hypothesis.site if tested.hypothesis else ""
 
 
-def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss | None) -> tuple[Judged, Blocks]:
+def judge(
+    rows: Rows,
+    null: Tested,
+    tested: Sequence[Tested],
+    usual: UsualLoss | None,
+    excluded: Callable[[Tested], bool] = lambda tested: False,
+) -> tuple[Judged, Blocks]:
     """Judge.
 
     Parameters
@@ -123,6 +129,8 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
         The hypotheses.
     usual
         Losses of the reference; None where there is none.
+    excluded
+        Whether the reference excludes the constants of a fit, though its covariance does not.
 
     Returns
     -------
@@ -138,7 +146,7 @@ def judge(rows: Rows, null: Tested, tested: Sequence[Tested], usual: UsualLoss |
     level = null.total / count
     least = float(np.mean(usual.losses)) if usual is not None else float(len(rows.columns) / np.mean(rows.memory))
     if usual is not None:
-        if usual.exceeded(null, count, len(blocks.edges)) is None:
+        if usual.exceeded(null, count, len(blocks.edges)) is None and not excluded(null):
             return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
     ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
     errors = None if usual is None else usual.errors

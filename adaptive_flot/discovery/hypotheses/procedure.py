@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import one_thread, parallel_map
-from adaptive_flot.discovery.hypotheses.calibration import Calibration, calibrate
+from adaptive_flot.discovery.hypotheses.calibration import Calibration, calibrate, excluded_by
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, blocks_of
 from adaptive_flot.discovery.hypotheses.cross_validation import (
     REFRESH,
@@ -34,6 +34,11 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.step_size import with_short_steps
+
+SIZES_OPEN = (
+    "The reference tells some constants only together, and with those of this fit it would err more: sizes may be "
+    "far off. Hold one of these constants fixed, or give bounds."
+)
 
 
 @dataclass(frozen=True)
@@ -155,10 +160,12 @@ def compare(
     possible = (t for t in results if t is not None and not moves_though_stopped(calibration.model, rows, t))
     tested = tuple(sorted(possible, key=lambda t: t.total))
     usual = _usual_losses(calibration) if references else None
-    judged, blocks = judge(rows, null, tested, usual)
+    judged, blocks = judge(rows, null, tested, usual, lambda t: excluded_by(calibration, t.fit))
     judged = unless_at_noise(judged, rows, null)
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
     told = judged.word in ("named", "class") and judged.best is not None
+    if references and told and judged.best is not None and excluded_by(calibration, judged.best.fit):
+        verdict = replace(verdict, notes=(*verdict.notes, SIZES_OPEN))
     best = judged.best if told and judged.best is not None else null
     extended = model_with(calibration.model, best.hypothesis).with_parameters(best.fit.values)
     return Comparison(
