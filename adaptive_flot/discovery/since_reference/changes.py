@@ -144,7 +144,7 @@ def _row_by_row(
             with_it = with_event(compared, search, told)
             if with_it is compared and compared.verdict.word in ("none", "abstain"):
                 # a model that lacks much may hide an event of some rows from free runs, which usually err as much
-                with_it = with_cause(compared, search, base, told, before, unusual=True)
+                with_it = with_cause(compared, search, base, told, before)
         elif leaves_more(compared.verdict) and not _is_structure(told):
             with_it = with_cause(compared, search, base, told, before)
             if with_it is compared and sole is not None and not _is_structure(sole):

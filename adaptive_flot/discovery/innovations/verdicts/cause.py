@@ -35,10 +35,11 @@ def with_cause(
     base: Explanation,
     told: Told,
     reference: tuple[Search, Explanation],
-    *,
-    unusual: bool = False,
 ) -> Comparison:
     """The comparison with the cause told; unchanged where errors over stretches do not fall to those of the reference.
+
+    Unchanged, too, where without the cause none of them is above ABOVE_USUAL times that of the reference: there is
+    nothing to explain then.
 
     Parameters
     ----------
@@ -48,8 +49,6 @@ def with_cause(
         The search in innovations form, the model as it is in the new record, and what was judged.
     reference
         The search in the reference, and the model as it is there.
-    unusual
-        Whether errors over stretches without the cause must be above those of the reference.
     """
     found = _tested(compared, search, told)
     if not found:
@@ -57,7 +56,7 @@ def with_cause(
     error = errors_over_folds(search, base, told.best)
     usual = usual_over_folds(*reference)
     error = tuple(replace(c, noise=usual[c.output]) for c in error)
-    if unusual and all(c.before <= ABOVE_USUAL * c.noise for c in error):
+    if all(c.before <= ABOVE_USUAL * c.noise for c in error):
         return compared
     word: Literal["named", "class"] = "named" if told.word == "named" else "class"
     if _too_many_parts(compared, told):
