@@ -92,9 +92,17 @@ class Hypothesis:
         Not where it has a scale, or is 0. Changes by a factor are as large at any site; `mode` is how effects act there
         by default.
         """
-        own_unit = {"s", "value", "value/driver"} | ({"g"} if (self.effect.mode or mode) == "offset" else set())
+        own_unit = {"s", *self._of_site(mode)}
         sizes = {c.name: abs(values[c.name]) for c in self.effect.terms if c.unit in own_unit and c.name in values}
         return replace(self, scales={**{name: size for name, size in sizes.items() if size > 0}, **self.scales})
+
+    def has_size_in_unit(self, mode: Mode) -> bool:
+        """Whether a fitted coefficient is in the unit of its site; `mode` is how effects act there by default."""
+        return any(c.unit in self._of_site(mode) for c in self.effect.terms if c.name in self.free)
+
+    def _of_site(self, mode: Mode) -> set[str]:
+        """Units of coefficients that stand for the unit of the site."""
+        return {"value", "value/driver"} | ({"g"} if (self.effect.mode or mode) == "offset" else set())
 
     @property
     def pulses(self) -> tuple[tuple[float, float], ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -115,7 +115,7 @@ def judge(
     null: Tested,
     tested: Sequence[Tested],
     usual: UsualLoss | None,
-    excluded: Callable[[Tested], bool] = lambda tested: False,
+    excluded: bool = False,
 ) -> tuple[Judged, Blocks]:
     """Judge.
 
@@ -130,7 +130,7 @@ def judge(
     usual
         Losses of the reference; None where there is none.
     excluded
-        Whether the reference excludes the constants of a fit, though its covariance does not.
+        Whether the reference excludes the constants with which the model as it is fits, though its covariance does not.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def judge(
     level = null.total / count
     least = float(np.mean(usual.losses)) if usual is not None else float(len(rows.columns) / np.mean(rows.memory))
     if usual is not None:
-        if usual.exceeded(null, count, len(blocks.edges)) is None and not excluded(null):
+        if usual.exceeded(null, count, len(blocks.edges)) is None and not excluded:
             return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
     ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
     errors = None if usual is None else usual.errors

@@ -35,6 +35,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.step_size import with_short_steps
 
+OTHER_CONSTANTS = "The model as it is fits the new records only with constants that the reference excludes."
 SIZES_OPEN = (
     "The reference tells some constants only together, and with those of this fit it would err more: sizes may be "
     "far off. Hold one of these constants fixed, or give bounds."
@@ -160,10 +161,13 @@ def compare(
     possible = (t for t in results if t is not None and not moves_though_stopped(calibration.model, rows, t))
     tested = tuple(sorted(possible, key=lambda t: t.total))
     usual = _usual_losses(calibration) if references else None
-    judged, blocks = judge(rows, null, tested, usual, lambda t: excluded_by(calibration, t.fit))
-    judged = unless_at_noise(judged, rows, null)
+    excluded = bool(references) and excluded_by(calibration, null.fit)
+    judged, blocks = judge(rows, null, tested, usual, excluded)
+    judged = judged if excluded else unless_at_noise(judged, rows, null)
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
     told = judged.word in ("named", "class") and judged.best is not None
+    if excluded and not told:
+        verdict = replace(verdict, notes=(*verdict.notes, OTHER_CONSTANTS))
     if references and told and judged.best is not None and excluded_by(calibration, judged.best.fit):
         verdict = replace(verdict, notes=(*verdict.notes, SIZES_OPEN))
     best = judged.best if told and judged.best is not None else null

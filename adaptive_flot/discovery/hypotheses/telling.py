@@ -17,6 +17,8 @@ from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.greybox.model import Model
 
+OPEN_FACTOR = 1.0
+"""Standard deviation of the logarithm of a constant from which only its ratio to others is known."""
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
 FAR_ABOVE = 2.0
@@ -86,6 +88,7 @@ def verdict_of(
             *_stopped(model, rows),
             *(what_is_left(error, reference) if told else ()),
             *(_moved(calibration, after) if reference else ()),
+            *(_by_a_factor(calibration, model, judged) if reference and told else ()),
         ),
         seconds=seconds,
     )
@@ -119,6 +122,30 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
     if not moved:
         return ()
     return (f"The new records want other constants, which the reference leaves open: {', '.join(moved)}.",)
+
+
+def _by_a_factor(calibration: Calibration, model: Model, judged: Judged) -> tuple[str, ...]:
+    """Constants that the reference tells up to a factor only, where a size that is told is in the unit of a part.
+
+    A sensor's size is in the unit of what is measured.
+    """
+    constants = calibration.constants
+    std = np.sqrt(np.sum(constants.root**2, axis=1))
+    label = {p.name: p.label for p in model.parameters}
+    loose = [
+        label[n]
+        for n, mean, s in zip(constants.names, constants.mean, std, strict=True)
+        if n in constants.ratios and s > OPEN_FACTOR * mean
+    ]
+    sensors = {site.name for site in model.sites if site.role == "sensor"}
+    modes = {site.name: site.mode for site in model.sites}
+    told = (t.hypothesis for t in judged.parts if t.hypothesis is not None)
+    if not loose or not any(h.site not in sensors and h.has_size_in_unit(modes[h.site]) for h in told):
+        return ()
+    return (
+        f"The reference tells these constants only up to a factor: {', '.join(loose)}. Sizes in the unit of a part may "
+        "be off by as much; shares and times are not.",
+    )
 
 
 def what_is_left(error: Sequence[OutputChange], reference: bool) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, test_on_stretches
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -69,12 +69,14 @@ def with_cause(
     verdict = verdict_of(
         calibration, compared.rows, compared.blocks, compared.null, judged, True, compared.verdict.seconds
     )
+    over_hours = what_is_left(verdict.error, reference=True)  # of free runs, and these are errors over stretches
+    notes = (*what_is_left(error, reference=True), *(n for n in verdict.notes if n not in over_hours))
     said = ", ".join(c.words for c in error)
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
     alone = f"By free runs alone, which what wanders spoils: {compared.verdict.reason}"
     return replace(
         compared,
-        verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*verdict.notes, alone)),
+        verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*notes, alone)),
         model=search.model_of(told.best),
         calibration=calibration,
         tested=(*found, *compared.tested),
