@@ -70,7 +70,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
             absorbed = responses.problem.absorbed
             variants = tuple(v for v in variants if not _is_absorbed(v, site, absorbed))
             if variants:
-                nameable = (site.name, driver) in known or _nameable(model, site, driver)
+                nameable = (site.name, driver) in known or has_a_reason(model, site, driver)
                 candidates.append(Candidate(site, driver, nameable, variants))
     return candidates
 
@@ -88,7 +88,7 @@ def _makes_sense(site: Site, driver: str) -> bool:
     return True
 
 
-def _nameable(model: Model, site: Site, driver: str) -> bool:
+def has_a_reason(model: Model, site: Site, driver: str) -> bool:
     """Whether a pair that no table lists may be named all the same.
 
     A quantity of the process may depend on anything in it. A sensor, an actuator or a feed has no reason to depend on

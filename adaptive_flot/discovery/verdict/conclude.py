@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import block_rows, changes, whiteness
+from adaptive_flot.discovery.candidates.catalogue import has_a_reason
 from adaptive_flot.discovery.candidates.direction import against, listed
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.moved_inputs import MOVED
@@ -23,7 +24,7 @@ from adaptive_flot.discovery.verdict.thresholds import with_ranges
 from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.stretches import LONGEST_IS_USED
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -195,8 +196,8 @@ def _meaning(model: Model, effect: Effect) -> str:
     """What the table of known effects says of an effect; why it has no name; empty where site and driver say it all."""
     known = listed(model, effect)
     if known is None:
-        role = next(s.role for s in model.sites if s.name == effect.site)
-        if role in INSTRUMENTS and effect.driver not in STATELESS_DRIVERS:
-            return f"without a name, since a {INSTRUMENTS[role]} has no reason to depend on it"
+        site = next(s for s in model.sites if s.name == effect.site)
+        if site.role in INSTRUMENTS and not has_a_reason(model, site, effect.driver):
+            return f"without a name, since a {INSTRUMENTS[site.role]} has no reason to depend on it"
         return "not listed among the effects known for this model" if model.known_effects else ""
     return f"the other way than: {known.meaning}" if against(model, effect) else known.meaning
