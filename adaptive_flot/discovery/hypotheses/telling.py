@@ -17,8 +17,6 @@ from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.greybox.model import Model
 
-OPEN_FACTOR = 1.0
-"""Standard deviation of the logarithm of a constant from which only its ratio to others is known."""
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
 FAR_ABOVE = 2.0
@@ -129,14 +127,8 @@ def _by_a_factor(calibration: Calibration, model: Model, judged: Judged) -> tupl
 
     A sensor's size is in the unit of what is measured.
     """
-    constants = calibration.constants
-    std = np.sqrt(np.sum(constants.root**2, axis=1))
     label = {p.name: p.label for p in model.parameters}
-    loose = [
-        label[n]
-        for n, mean, s in zip(constants.names, constants.mean, std, strict=True)
-        if n in constants.ratios and s > OPEN_FACTOR * mean
-    ]
+    loose = [label[name] for name in calibration.constants.up_to_a_factor]
     sensors = {site.name for site in model.sites if site.role == "sensor"}
     modes = {site.name: site.mode for site in model.sites}
     told = (t.hypothesis for t in judged.parts if t.hypothesis is not None)

@@ -121,6 +121,18 @@ def test_a_heater_that_has_aged_is_told_and_no_thermometer(seed: int) -> None:
     assert compared.tested[0].fit.values["heater_by_constant.amplitude"] == pytest.approx(-0.15, abs=0.01)
 
 
+@pytest.mark.parametrize("level", [60.0, 110.0])
+def test_a_heater_that_does_not_close_is_fitted_though_all_constants_move(level: float) -> None:
+    """Its level and all constants go together. With derivatives from before, the fit ended 26 times above the noise."""
+    leaks = Effect("heater", "own_value", "leak", {"amplitude": 1.0, "level": level}, {"width": 1.0})
+    compared = compare(tank(), [record(10, leaks)], [record(0)])
+    best = compared.tested[0]
+    assert best.hypothesis is not None and best.hypothesis.label == "heater leaks"
+    told = best.fit.value("heater_by_own_value.level") / best.fit.value("power")
+    assert told == pytest.approx(level / 240.0, rel=0.02)
+    assert compared.verdict.error[0].after < 1.2 * NOISE
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_fits_do_not_drift_where_nothing_is_told(seed: int) -> None:
     """Constants of every fit stay within a factor of eight of those of the reference; their bounds are at about 20."""

@@ -29,6 +29,8 @@ FAR = 20.0
 """Natural logarithm of the largest factor by which a constant differs from its mean: beyond, none is told from more."""
 
 
+OPEN = 1.0
+"""Standard deviation of the logarithm of a constant from which it is known only together with others."""
 LEAST_SHARE = 1e-3
 """Least share of its mean at which what is known of a constant by its ratio may be told about another mean."""
 
@@ -91,6 +93,14 @@ class Constants:
         share = np.where(self._by_ratio, np.maximum(mean / self._divisor, LEAST_SHARE), 1.0)
         about = np.where(self._by_ratio, share * self.mean, mean)
         return replace(self, mean=about, root=self.root * share[:, None])
+
+    @property
+    def up_to_a_factor(self) -> tuple[str, ...]:
+        """Those that are known only together with others: the logarithm of the ratio is open by more than OPEN."""
+        std = np.sqrt(np.sum(self.root**2, axis=1))
+        return tuple(
+            n for n, mean, s in zip(self.names, self.mean, std, strict=True) if n in self.ratios and s > OPEN * mean
+        )
 
     @property
     def _by_ratio(self) -> BoolArray:
