@@ -105,17 +105,19 @@ def test_only_what_is_there_all_the_time_speaks_for_a_name(
 
 
 @pytest.mark.parametrize(
-    ("usual", "kind", "sites", "stays"),
+    ("usual", "kind", "sites", "less", "stays"),
     [
-        (5.0, "span", ("pump", "gauge"), False),
-        (1.5, "span", ("pump", "gauge"), True),
-        (5.0, "switch", ("pump", "gauge"), True),
-        (5.0, "span", ("pump", "draw"), True),
-        (5.0, "span", ("gauge", "gauge"), True),
+        (5.0, "span", ("pump", "gauge"), 5.0, False),
+        (5.0, "span", ("pump", "gauge"), 20.0, True),
+        (1.5, "span", ("pump", "gauge"), 5.0, True),
+        (5.0, "switch", ("pump", "gauge"), 5.0, True),
+        (5.0, "depends", ("pump", "gauge"), 5.0, True),
+        (5.0, "span", ("pump", "draw"), 5.0, True),
+        (5.0, "span", ("gauge", "gauge"), 5.0, True),
     ],
 )
 def test_a_class_lacks_no_part_that_process_noise_takes_for_as_good(
-    monkeypatch: pytest.MonkeyPatch, usual: float, kind: str, sites: tuple[str, str], stays: bool
+    monkeypatch: pytest.MonkeyPatch, usual: float, kind: str, sites: tuple[str, str], less: float, stays: bool
 ) -> None:
     """A vessel whose gauge was off by 7 %: free runs told the valve or a leak, by what had wandered over hours.
 
@@ -126,5 +128,6 @@ def test_a_class_lacks_no_part_that_process_noise_takes_for_as_good(
     calibration = SimpleNamespace(usual=SimpleNamespace(overall=np.array([usual])), noise=np.array([1.0]))
     compared: Any = SimpleNamespace(verdict=verdict, calibration=calibration)
     one, other = (SimpleNamespace(site=s, kind=k, label=s) for s, k in zip(sites, ("gain", kind), strict=True))
-    told: Any = SimpleNamespace(alike=tuple(SimpleNamespace(hypotheses=(h,)) for h in (one, other)))
+    found = ((one, 60.0), (other, 60.0 - less))
+    told: Any = SimpleNamespace(alike=tuple(SimpleNamespace(hypotheses=(h,), criterion=c) for h, c in found))
     assert (supported.unless_alike(compared, told) is compared) == stays

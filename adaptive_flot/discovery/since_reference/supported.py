@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
-from adaptive_flot.discovery.hypotheses.families import EVENTS
+from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.since_reference.taken_back import taken_back
 
 LATE = "lag"
@@ -72,8 +72,8 @@ def unless_alike(compared: Comparison, told: Told) -> Comparison:
     """The comparison, its name or class taken back where with process noise a part that it leaves out is as good.
 
     Free runs over hours tell parts apart by what wanders as well. Where the errors of the reference are far more than
-    noise, the innovations form must tell a part that is named from others, too: one effect of another site that it
-    takes for about as good, and that is there all the time, is a member that the class lacks.
+    noise, the innovations form must tell a part that is named from others, too. One effect of another site that is
+    there all the time, and that it does not tell from it by LEAST_GAIN, is a member that the class lacks.
 
     Parameters
     ----------
@@ -86,10 +86,11 @@ def unless_alike(compared: Comparison, told: Told) -> Comparison:
     if verdict.word not in ("named", "class") or not _wanders(compared):
         return compared
     sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
-    single = (e.hypotheses[0] for e in told.alike if len(e.hypotheses) == 1)
-    alone = [h for h in single if h.kind not in (*EVENTS, LATE)]
-    others = [h for h in alone if h.site not in sites]
-    if not others or len(others) == len(alone):
+    single = [(e.hypotheses[0], e.criterion) for e in told.alike if len(e.hypotheses) == 1]
+    lasting = [(h, c) for h, c in single if h.kind not in (*EVENTS, *STRUCTURE, LATE)]
+    own = max((c for h, c in lasting if h.site in sites), default=float("inf"))
+    others = [h for h, c in lasting if h.site not in sites and c > own - LEAST_GAIN]
+    if not others:
         return compared
     said = ", ".join(h.label for h in others)
     return taken_back(compared, f"with process noise {said} explains about as much")
