@@ -35,6 +35,8 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.step_size import with_short_steps
 
+FAR_OPEN = 1.5
+"""Standard deviation of the logarithm of a constant from which a fit asks for all derivatives at each step."""
 OTHER_CONSTANTS = "The model as it is fits the new records only with constants that the reference excludes."
 SIZES_OPEN = (
     "The reference tells some constants only together, and with those of this fit it would err more: sizes may be "
@@ -130,8 +132,8 @@ def compare(
     sizes = [calibration.usual.sizes(r) for r in records] if references else calibration.rows.sizes
     rows = rows_of(records, columns, sizes, calibration.rows.memory)
     constants = calibration.constants if references else loose_constants(calibration.model, free)
-    # where constants move by factors, derivatives from before lead astray
-    refresh = REFRESH if references and not constants.up_to_a_factor else 1
+    # where constants may move by large factors, derivatives from before lead astray
+    refresh = REFRESH if references and not constants.up_to_a_factor(FAR_OPEN) else 1
     elsewhere = () if references else scattered_starts(model, constants)
     progress("run the new records")
     base = fit_all_rows(calibration.model, rows, None, constants, None, refresh=1)

@@ -128,7 +128,7 @@ def _by_a_factor(calibration: Calibration, model: Model, judged: Judged) -> tupl
     A sensor's size is in the unit of what is measured.
     """
     label = {p.name: p.label for p in model.parameters}
-    loose = [label[name] for name in calibration.constants.up_to_a_factor]
+    loose = [label[name] for name in calibration.constants.up_to_a_factor()]
     sensors = {site.name for site in model.sites if site.role == "sensor"}
     modes = {site.name: site.mode for site in model.sites}
     told = (t.hypothesis for t in judged.parts if t.hypothesis is not None)

@@ -94,12 +94,11 @@ class Constants:
         about = np.where(self._by_ratio, share * self.mean, mean)
         return replace(self, mean=about, root=self.root * share[:, None])
 
-    @property
-    def up_to_a_factor(self) -> tuple[str, ...]:
-        """Those that are known only together with others: the logarithm of the ratio is open by more than OPEN."""
+    def up_to_a_factor(self, least: float = OPEN) -> tuple[str, ...]:
+        """Those that are known only together with others: the logarithm of the ratio is open by more than `least`."""
         std = np.sqrt(np.sum(self.root**2, axis=1))
         return tuple(
-            n for n, mean, s in zip(self.names, self.mean, std, strict=True) if n in self.ratios and s > OPEN * mean
+            n for n, mean, s in zip(self.names, self.mean, std, strict=True) if n in self.ratios and s > least * mean
         )
 
     @property
