@@ -85,7 +85,8 @@ def _words(balanced: Search, explanation: Explanation) -> str:
     name = h.site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit
     amount = model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value
-    rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if balanced.known is not None else ""
+    measured = balanced.known is not None and not balanced.known.up_to_a_factor()
+    rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""
     does, where = ("adds", "to") if amount > 0 else ("takes", "from")
     words = name.replace("_", " ")
     return f"something {does}{rate} {where} the balance of {words} ({when}), and the model has no site for that"
