@@ -12,9 +12,10 @@ from typing import Literal
 
 import numpy as np
 
+from adaptive_flot.discovery.hypotheses.calibration import excluded_by
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, test_on_stretches
 from adaptive_flot.discovery.hypotheses.judgement import Judged
-from adaptive_flot.discovery.hypotheses.procedure import Comparison
+from adaptive_flot.discovery.hypotheses.procedure import SIZES_OPEN, Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
@@ -71,6 +72,8 @@ def with_cause(
     )
     over_hours = what_is_left(verdict.error, reference=True)  # of free runs, and these are errors over stretches
     notes = (*what_is_left(error, reference=True), *(n for n in verdict.notes if n not in over_hours))
+    if excluded_by(compared.calibration, found[0].fit):
+        notes = (*notes, SIZES_OPEN)
     said = ", ".join(c.words for c in error)
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
     alone = f"By free runs alone, which what wanders spoils: {compared.verdict.reason}"
