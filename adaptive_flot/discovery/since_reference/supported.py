@@ -15,7 +15,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
-from adaptive_flot.discovery.since_reference.taken_back import taken_back
+from adaptive_flot.discovery.since_reference.taken_back import sites_told, taken_back
 
 LATE = "lag"
 SUPPORT = 30.0
@@ -36,7 +36,7 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     verdict, best = compared.verdict, compared.judged.best
     if verdict.word not in ("named", "class") or best is None:
         return compared
-    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    sites = sites_told(verdict)
     # an event there, or a part that is late, is another cause: it does not speak for one that is there all the time
     found = (e for e in told.alike if sites & {h.site for h in e.hypotheses if h.kind not in (*EVENTS, LATE)})
     if any(e.criterion - base.criterion > SUPPORT for e in found):
@@ -85,7 +85,7 @@ def unless_alike(compared: Comparison, told: Told) -> Comparison:
     verdict = compared.verdict
     if verdict.word not in ("named", "class") or not _wanders(compared):
         return compared
-    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    sites = sites_told(verdict)
     single = [(e.hypotheses[0], e.criterion) for e in told.alike if len(e.hypotheses) == 1]
     lasting = [(h, c) for h, c in single if h.kind not in (*EVENTS, *STRUCTURE, LATE)]
     own = max((c for h, c in lasting if h.site in sites), default=float("inf"))

@@ -24,6 +24,11 @@ def leaves_more(verdict: Verdict) -> bool:
     return verdict.word == "abstain" or (verdict.word in ("named", "class") and left)
 
 
+def sites_told(verdict: Verdict) -> set[str]:
+    """Sites of what is named, and of every member of a class."""
+    return {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+
+
 def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     """The comparison, its name taken back where the innovations form does not know it.
 
@@ -32,7 +37,7 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     wanders.
     """
     verdict, found = compared.verdict, told.effects
-    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    sites = sites_told(verdict)
     if verdict.word not in ("named", "class") or sites & {h.site for h in found}:
         return compared
     if told.word == "named" and found and leaves_more(verdict):

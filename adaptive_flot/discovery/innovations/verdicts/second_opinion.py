@@ -98,7 +98,8 @@ def second_opinion(state: State) -> State:
         return asked
     with np.errstate(all="ignore"):
         among = among_alternatives(state, search, base, found)
-        among = _by_the_rules(state, search, base, among) if among is not None else None
+        if among is not None:  # what a balance explains better is not told by this way either
+            among = unless_on_a_balance(search, base, _by_the_rules(state, search, base, among))
     if among is None or among.word not in TELLS:
         return asked
     return _told(state, search, base, among, among=True)
