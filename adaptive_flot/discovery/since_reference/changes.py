@@ -169,7 +169,8 @@ def _with_words_of_a_balance(compared: Comparison, why: str) -> Comparison:
     """The comparison with what acts on the balance of a state: first where nothing else is told, else as a note."""
     verdict = compared.verdict
     if verdict.word == "abstain":
-        changed = replace(verdict, reason=f"Something has changed: {why}.", notes=(*verdict.notes, verdict.reason))
+        alone = f"By single faults of the whole record: {verdict.reason}"
+        changed = replace(verdict, reason=f"Something has changed: {why}.", notes=(*verdict.notes, alone))
     else:
         changed = replace(verdict, notes=(*verdict.notes, f"With process noise {why}."))
     return replace(compared, verdict=changed)
