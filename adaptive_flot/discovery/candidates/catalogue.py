@@ -52,7 +52,6 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     A driver that hardly moves is left out; lag and delay are those of sensors, actuators and feeds; what the model has
     already is not offered again, and a change that only rescales an adapted parameter neither.
     """
-    known = {(k.site, k.driver): k for k in model.known_effects}
     taken = {(e.site, e.driver) for e in model.effects}
     time = responses.problem.record.time
     candidates = []
@@ -70,8 +69,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
             absorbed = responses.problem.absorbed
             variants = tuple(v for v in variants if not _is_absorbed(v, site, absorbed))
             if variants:
-                nameable = (site.name, driver) in known or has_a_reason(model, site, driver)
-                candidates.append(Candidate(site, driver, nameable, variants))
+                candidates.append(Candidate(site, driver, nameable(model, site, driver), variants))
     return candidates
 
 
@@ -86,6 +84,13 @@ def _makes_sense(site: Site, driver: str) -> bool:
     if driver == "saturation":  # a sensor at its limit shows in the data screening
         return site.role == "actuator" and site.passed == 1
     return True
+
+
+def nameable(model: Model, site: Site, driver: str) -> bool:
+    """Whether a pair may be named: a table of the model lists it, or it needs no table."""
+    return any((k.site, k.driver) == (site.name, driver) for k in model.known_effects) or has_a_reason(
+        model, site, driver
+    )
 
 
 def has_a_reason(model: Model, site: Site, driver: str) -> bool:

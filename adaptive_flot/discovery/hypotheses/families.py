@@ -280,7 +280,12 @@ def _amount(model: Model, site: Site, seen: Mapping[str, FloatArray]) -> Hypothe
     others = [s for s in model.sites if s.unit == site.unit and s.role != "sensor"]
     sizes = [float(np.median(np.abs(seen[s.name]))) for s in others if np.isfinite(seen[s.name]).all()]
     size = max(sizes, default=0.0)
-    return replace(_offset(site, size), limits={}) if size > 0 else None
+    return constant_amount(site, size) if size > 0 else None
+
+
+def constant_amount(site: Site, size: float) -> Hypothesis:
+    """A constant amount of any size that is added at a site; `size` is an ordinary one."""
+    return replace(_offset(site, size), limits={})
 
 
 def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import one_thread, parallel_map
+from adaptive_flot.discovery.hypotheses.balances import unless_on_a_balance
 from adaptive_flot.discovery.hypotheses.calibration import Calibration, calibrate, excluded_by
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, blocks_of
 from adaptive_flot.discovery.hypotheses.cross_validation import (
@@ -167,6 +168,10 @@ def compare(
     excluded = bool(references) and excluded_by(calibration, null.fit)
     judged, blocks = judge(rows, null, tested, usual, excluded)
     judged = judged if excluded else unless_at_noise(judged, rows, null)
+    if usual is not None and complete:
+        progress("compare with amounts on balances")
+        judged = unless_on_a_balance(calibration, rows, blocks, null, judged, usual, base.fit, processes, ends)
+        complete = time.monotonic() <= ends
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
     told = judged.word in ("named", "class") and judged.best is not None
     if excluded and not told:

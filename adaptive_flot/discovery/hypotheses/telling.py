@@ -8,6 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
+from adaptive_flot.discovery.hypotheses.balances import NO_SITE
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
@@ -176,14 +177,17 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
     if judged.word == "insufficient":
         return f"The records do not say enough: {judged.why}."
     if judged.word == "abstain":
+        differs = "differs from the reference" if reference else "is missing"
         near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis) or "nothing"
+        if NO_SITE in judged.why:
+            return f"Something {differs}: {judged.why}. Nearest at a site: {near}."
         most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
         if reference and most <= FAR_ABOVE:
             larger = f"up to {most:.2g} times those of the reference"
             size = larger if most > JUST_ABOVE else "no larger than those of the reference, but unlike them"
             first = f"Errors are {size}, and the records do not say why"
             return f"{first}: {judged.why}. What wanders in the process may do that. Nearest: {near}."
-        return f"Something {changed}, but the records do not say what: {judged.why}. Nearest: {near}."
+        return f"Something {differs}, but the records do not say what: {judged.why}. Nearest: {near}."
     said = [_part_in_words(model, judged, t) for t in judged.parts]
     first = f"{said[0][0].upper()}{said[0][1:]}." if judged.word == "named" else _one_of(said)
     helped = ", ".join(c.words for c in error)

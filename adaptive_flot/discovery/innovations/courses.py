@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from adaptive_flot.discovery.candidates.catalogue import nameable
 from adaptive_flot.discovery.candidates.dynamics import dragged
 from adaptive_flot.discovery.candidates.turns import has_sign, turns, turns_with
 from adaptive_flot.discovery.hypotheses.families import (
@@ -135,7 +136,7 @@ def _at_site(
     if site.role in ("process", "flow", "feed"):
         by = v if site.mode == "factor" else np.ones_like(v)
         for driver, d in drivers.items():
-            if driver in _known_at(model, site):
+            if driver in _known_at(model) and nameable(model, site, driver):
                 yield from _depends(site, driver, d, by)
                 if has_sign(model, driver) and turns(d) and (site.mode == "offset" or turns_with(v, d)):
                     yield _turns(site, driver, d)
@@ -227,7 +228,7 @@ def _constant(site: Site, v: FloatArray, spread: float) -> Iterator[Suspect]:
         yield Suspect(Hypothesis(site.name, "constant", "gain", effect, free, ({},)), v[:, None], free)
 
 
-def _known_at(model: Model, site: Site) -> set[str]:
+def _known_at(model: Model) -> set[str]:
     names = model.drivers or (*model.names("inputs"), *model.names("states"))
     return {n for n in names if "." not in n}
 

@@ -92,7 +92,8 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
         failed = _at_steps_of_an_input(search, best) or _overlapping(base, best, without)
         failed = failed or _contradicted(search, best, without)
         if not failed:
-            return _unless_given_up(_told(search, base, found, without), given_up, everything)
+            told = _told(search, base, found, without)
+            return _unless_given_up(search, base, told, given_up, everything)
         given_up.append(failed[0])
         if len(best.hypotheses) == 1:
             break
@@ -113,16 +114,26 @@ def _without_each(search: Search, explanation: Explanation) -> dict[str, Explana
     return {h.label: e for h, e in zip(effects, left, strict=True)}
 
 
-def _unless_given_up(told: Told, given_up: Sequence[Hypothesis], found: Sequence[Explanation]) -> Told:
-    """What is told, unless it is an event, and one that was given up beside another effect explains more alone.
+def _unless_given_up(
+    search: Search, base: Explanation, told: Told, given_up: Sequence[Hypothesis], found: Sequence[Explanation]
+) -> Told:
+    """What is told, unless the record tells it from something better that has been given up.
 
-    A leak that opens was given up beside a dependence that takes a part of it, and an event elsewhere named for both.
+    What is given up beside another effect leaves that one. Where an effect is told that none of the explanations had
+    that came first, it stands in for them. So does an event, where another one, given up, explains more alone: a leak
+    that opens was given up beside a dependence that takes a part of it, and an event elsewhere named for both.
     """
+    if told.word == "abstain" or not given_up:
+        return told
+    first = _alike(search, base, found)
+    if not all(any(_has(e, h) for e in first) for h in told.effects) and told_apart(search, base, first[0], told.best):
+        why = f"{' with '.join(h.label for h in first[0].hypotheses)} explains more, and is not certain"
+        return replace(told, word="abstain", certain=(), open=(), why=why)
     events = {_name(h) for h in given_up if h.kind in EVENTS}
     alone = [e for e in found if len(e.hypotheses) == 1 and _name(e.hypotheses[0]) in events]
     better = max(alone, key=lambda e: e.criterion, default=told.best)
     is_event = bool(told.effects) and all(h.kind in EVENTS for h in told.effects)
-    if told.word == "abstain" or not is_event or better.criterion < told.best.criterion + LEAST_GAIN:
+    if not is_event or better.criterion < told.best.criterion + LEAST_GAIN:
         return told
     why = f"{better.hypotheses[0].label} explains more, and is not certain"
     return replace(told, word="abstain", certain=(), open=(), why=why)
@@ -151,10 +162,12 @@ def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hyp
 def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Explanation]) -> tuple[Hypothesis, ...]:
     """An event beside another effect that explains much of the same: it draws what is left of a wrong model.
 
-    Nothing else draws an event that is there. So without it most of the gain is lost (OWN).
+    Nothing else draws an event that is there. So without it most of the gain is lost (OWN). Not so beside a constant
+    error at its site: that and the event are the level before and after.
     """
     total = best.criterion - base.criterion
-    beside = best.hypotheses if len(best.hypotheses) > 1 else ()
+    levels = {h.site for h in best.hypotheses if h.driver == "constant"}
+    beside = [h for h in best.hypotheses if h.site not in levels] if len(best.hypotheses) > 1 else []
     return tuple(
         h for h in beside if h.kind in EVENTS and best.criterion - without[h.label].criterion < OWN * total
     )  # fmt: skip

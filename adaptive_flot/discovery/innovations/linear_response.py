@@ -206,5 +206,22 @@ def _gains(filtered: Filtered, H: FloatArray, r: FloatArray, there: BoolArray) -
     gone = ~there
     both = gone[:, :, None] | gone[:, None, :]
     alone = np.where(both, np.eye(len(r)) * variances[:, :, None], S)
-    gain = np.linalg.solve(alone, np.where(gone[:, None, :], 0.0, spread).transpose(0, 2, 1)).transpose(0, 2, 1)
-    return gain, variances
+    right = np.where(gone[:, None, :], 0.0, spread).transpose(0, 2, 1)
+    return _solved(alone, right).transpose(0, 2, 1), variances
+
+
+def _solved(A: FloatArray, right: FloatArray) -> FloatArray:
+    """Solutions of systems (N, m, m) with right sides (N, m, n); NaN of a system that has none.
+
+    A trial far off may have a factor of e^20 at a sensor: its outputs are then one and the same to the last digit.
+    """
+    try:
+        return np.asarray(np.linalg.solve(A, right), dtype=float)
+    except np.linalg.LinAlgError:
+        rank = np.zeros(len(A), dtype=int)
+        finite = np.isfinite(A).all(axis=(1, 2))
+        rank[finite] = np.linalg.matrix_rank(A[finite], hermitian=True)
+        found = np.full_like(right, np.nan)
+        regular = rank == A.shape[1]
+        found[regular] = np.linalg.solve(A[regular], right[regular])
+        return found

@@ -38,6 +38,7 @@ from adaptive_flot.discovery.since_reference.searched_change import with_searche
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
     leaves_more,
+    sites_told,
     taken_back,
     unless_contradicted,
     unless_more_than_noise,
@@ -138,7 +139,7 @@ def _row_by_row(
         if search.time_is_up:
             return None
         if on_sites is not told:
-            told, compared = on_sites, _with_words_of_a_balance(compared, on_sites.why)
+            told, compared = on_sites, _with_words_of_a_balance(compared, told, on_sites.why)
         with_it = compared
         if _has_event(told):
             with_it = with_event(compared, search, told)
@@ -165,15 +166,19 @@ def _is_structure(told: Told) -> bool:
     return bool(told.effects) and all(h.kind in STRUCTURE for h in told.effects)
 
 
-def _with_words_of_a_balance(compared: Comparison, why: str) -> Comparison:
-    """The comparison with what acts on the balance of a state: first where nothing else is told, else as a note."""
+def _with_words_of_a_balance(compared: Comparison, vetoed: Told, why: str) -> Comparison:
+    """The comparison with what acts on the balance of a state: a note where another part is told, else first.
+
+    What free runs tell at a site of what is `vetoed` with process noise is taken back.
+    """
     verdict = compared.verdict
-    if verdict.word == "abstain":
-        alone = f"By single faults of the whole record: {verdict.reason}"
-        changed = replace(verdict, reason=f"Something has changed: {why}.", notes=(*verdict.notes, alone))
-    else:
-        changed = replace(verdict, notes=(*verdict.notes, f"With process noise {why}."))
-    return replace(compared, verdict=changed)
+    elsewhere = sites_told(verdict) - {h.site for h in vetoed.effects}
+    if elsewhere or verdict.word not in ("abstain", *TOLD):
+        return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, f"With process noise {why}.")))
+    alone = f"By single faults of the whole record: {verdict.reason}"
+    compared = taken_back(compared, why)
+    reason = f"Something differs from the reference: {why}."
+    return replace(compared, verdict=replace(compared.verdict, reason=reason, notes=(*verdict.notes, alone)))
 
 
 def unless_an_event(

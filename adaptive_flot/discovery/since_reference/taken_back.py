@@ -63,14 +63,15 @@ def unless_much_is_left(compared: Comparison) -> Comparison:
     """The comparison, its name or class taken back where it stays far above the errors of the reference.
 
     A name by the output of which it leaves the most: another part may explain that, too. A class, which says less, by
-    the geometric mean of after / usual over the outputs.
+    the geometric mean of after / usual over the outputs; but no output may be twice as far above as one of a name.
     """
     verdict = compared.verdict
     left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
     if verdict.word not in ("named", "class") or not left:
         return compared
     logs = np.log(list(left.values()))
-    if float(np.max(logs) if verdict.word == "named" else np.mean(logs)) <= np.log(MUCH_LEFT):
+    most_of_all = float(np.max(logs)) - (np.log(2.0) if verdict.word == "class" else 0.0)
+    if max(most_of_all, float(np.mean(logs))) <= np.log(MUCH_LEFT):
         return compared
     most = max(left, key=lambda name: left[name])
     why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
@@ -101,12 +102,14 @@ def _noise_where_right(compared: Comparison) -> dict[str, float]:
     return {calibration.model.outputs[c].name: float(s) for c, s in zip(columns, level, strict=True)}
 
 
-def taken_back(compared: Comparison, why: str, changed: str = "has changed", said: str = "") -> Comparison:
+def taken_back(
+    compared: Comparison, why: str, differs: str = "differs from the reference", said: str = ""
+) -> Comparison:
     """The comparison without its name, and why."""
     word: Literal["abstain"] = "abstain"
     verdict = compared.verdict
     nearest = verdict.reason[:1].lower() + verdict.reason[1:]
-    said = said or f"Something {changed}, and it is not told what"
+    said = said or f"Something {differs}, and it is not told what"
     reason = f"{said}: {why}. The nearest: {nearest}"
     return replace(
         compared,

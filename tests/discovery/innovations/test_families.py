@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
+from adaptive_flot.discovery.innovations.courses import suspects
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
 from tests.discovery.innovations.thermostat import BAND, LAMP, PERIOD, SWING, ZONE, Wrong, model, record
 
 
@@ -65,3 +67,28 @@ def test_a_constant_heat_where_the_model_has_none_is_told_with_its_size() -> Non
 
 def test_nothing_is_told_of_a_plate_that_does_as_it_is_told() -> None:
     assert _told("nothing")[0].word == "none"
+
+
+def test_a_feed_and_an_instrument_are_not_tried_to_depend_on_what_they_have_no_reason_for() -> None:
+    """A reaction of second order was told as a feed that depends on the concentration in the reactor."""
+
+    def equations(m: Scope) -> None:
+        salt = m.state("salt")
+        feed = m.site("feed", m.input("feed"), "feed")
+        rate = m.site("rate", m.parameter("rate"), "process")
+        m.derivative("salt", (feed - salt) / 100.0 - rate * salt)
+        m.output("probe", m.site("probe", salt, "sensor"))
+
+    reactor = Model(
+        name="reactor",
+        states=(Quantity("salt", "g/L", ""),),
+        inputs=(Quantity("feed", "g/L", ""), Quantity("room", "degC", "")),
+        parameters=(Parameter("rate", 0.01, "1/s", ""),),
+        outputs=(Quantity("probe", "g/L", ""),),
+        equations=equations,
+        max_step_s=10.0,
+    )
+    seen = np.linspace(1.0, 2.0, 50)
+    found = suspects(reactor, dict.fromkeys(("feed", "rate", "probe"), seen), {"salt": seen, "room": seen}, 10.0)
+    depend = {(s.hypothesis.site, s.hypothesis.driver) for s in found if s.hypothesis.kind == "depends"}
+    assert depend == {("rate", "salt"), ("rate", "room")}

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.innovations import linear_response
 from adaptive_flot.discovery.innovations.linear_response import ResponseFunctions
 from adaptive_flot.discovery.innovations.noise_fit import search_noise
 from adaptive_flot.greybox.effects import Effect
@@ -47,6 +48,14 @@ def test_constants_move_the_innovations_as_the_derivatives_say() -> None:
     moved = (after.predicted - before.predicted)[1:, 0] / np.sqrt(before.variance[1:, 0]) / step
     response = ResponseFunctions(plain, DT, [0], (), ["conductance"]).at(data, NOISE, plain.parameter_values, START)
     np.testing.assert_allclose(response.by_constants[:, 0], moved, atol=0.03 * np.abs(moved).max())
+
+
+def test_a_system_without_a_solution_is_nan_and_spoils_no_other() -> None:
+    """A trial with a factor of e^20 at a sensor: two outputs are the same to the last digit. It ended the program."""
+    systems = np.array([[[2.0, 0.0], [0.0, 4.0]], [[1e18, 1e18], [1e18, 1e18]], [[np.nan, 0.0], [0.0, 1.0]]])
+    found = linear_response._solved(systems, np.ones((3, 2, 1)))
+    np.testing.assert_allclose(found[0, :, 0], [0.5, 0.25])
+    assert np.isnan(found[1:]).all()
 
 
 def test_the_noise_search_finds_the_minimum_of_a_known_cost() -> None:

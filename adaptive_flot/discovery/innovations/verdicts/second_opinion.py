@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.candidates.catalogue import nameable
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.hypotheses.families import EVENTS
@@ -233,10 +234,10 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
 
 def _judgement(state: State, told: Told, best: Alternative) -> Judgement:
     """The word for what is told: as in free runs, a dependence that its site has no reason for has no name."""
-    _, result = state.searched
-    nameless = {n for a in result.alternatives for n, known in zip(a.names, a.known, strict=True) if not known}
+    sites = {site.name: site for site in state.model.sites}
+    nameless = any(not nameable(state.model, sites[site], driver) for site, driver in best.names)
     members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
-    word: Word = "class" if told.word != "named" else "unnamed" if nameless & set(best.names) else "named"
+    word: Word = "class" if told.word != "named" else "unnamed" if nameless else "named"
     return Judgement(word, best, members, (), 0.0)
 
 

@@ -5,13 +5,19 @@ A basin through which water with a measured concentration flows. The records are
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.hypotheses import procedure
+from adaptive_flot.discovery.hypotheses.balances import with_balances
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
+from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance, with_balances
+from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance
+from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
@@ -45,13 +51,13 @@ def basin() -> Model:
     )
 
 
-def record(seed: int, *, fresh: float = 0.0, probe: float = 1.0) -> Dataset:
+def record(seed: int, *, fresh: float = 0.0, probe: float = 1.0, on: slice = ON) -> Dataset:
     """Salt that is taken out by unmeasured fresh water [g/s], or a probe that shows a share of what is there."""
     rng = np.random.default_rng(seed)
     flow = np.repeat(rng.uniform(8.0, 16.0, ROWS // 20), 20)
     feed = np.repeat(rng.uniform(2.0, 4.0, ROWS // 30), 30)
     taken, shows = np.zeros(ROWS), np.ones(ROWS)
-    taken[ON], shows[ON] = fresh, probe
+    taken[on], shows[on] = fresh, probe
     salt, seen = 3.0, np.zeros(ROWS)
     for k in range(ROWS):
         seen[k] = shows[k] * salt + NOISE * rng.normal()
@@ -101,3 +107,36 @@ def test_a_model_with_balances_is_the_same_model() -> None:
     x0 = np.array([3.0])
     one, two = (RecordSimulator(m, DT).outputs(data, x0, plain.parameter_values) for m in (plain, balanced))
     np.testing.assert_allclose(one, two, rtol=1e-12)
+
+
+ALWAYS = slice(None)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_since_a_reference_fresh_water_is_no_probe_though_it_runs_all_the_time(seed: int) -> None:
+    """3 g/s of 1500 L. Before, the probe was told, 0.25 g/L too low: by free runs, or by process noise."""
+    new, old = record(10 + seed, fresh=3.0, on=ALWAYS), record(seed)
+    found = find_changes(basin(), [new], [old]).verdict
+    assert found.word == "abstain" and not found.effects and not found.members
+    said = re.match(
+        r"Something differs from .*: something takes (\S+) g/L/s from the balance of salt, and", found.reason
+    )
+    assert said is not None, found.reason
+    assert float(said[1]) == pytest.approx(3.0 / VOLUME, rel=0.1)
+
+
+def test_since_a_reference_a_probe_that_shows_less_all_the_time_is_one() -> None:
+    new, old = record(10, probe=0.85, on=ALWAYS), record(0)
+    found = find_changes(basin(), [new], [old]).verdict
+    assert found.word == "named" and found.effects[0].effect.site == "probe"
+
+
+def test_the_comparison_alone_tells_a_balance_from_the_sites(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And it does so by that rule alone."""
+    new, old = record(10, fresh=6.0, on=ALWAYS), record(0)
+    found = compare(basin(), [new], [old]).verdict
+    assert (
+        found.word == "abstain" and "takes 0.004" in found.reason and "Nearest at a site: probe offset" in found.reason
+    )
+    monkeypatch.setattr(procedure, "unless_on_a_balance", lambda c, rows, blocks, null, judged, *_: judged)
+    assert compare(basin(), [new], [old]).verdict.word == "named"

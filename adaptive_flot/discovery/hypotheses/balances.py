@@ -1,0 +1,145 @@
+"""What acts on the balance of a state all the time, where the model has no site: a leak, a load that nobody counts.
+
+A tank with a leak and a model without one: a pump that gives less comes nearest, and would get the name. So before a
+part gets one, a constant amount of its own is put into the balance of each state in turn. Where one of these explains
+the new records surely better than all that would be told, the model has no place for what has changed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adaptive_flot.discovery.fitting.parallel import parallel_map
+from adaptive_flot.discovery.hypotheses.calibration import Calibration
+from adaptive_flot.discovery.hypotheses.comparison import Blocks, stands, tied
+from adaptive_flot.discovery.hypotheses.cross_validation import (
+    REFRESH,
+    Tested,
+    fit_all_rows,
+    refined,
+    test_on_stretches,
+)
+from adaptive_flot.discovery.hypotheses.families import Hypothesis, constant_amount
+from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
+from adaptive_flot.discovery.hypotheses.joint.rows import Rows
+from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss
+from adaptive_flot.discovery.hypotheses.seen import seen_values
+from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.scope import Scope
+
+BALANCE = "balance of "
+NO_SITE = "the model has no site for that"
+
+
+@dataclass(frozen=True)
+class _WithBalances:
+    """The equations of a model, with a site at the derivative of each of some states."""
+
+    equations: Callable[[Scope], None]
+    states: tuple[str, ...]
+
+    def __call__(self, m: Scope) -> None:
+        self.equations(m)
+        for name in self.states:
+            m.derivatives[name] = m.site(BALANCE + name, m.derivatives[name], "process", "offset")
+
+
+def with_balances(model: Model) -> Model:
+    """The model with a site, to which an amount may be added, at the derivative of each state of its own."""
+    states = tuple(s.name for s in model.states if "." not in s.name)  # those of effects have the effect's name first
+    return replace(model, equations=_WithBalances(model.equations, states))
+
+
+def amount_in_words(model: Model, site: str, amount: float, when: str, measured: bool) -> str:
+    """``something takes 0.3 m/s from the balance of level (120-340 s), and the model has no site for that``.
+
+    Parameters
+    ----------
+    model
+        The model, for the unit of the state.
+    site
+        Name of the balance's site.
+    amount
+        What is added, in the unit of the state by second.
+    when
+        The times in words; empty for the whole record.
+    measured
+        Whether the constants are known by which a rate is measured; else no rate is said.
+    """
+    name = site.removeprefix(BALANCE)
+    unit = model.states[model.index("states", name)].unit
+    rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""
+    does, where = ("adds", "to") if amount > 0 else ("takes", "from")
+    at = f" ({when})" if when else ""
+    words = name.replace("_", " ")
+    return f"something {does}{rate} {where} the balance of {words}{at}, and {NO_SITE}"
+
+
+def unless_on_a_balance(
+    calibration: Calibration,
+    rows: Rows,
+    blocks: Blocks,
+    null: Tested,
+    judged: Judged,
+    usual: UsualLoss,
+    base: JointFit,
+    processes: int = 1,
+    ends: float = float("inf"),
+) -> Judged:
+    """What is told since a reference; nothing where an amount on the balance of a state surely explains more.
+
+    Parameters
+    ----------
+    calibration
+        Constants and the model, from the reference.
+    rows, blocks
+        The new records, and the blocks that they are judged on.
+    null
+        The model as it is.
+    judged
+        What would be told.
+    usual
+        What the model costs on its reference.
+    base
+        Fit of the model as it is to the new records.
+    processes
+        Fits that run at once.
+    ends
+        Time of `time.monotonic` after which nothing more is fitted.
+    """
+    if judged.word not in ("named", "class") or judged.best is None:
+        return judged
+    model, constants = with_balances(calibration.model), calibration.constants
+
+    def tested(h: Hypothesis) -> Tested | None:
+        if time.monotonic() > ends:
+            return None
+        with np.errstate(all="ignore"):
+            fitted = fit_all_rows(model, rows, h, constants, base, refresh=REFRESH)
+            if fitted is None:
+                return None
+            return test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
+
+    found = parallel_map(tested, _amounts(model, base, rows), processes, lambda: None)
+    rivals = [t for t in found if t is not None and stands(rows, blocks, null, t, usual.errors)]
+    best = min(rivals, key=lambda t: t.total, default=None)
+    if best is None or best.hypothesis is None or best.total >= judged.best.total:
+        return judged
+    adequate = usual.exceeded(best, rows.count, len(blocks.edges)) is None
+    told = [judged.best, *judged.alike]
+    if tied(blocks, null, best, told, adequate):
+        return judged
+    amount = best.fit.value(best.hypothesis.effect.parameter("amplitude"))
+    why = amount_in_words(model, best.hypothesis.site, amount, "", not constants.up_to_a_factor())
+    return replace(judged, word="abstain", why=why)
+
+
+def _amounts(model: Model, base: JointFit, rows: Rows) -> Sequence[Hypothesis]:
+    seen, _ = seen_values(model, base, rows.records)
+    sites = (s for s in model.sites if s.name.startswith(BALANCE))
+    sizes = ((site, float(np.ptp(np.quantile(seen[site.name], (0.05, 0.95))))) for site in sites)
+    return [constant_amount(site, size) for site, size in sizes if size > 0]
