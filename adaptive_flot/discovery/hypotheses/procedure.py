@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import one_thread, parallel_map
-from adaptive_flot.discovery.hypotheses.balances import unless_on_a_balance
 from adaptive_flot.discovery.hypotheses.calibration import Calibration, calibrate, excluded_by
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, blocks_of
 from adaptive_flot.discovery.hypotheses.cross_validation import (
@@ -30,6 +29,7 @@ from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judg
 from adaptive_flot.discovery.hypotheses.plausible import moves_though_stopped
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.discovery.hypotheses.telling import unless_at_noise, verdict_of
+from adaptive_flot.discovery.hypotheses.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -169,8 +169,8 @@ def compare(
     judged, blocks = judge(rows, null, tested, usual, excluded)
     judged = judged if excluded else unless_at_noise(judged, rows, null)
     if usual is not None and complete:
-        progress("compare with amounts on balances")
-        judged = unless_on_a_balance(calibration, rows, blocks, null, judged, usual, base.fit, processes, ends)
+        progress("compare with what has no site")
+        judged = unless_without_a_site(calibration, rows, blocks, null, judged, usual, base.fit, processes, ends)
         complete = time.monotonic() <= ends
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
     told = judged.word in ("named", "class") and judged.best is not None

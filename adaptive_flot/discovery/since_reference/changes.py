@@ -27,11 +27,11 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short_since_reference
-from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
+from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
@@ -135,7 +135,7 @@ def _row_by_row(
             return None
         search, base, told, sole, before = known
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
-        on_sites = unless_on_a_balance(search, base, told)
+        on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return None
         if on_sites is not told:

@@ -6,7 +6,7 @@ stretches.py       Errors on held-out stretches, each predicted from the state o
 rivals.py          What the free run has, which a name of the innovations form must beat.
 alternatives.py    What is told beside what the free run has and does not tell, both in innovations form.
 common.py          One effect that every explanation has, alone where the rest stays open.
-balances.py        An event at a site, beside one on the balance of a state, which no site stands for.
+without_a_site.py  What is told at a site, beside what acts where the model has none.
 reach.py           Outputs that effects can change at all.
 members.py         Members of a class as alternatives of a free run.
 second_opinion.py  The stage of `discover` that asks, where the free run leaves too much.

@@ -22,7 +22,6 @@ from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives, beside_alternatives
-from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance
 from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near, one_that_all_have
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
@@ -45,6 +44,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     unless_it_wanders,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
+from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
@@ -89,7 +89,7 @@ def second_opinion(state: State) -> State:
             return _not_asked(state)
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
         told = _by_the_rules(state, search, base, told)
-        on_sites = unless_on_a_balance(search, base, told)
+        on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return _not_asked(state)
     if on_sites is not told:
@@ -100,7 +100,7 @@ def second_opinion(state: State) -> State:
     with np.errstate(all="ignore"):
         among = among_alternatives(state, search, base, found)
         if among is not None:  # what a balance explains better is not told by this way either
-            among = unless_on_a_balance(search, base, _by_the_rules(state, search, base, among))
+            among = unless_without_a_site(search, base, _by_the_rules(state, search, base, among))
     if among is None or among.word not in TELLS:
         return asked
     return _told(state, search, base, among, among=True)

@@ -1,8 +1,9 @@
-"""What acts on the balance of a state all the time, where the model has no site: a leak, a load that nobody counts.
+"""What acts where the model has no site: on the balance of a state, or on what an input says.
 
-A tank with a leak and a model without one: a pump that gives less comes nearest, and would get the name. So before a
-part gets one, a constant amount of its own is put into the balance of each state in turn. Where one of these explains
-the new records surely better than all that would be told, the model has no place for what has changed.
+A tank with a leak and a model without one: a pump that gives less comes nearest, and would get the name. Cooling water
+that is warmer than its thermometer says is told as less water. So before a part gets a name, a constant amount of its
+own is put into the balance of each state in turn, and added to each input. Where one of these explains the new records
+surely better than all that would be told, the model has no place for what has changed.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
@@ -29,29 +31,48 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.scope import Scope
+from adaptive_flot.greybox.scope import Scope, Site
 
-BALANCE = "balance of "
+BALANCE, READING = "balance of ", "reading of "
+"""How the names of the further sites begin."""
 NO_SITE = "the model has no site for that"
 
 
+class _Read(Scope):
+    """A scope whose inputs pass a site each, where they are asked for first; all else is that of the scope given."""
+
+    def __init__(self, scope: Scope) -> None:
+        self.__dict__ = scope.__dict__
+        self._read: dict[str, ca.SX] = {}
+
+    def input(self, name: str) -> ca.SX:
+        if name not in self._read:
+            self._read[name] = self.site(READING + name, super().input(name), "actuator", "offset")
+        return self._read[name]
+
+
 @dataclass(frozen=True)
-class _WithBalances:
-    """The equations of a model, with a site at the derivative of each of some states."""
+class _WithFurtherSites:
+    """The equations of a model, with a site at each input and at the derivative of each of some states."""
 
     equations: Callable[[Scope], None]
     states: tuple[str, ...]
 
     def __call__(self, m: Scope) -> None:
-        self.equations(m)
+        self.equations(_Read(m))
         for name in self.states:
             m.derivatives[name] = m.site(BALANCE + name, m.derivatives[name], "process", "offset")
 
 
-def with_balances(model: Model) -> Model:
-    """The model with a site, to which an amount may be added, at the derivative of each state of its own."""
+def with_further_sites(model: Model) -> Model:
+    """The model with sites where it has none: at the derivative of each state of its own, and at each input."""
     states = tuple(s.name for s in model.states if "." not in s.name)  # those of effects have the effect's name first
-    return replace(model, equations=_WithBalances(model.equations, states))
+    return replace(model, equations=_WithFurtherSites(model.equations, states))
+
+
+def further_sites(model: Model) -> tuple[Site, ...]:
+    """The further sites of such a model."""
+    return tuple(s for s in model.sites if s.name.startswith((BALANCE, READING)))
 
 
 def amount_in_words(model: Model, site: str, amount: float, when: str, measured: bool) -> str:
@@ -60,26 +81,31 @@ def amount_in_words(model: Model, site: str, amount: float, when: str, measured:
     Parameters
     ----------
     model
-        The model, for the unit of the state.
+        The model, for the unit.
     site
-        Name of the balance's site.
+        Name of the further site.
     amount
-        What is added, in the unit of the state by second.
+        What is added, at a balance in the unit of the state by second.
     when
         The times in words; empty for the whole record.
     measured
         Whether the constants are known by which a rate is measured; else no rate is said.
     """
+    at = f" ({when})" if when else ""
+    if site.startswith(READING):
+        name = site.removeprefix(READING)
+        unit = model.inputs[model.index("inputs", name)].unit
+        off = f"{abs(amount):.3g} {'' if unit == '-' else unit}".strip()
+        more = "more" if amount > 0 else "less"
+        return f"{name.replace('_', ' ')} is {off} {more} than the record says{at}, and {NO_SITE}"
     name = site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit
     rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""
     does, where = ("adds", "to") if amount > 0 else ("takes", "from")
-    at = f" ({when})" if when else ""
-    words = name.replace("_", " ")
-    return f"something {does}{rate} {where} the balance of {words}{at}, and {NO_SITE}"
+    return f"something {does}{rate} {where} the balance of {name.replace('_', ' ')}{at}, and {NO_SITE}"
 
 
-def unless_on_a_balance(
+def unless_without_a_site(
     calibration: Calibration,
     rows: Rows,
     blocks: Blocks,
@@ -90,7 +116,7 @@ def unless_on_a_balance(
     processes: int = 1,
     ends: float = float("inf"),
 ) -> Judged:
-    """What is told since a reference; nothing where an amount on the balance of a state surely explains more.
+    """What is told since a reference; nothing where what has no site surely explains more.
 
     Parameters
     ----------
@@ -113,7 +139,7 @@ def unless_on_a_balance(
     """
     if judged.word not in ("named", "class") or judged.best is None:
         return judged
-    model, constants = with_balances(calibration.model), calibration.constants
+    model, constants = with_further_sites(calibration.model), calibration.constants
 
     def tested(h: Hypothesis) -> Tested | None:
         if time.monotonic() > ends:
@@ -140,6 +166,5 @@ def unless_on_a_balance(
 
 def _amounts(model: Model, base: JointFit, rows: Rows) -> Sequence[Hypothesis]:
     seen, _ = seen_values(model, base, rows.records)
-    sites = (s for s in model.sites if s.name.startswith(BALANCE))
-    sizes = ((site, float(np.ptp(np.quantile(seen[site.name], (0.05, 0.95))))) for site in sites)
+    sizes = ((s, float(np.ptp(np.quantile(seen[s.name], (0.05, 0.95))))) for s in further_sites(model))
     return [constant_amount(site, size) for site, size in sizes if size > 0]

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses import procedure
-from adaptive_flot.discovery.hypotheses.balances import with_balances
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import compare
+from adaptive_flot.discovery.hypotheses.without_a_site import with_further_sites
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.verdicts.balances import unless_on_a_balance
+from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -79,7 +79,7 @@ def judged(data: Dataset) -> tuple[Search, Explanation, Told]:
 def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
     search, base, told = judged(record(seed, fresh=6.0))
     assert any(h.kind == "switch" for h in told.effects), "without the rule an event at a site is told"
-    kept = unless_on_a_balance(search, base, told)
+    kept = unless_without_a_site(search, base, told)
     assert kept.word == "abstain" and not kept.effects
     assert kept.why.startswith("something takes from the balance of salt (")
     begins, ends = (float(t) for t in kept.why.split("(")[1].split(" s)")[0].split("-"))
@@ -90,19 +90,19 @@ def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
 def test_a_probe_that_shows_less_stays_one(seed: int) -> None:
     search, base, told = judged(record(seed, probe=0.85))
     assert [h.site for h in told.effects] == ["probe"]
-    assert unless_on_a_balance(search, base, told) is told
+    assert unless_without_a_site(search, base, told) is told
 
 
 def test_what_is_no_event_is_not_asked() -> None:
     search, base, told = judged(record(3))
     assert not any(h.kind == "switch" for h in told.effects)
-    assert unless_on_a_balance(search, base, told) is told
+    assert unless_without_a_site(search, base, told) is told
 
 
-def test_a_model_with_balances_is_the_same_model() -> None:
+def test_a_model_with_further_sites_is_the_same_model() -> None:
     """Reduction: with nothing added it gives the same run."""
     data, plain = record(4), basin()
-    balanced = with_balances(plain)
+    balanced = with_further_sites(plain)
     assert [s.name for s in balanced.sites][-1] == "balance of salt"
     x0 = np.array([3.0])
     one, two = (RecordSimulator(m, DT).outputs(data, x0, plain.parameter_values) for m in (plain, balanced))
@@ -138,5 +138,5 @@ def test_the_comparison_alone_tells_a_balance_from_the_sites(monkeypatch: pytest
     assert (
         found.word == "abstain" and "takes 0.004" in found.reason and "Nearest at a site: probe offset" in found.reason
     )
-    monkeypatch.setattr(procedure, "unless_on_a_balance", lambda c, rows, blocks, null, judged, *_: judged)
+    monkeypatch.setattr(procedure, "unless_without_a_site", lambda c, rows, blocks, null, judged, *_: judged)
     assert compare(basin(), [new], [old]).verdict.word == "named"

@@ -1,10 +1,10 @@
-"""What is told at a site, beside what acts on the balance of a state and that no site of the model stands for.
+"""What is told at a site, beside what acts where the model has none: on the balance of a state, on an input.
 
 A probe that shows 15 % less for an hour, and fresh water that nobody measures, look alike to a model that has a site
 for the first alone. Their edges differ: what a sensor shows changes at once, and a basin takes its time. So before an
-event is told, an amount of its own is put into the balance of each state in turn. Where one of these explains the
-record better, the model has no place for what has happened. Since a reference, a cause of the whole record is compared
-with a constant amount in the same way.
+event is told, an amount of its own is put into the balance of each state in turn, and added to each input. Where one of
+these explains the record better, the model has no place for what has happened. Since a reference, a cause of the whole
+record is compared with a constant amount in the same way.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.hypotheses.balances import BALANCE, amount_in_words, with_balances
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.without_a_site import amount_in_words, further_sites, with_further_sites
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -21,8 +21,8 @@ from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.greybox.scope import Site
 
 
-def unless_on_a_balance(search: Search, base: Explanation, told: Told) -> Told:
-    """What is told; nothing where the record tells it from a better explanation on the balance of a state.
+def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told:
+    """What is told; nothing where the record tells it from a better explanation without a site.
 
     An event always; a cause of the whole record where a reference says what the constants are. Without one, these make
     up for a constant amount.
@@ -39,19 +39,19 @@ def unless_on_a_balance(search: Search, base: Explanation, told: Told) -> Told:
     left_out = event if event is not None else cause
     if told.word not in ("named", "class") or left_out not in told.best.hypotheses:
         return told
-    balanced = replace(search, model=with_balances(search.model))
+    further = replace(search, model=with_further_sites(search.model))
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, left_out)
-    rivals = balanced.all_with(rest, _on_balances(balanced, rest, event))
+    rivals = further.all_with(rest, _without_a_site(further, rest, event))
     best = max(rivals, key=lambda e: e.criterion, default=None)
-    if best is None or not told_apart(balanced, base, best, told.best):
+    if best is None or not told_apart(further, base, best, told.best):
         return told
-    return replace(told, word="abstain", certain=(), open=(), why=_words(balanced, best))
+    return replace(told, word="abstain", certain=(), open=(), why=_words(further, best))
 
 
-def _on_balances(balanced: Search, rest: Explanation, event: Hypothesis | None) -> list[Screened]:
-    """An amount at the balance of each state: at the times of the event, and at its own; without one, all the time."""
-    sites = [s for s in balanced.model.sites if s.name.startswith(BALANCE)]
-    screening = balanced.screening(rest, [s.name for s in sites])
+def _without_a_site(further: Search, rest: Explanation, event: Hypothesis | None) -> list[Screened]:
+    """An amount at each balance and input: at the times of the event, and at its own; without one, all the time."""
+    sites = further_sites(further.model)
+    screening = further.screening(rest, [s.name for s in sites])
     return [s for site in sites for s in _at(screening, site, event)]
 
 
@@ -65,10 +65,10 @@ def _at(screening: Screening, site: Site, event: Hypothesis | None) -> Sequence[
     return [*screening.at_times_of(event, site), *([own] if own is not None else [])]
 
 
-def _words(balanced: Search, explanation: Explanation) -> str:
+def _words(further: Search, explanation: Explanation) -> str:
     """What acts where and when; how much, where the constants are known by which a rate is measured."""
-    h, model = explanation.hypotheses[-1], balanced.model_of(explanation)
+    h, model = explanation.hypotheses[-1], further.model_of(explanation)
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
     amount = model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value
-    measured = balanced.known is not None and not balanced.known.up_to_a_factor()
+    measured = further.known is not None and not further.known.up_to_a_factor()
     return amount_in_words(model, h.site, amount, when, measured)
