@@ -7,6 +7,7 @@ rivals.py          What the free run has, which a name of the innovations form m
 alternatives.py    What is told beside what the free run has and does not tell, both in innovations form.
 common.py          One effect that every explanation has, alone where the rest stays open.
 without_a_site.py  What is told at a site, beside what acts where the model has none.
+in_time.py         A dependence on what moves slowly, beside a change in time at the same site.
 reach.py           Outputs that effects can change at all.
 members.py         Members of a class as alternatives of a free run.
 second_opinion.py  The stage of `discover` that asks, where the free run leaves too much.

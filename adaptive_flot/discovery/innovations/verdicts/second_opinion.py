@@ -23,6 +23,7 @@ from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives, beside_alternatives
 from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near, one_that_all_have
+from adaptive_flot.discovery.innovations.verdicts.in_time import or_in_time
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
@@ -115,7 +116,7 @@ def _noted(state: State, why: str) -> State:
 def _by_the_rules(state: State, search: Search, base: Explanation, told: Told) -> Told:
     """What is told, without what stands in for something else more often than not (see `rivals`)."""
     told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
-    return unless_a_trend(base, unless_it_wanders(search, base, told))
+    return or_in_time(search, base, unless_a_trend(base, unless_it_wanders(search, base, told)))
 
 
 def is_asked(state: State) -> bool:
