@@ -105,7 +105,12 @@ def has_a_reason(model: Model, site: Site, driver: str) -> bool:
         return True
     if model.known_effects:
         return False
-    return site.role == "flow" or model.derived(_passed_on).get(site.name) == driver
+    return site.role == "flow" or passed_on(model).get(site.name) == driver
+
+
+def passed_on(model: Model) -> Mapping[str, str]:
+    """The input or state, by site, that the value there is a function of, where it is one of no other."""
+    return model.derived(_passed_on)
 
 
 def _passed_on(model: Model) -> dict[str, str]:

@@ -32,6 +32,15 @@ LARGEST_CLASS = 3
 
 
 @dataclass(frozen=True)
+class WithoutSite:
+    """What acts where the model has no site: the name of the place, what it depends on, and words."""
+
+    place: str
+    driver: str
+    words: str
+
+
+@dataclass(frozen=True)
 class UsualLoss:
     """What the model costs on its reference.
 
@@ -82,6 +91,8 @@ class Judged:
         What decided, in words, where the word is `none`, `abstain` or `insufficient`.
     explained
         Share of what is above the usual level that the best one removes; NaN where there is none.
+    beside
+        What explains about as much as a name where the model has no site; None where nothing does.
     """
 
     word: Word
@@ -89,6 +100,7 @@ class Judged:
     alike: tuple[Tested, ...]
     why: str
     explained: float
+    beside: WithoutSite | None = None
 
     @property
     def parts(self) -> tuple[Tested, ...]:

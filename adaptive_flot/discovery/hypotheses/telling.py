@@ -73,13 +73,15 @@ def verdict_of(
     )  # fmt: skip
     effects = _effects(model, judged) if told else ()
     members = tuple((t.hypothesis.site, t.hypothesis.driver) for t in judged.parts if t.hypothesis)
+    members += ((judged.beside.place, judged.beside.driver),) if told and judged.beside else ()
+    word = "class" if judged.word == "named" and judged.beside else judged.word
     fitted = model.indices("parameters", calibration.constants.names)
     labels = {model.parameters[i].label: model.parameters[i].value for i in fitted}
     return Verdict(
-        word=judged.word,
+        word=word,
         reason=_reason(model, judged, reference, error),
         effects=effects,
-        members=members if judged.word == "class" else (),
+        members=members if word == "class" else (),
         error=error,
         split=JUDGED_ON,
         parameters=labels,
@@ -180,7 +182,7 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
         differs = "differs from the reference" if reference else "is missing"
         near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis) or "nothing"
         if NO_SITE in judged.why:
-            return f"Something {differs}: {judged.why}. Nearest at a site: {near}."
+            return f"Something {differs}, {judged.why}. Nearest at a site: {near}."
         most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
         if reference and most <= FAR_ABOVE:
             larger = f"up to {most:.2g} times those of the reference"
@@ -189,7 +191,8 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
             return f"{first}: {judged.why}. What wanders in the process may do that. Nearest: {near}."
         return f"Something {differs}, but the records do not say what: {judged.why}. Nearest: {near}."
     said = [_part_in_words(model, judged, t) for t in judged.parts]
-    first = f"{said[0][0].upper()}{said[0][1:]}." if judged.word == "named" else _one_of(said)
+    said += [f"{judged.beside.words}, and {NO_SITE}"] if judged.beside else []
+    first = f"{said[0][0].upper()}{said[0][1:]}." if len(said) == 1 else _one_of(said)
     helped = ", ".join(c.words for c in error)
     return f"{first} Error on stretches that did not fit it: {helped}."
 

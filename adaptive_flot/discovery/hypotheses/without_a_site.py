@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.discovery.candidates.catalogue import passed_on
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, stands, tied
@@ -28,7 +29,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
 from adaptive_flot.discovery.hypotheses.families import Hypothesis, constant_amount
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
-from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss
+from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.scope import Scope, Site
@@ -36,6 +37,8 @@ from adaptive_flot.greybox.scope import Scope, Site
 BALANCE, READING = "balance of ", "reading of "
 """How the names of the further sites begin."""
 NO_SITE = "the model has no site for that"
+MOST_SAID = 3
+"""So many of what is not told apart are said."""
 
 
 class _Read(Scope):
@@ -76,7 +79,7 @@ def further_sites(model: Model) -> tuple[Site, ...]:
 
 
 def amount_in_words(model: Model, site: str, amount: float, when: str, measured: bool) -> str:
-    """``something takes 0.3 m/s from the balance of level (120-340 s), and the model has no site for that``.
+    """``something takes 0.3 m/s from the balance of level (120-340 s)``.
 
     Parameters
     ----------
@@ -96,13 +99,28 @@ def amount_in_words(model: Model, site: str, amount: float, when: str, measured:
         name = site.removeprefix(READING)
         unit = model.inputs[model.index("inputs", name)].unit
         off = f"{abs(amount):.3g} {'' if unit == '-' else unit}".strip()
-        more = "more" if amount > 0 else "less"
-        return f"{name.replace('_', ' ')} is {off} {more} than the record says{at}, and {NO_SITE}"
+        return f"{name.replace('_', ' ')} were {off} {'more' if amount > 0 else 'less'} than the record says{at}"
     name = site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit
     rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""
     does, where = ("adds", "to") if amount > 0 else ("takes", "from")
-    return f"something {does}{rate} {where} the balance of {name.replace('_', ' ')}{at}, and {NO_SITE}"
+    return f"something {does}{rate} {where} the balance of {name.replace('_', ' ')}{at}"
+
+
+def as_if(words: Sequence[str]) -> str:
+    """What is not told apart, in words: ``as if something ...; or as if ...: the model has no site for that``."""
+    return f"{'; or '.join(f'as if {w}' for w in words[:MOST_SAID])}: {NO_SITE}"
+
+
+def is_meant(model: Model, h: Hypothesis, place: str) -> bool:
+    """Whether a hypothesis says the same as an amount at a further site.
+
+    An amount at a site that stands for one, and an input that is asked of the actuator whose site it passes.
+    """
+    site = next(s for s in model.sites if s.name == h.site)
+    if place.startswith(READING):
+        return passed_on(model).get(site.name) == place.removeprefix(READING)
+    return site.mode == "offset" and site.role != "sensor" and (h.effect.mode or site.mode) == "offset"
 
 
 def unless_without_a_site(
@@ -116,7 +134,7 @@ def unless_without_a_site(
     processes: int = 1,
     ends: float = float("inf"),
 ) -> Judged:
-    """What is told since a reference; nothing where what has no site surely explains more.
+    """What is told since a reference; nothing where what has no site surely explains more, a class where as much.
 
     Parameters
     ----------
@@ -151,17 +169,28 @@ def unless_without_a_site(
             return test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
 
     found = parallel_map(tested, _amounts(model, base, rows), processes, lambda: None)
-    rivals = [t for t in found if t is not None and stands(rows, blocks, null, t, usual.errors)]
-    best = min(rivals, key=lambda t: t.total, default=None)
-    if best is None or best.hypothesis is None or best.total >= judged.best.total:
+    stand = (t for t in found if t is not None and stands(rows, blocks, null, t, usual.errors))
+    rivals = sorted(stand, key=lambda t: t.total)
+    if not rivals:
         return judged
-    adequate = usual.exceeded(best, rows.count, len(blocks.edges)) is None
-    told = [judged.best, *judged.alike]
-    if tied(blocks, null, best, told, adequate):
-        return judged
-    amount = best.fit.value(best.hypothesis.effect.parameter("amplitude"))
-    why = amount_in_words(model, best.hypothesis.site, amount, "", not constants.up_to_a_factor())
-    return replace(judged, word="abstain", why=why)
+
+    def words(t: Tested) -> WithoutSite:
+        assert t.hypothesis is not None  # each adds an amount
+        amount, place = t.fit.value(t.hypothesis.effect.parameter("amplitude")), t.hypothesis.site
+        said = amount_in_words(model, place, amount, "", not constants.up_to_a_factor())
+        return WithoutSite(place, "constant", said)
+
+    def alike(best: Tested, others: Sequence[Tested]) -> tuple[Tested, ...]:
+        return tied(blocks, null, best, others, usual.exceeded(best, rows.count, len(blocks.edges)) is None)
+
+    best, told = rivals[0], [judged.best, *judged.alike]
+    if best.total < judged.best.total and not alike(best, told):
+        near = (best, *alike(best, rivals[1:]))
+        return replace(judged, word="abstain", why=as_if([words(t).words for t in near]))
+    said = [t.hypothesis for t in told if t.hypothesis is not None]
+    others = [t for t in rivals if t.hypothesis and not any(is_meant(model, h, t.hypothesis.site) for h in said)]
+    near = alike(judged.best, others)
+    return replace(judged, beside=words(near[0])) if judged.word == "named" and near else judged
 
 
 def _amounts(model: Model, base: JointFit, rows: Rows) -> Sequence[Hypothesis]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.without_a_site import NO_SITE
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -14,6 +15,8 @@ def told_in_words(search: Search, told: Told) -> str:
     """What is certain, then what is one of a few."""
     sure = "; and ".join(words_at(search, told.best, h) for h in told.certain)
     said = f"{sure[0].upper()}{sure[1:]}." if sure else ""
+    if told.word == "named" and told.beside:
+        return f"One of these, which the record can not tell apart: {sure}; or {told.beside.words}, and {NO_SITE}."
     if told.word != "class":
         return said
     members = "; or ".join(_open_one(search, told, e, h) for e, h in told.open)

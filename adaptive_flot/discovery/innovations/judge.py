@@ -11,6 +11,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
@@ -51,6 +52,8 @@ class Told:
         Explanations that the record does not tell from the best one, this one first.
     why
         What decided, in words, where nothing is told.
+    beside
+        What explains about as much as a name where the model has no site; None where nothing does.
     """
 
     word: Word
@@ -59,6 +62,7 @@ class Told:
     open: tuple[tuple[Explanation, Hypothesis], ...]
     alike: tuple[Explanation, ...]
     why: str
+    beside: WithoutSite | None = None
 
     @property
     def effects(self) -> tuple[Hypothesis, ...]:

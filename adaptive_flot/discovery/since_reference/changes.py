@@ -174,10 +174,10 @@ def _with_words_of_a_balance(compared: Comparison, vetoed: Told, why: str) -> Co
     verdict = compared.verdict
     elsewhere = sites_told(verdict) - {h.site for h in vetoed.effects}
     if elsewhere or verdict.word not in ("abstain", *TOLD):
-        return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, f"With process noise {why}.")))
+        return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, f"With process noise it is {why}.")))
     alone = f"By single faults of the whole record: {verdict.reason}"
     compared = taken_back(compared, why)
-    reason = f"Something differs from the reference: {why}."
+    reason = f"Something differs from the reference, {why}."
     return replace(compared, verdict=replace(compared.verdict, reason=reason, notes=(*verdict.notes, alone)))
 
 

@@ -65,7 +65,7 @@ def with_cause(
     against = contradiction(Judgement(word, None, (), (), 0.0), error, np.array([c.noise for c in error]))
     if against or hardly_explained(error, ABOVE_USUAL, MOST):
         return compared
-    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))
+    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"), told.beside)
     calibration = replace(compared.calibration, model=search.model)
     verdict = verdict_of(
         calibration, compared.rows, compared.blocks, compared.null, judged, True, compared.verdict.seconds

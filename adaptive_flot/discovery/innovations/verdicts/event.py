@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.comparison import blocks_of, rms
+from adaptive_flot.discovery.hypotheses.comparison import blocks_of, rms, worse_outputs
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, model_with, test_on_stretches
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
@@ -26,7 +26,7 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
 
     Where no output's error without the event is above what is usual on the reference, there is nothing to explain.
     Where an output keeps more than half of what its squared error is above that, there is more than the event explains,
-    and its name would be a guess.
+    and its name would be a guess. So it is where the error of another output grows.
 
     Parameters
     ----------
@@ -51,10 +51,12 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     if not found or not np.nanmean(rms(rows, found[0].fresh) / rms(rows, null.fresh)) < 1:
         return compared
     word = "class" if told.word == "class" and len(found) > 1 else "named"
-    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"))  # type: ignore[arg-type]
+    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"), told.beside)  # type: ignore[arg-type]
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, compared.verdict.seconds)
     if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or hardly_explained(verdict.error, ABOVE_USUAL):
+        return compared
+    if worse_outputs(rows, blocks, null, found[0], compared.calibration.usual.overall):
         return compared
     said = compared.verdict.word in ("named", "class")  # what is not told over the whole record says nothing beside it
     over_all = (f"Over the whole record: {compared.verdict.reason}",) if said else ()

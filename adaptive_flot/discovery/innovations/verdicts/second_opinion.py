@@ -50,6 +50,7 @@ from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.discovery.verdict.wording import beside_a_part
+from adaptive_flot.greybox.model import Model
 
 
 def second_opinion(state: State) -> State:
@@ -109,7 +110,7 @@ def second_opinion(state: State) -> State:
 
 def _noted(state: State, why: str) -> State:
     """The state with what process noise says among the notes on the record."""
-    said = f"with process noise {why}"
+    said = f"with process noise it is {why}"
     return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
@@ -235,11 +236,14 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
 
 def _judgement(state: State, told: Told, best: Alternative) -> Judgement:
     """The word for what is told: as in free runs, a dependence that its site has no reason for has no name."""
-    sites = {site.name: site for site in state.model.sites}
-    nameless = any(not nameable(state.model, sites[site], driver) for site, driver in best.names)
+    nameless = not all(_is_nameable(state.model, *name) for name in best.names)
     members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
     word: Word = "class" if told.word != "named" else "unnamed" if nameless else "named"
     return Judgement(word, best, members, (), 0.0)
+
+
+def _is_nameable(model: Model, name: str, driver: str) -> bool:
+    return nameable(model, next(site for site in model.sites if site.name == name), driver)
 
 
 def _another_drift(state: State, told: Told) -> bool:

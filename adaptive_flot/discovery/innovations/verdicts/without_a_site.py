@@ -9,11 +9,18 @@ record is compared with a constant amount in the same way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
-from adaptive_flot.discovery.hypotheses.without_a_site import amount_in_words, further_sites, with_further_sites
+from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
+from adaptive_flot.discovery.hypotheses.without_a_site import (
+    amount_in_words,
+    as_if,
+    further_sites,
+    is_meant,
+    with_further_sites,
+)
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -22,7 +29,7 @@ from adaptive_flot.greybox.scope import Site
 
 
 def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told:
-    """What is told; nothing where the record tells it from a better explanation without a site.
+    """What is told; nothing where the record tells it from a better explanation without a site, see `Told.beside`.
 
     An event always; a cause of the whole record where a reference says what the constants are. Without one, these make
     up for a constant amount.
@@ -41,11 +48,25 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
         return told
     further = replace(search, model=with_further_sites(search.model))
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, left_out)
-    rivals = further.all_with(rest, _without_a_site(further, rest, event))
-    best = max(rivals, key=lambda e: e.criterion, default=None)
-    if best is None or not told_apart(further, base, best, told.best):
+    rivals = sorted(further.all_with(rest, _without_a_site(further, rest, event)), key=lambda e: -e.criterion)
+    if not rivals:
         return told
-    return replace(told, word="abstain", certain=(), open=(), why=_words(further, best))
+    if told_apart(further, base, rivals[0], told.best):
+        near = _best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
+        return replace(told, word="abstain", certain=(), open=(), why=as_if([_words(further, e) for e in near]))
+    others = [e for e in rivals if not any(is_meant(further.model, h, e.hypotheses[-1].site) for h in told.effects)]
+    if told.word == "class" or search.known is None or not others or told_apart(further, base, told.best, others[0]):
+        return told
+    beside = others[0].hypotheses[-1]
+    return replace(told, beside=WithoutSite(beside.site, beside.driver, _words(further, others[0])))
+
+
+def _best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
+    """The best explanation of each place, the best first."""
+    kept: dict[str, Explanation] = {}
+    for e in found:
+        kept.setdefault(e.hypotheses[-1].site, e)
+    return list(kept.values())
 
 
 def _without_a_site(further: Search, rest: Explanation, event: Hypothesis | None) -> list[Screened]:

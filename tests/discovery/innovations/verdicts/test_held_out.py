@@ -48,8 +48,9 @@ def verdict(
     monkeypatch.setattr(asking, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
     state: Any = SimpleNamespace(
         judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
-        known_problem=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
+        known_problem=None, model=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
     )  # fmt: skip
+    monkeypatch.setattr(asking, "_is_nameable", lambda model, site, driver: True)
     search: Any = SimpleNamespace(sizes=lambda explanation: ({}, np.zeros((0, 0))))
     found: Judgement = asking._told(state, search, told.best, told).judgement  # type: ignore[assignment]
     return found

@@ -12,6 +12,7 @@ from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
 from adaptive_flot.greybox.effects import Effect
+from tests.discovery.innovations.box import model
 
 CURVE = Effect("gains", "time", "curve", {"value_1": 0.0, "value_2": 1.0}, {"knots": (0.0, 1.0)})
 STEP = Effect("gains", "time", "step", {"amplitude": 1.0, "onset": 5.0}, {"width": 2.0})
@@ -214,12 +215,18 @@ def test_much_that_is_found_and_not_confirmed_is_not_nothing(word: str, fall: fl
     assert rivals.unconfirmed(given) == asked
 
 
-@pytest.mark.parametrize(("known", "word"), [(True, "named"), (False, "unnamed")])
-def test_a_dependence_that_its_site_has_no_reason_for_has_no_name_here_either(known: bool, word: str) -> None:
-    """A voltmeter by the charge of a cell was named, and the free run would have told a curve without a name."""
-    names = (("voltmeter", "charge"),)
-    found = [SimpleNamespace(names=(("loss", "time"),), known=(True,)), SimpleNamespace(names=names, known=(known,))]
-    state: Any = SimpleNamespace(searched=(None, SimpleNamespace(alternatives=found)))
+@pytest.mark.parametrize(
+    ("site", "driver", "word"),
+    [("loss", "air", "named"), ("thermometer", "power", "unnamed"), ("thermometer", "time", "named")],
+)
+def test_a_dependence_that_its_site_has_no_reason_for_has_no_name_here_either(
+    site: str, driver: str, word: str
+) -> None:
+    """A voltmeter by the charge of a cell was named, and the free run would have told a curve without a name.
+
+    A feed by the concentration in the reactor was named as well, where no alternative of the free run had that pair.
+    """
+    state: Any = SimpleNamespace(model=model())
     told: Any = SimpleNamespace(word="named", open=(), effects=())
-    best: Any = SimpleNamespace(names=names)
+    best: Any = SimpleNamespace(names=((site, driver),))
     assert asking._judgement(state, told, best).word == word

@@ -81,7 +81,7 @@ def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
     assert any(h.kind == "switch" for h in told.effects), "without the rule an event at a site is told"
     kept = unless_without_a_site(search, base, told)
     assert kept.word == "abstain" and not kept.effects
-    assert kept.why.startswith("something takes from the balance of salt (")
+    assert kept.why.startswith("as if something takes from the balance of salt (")
     begins, ends = (float(t) for t in kept.why.split("(")[1].split(" s)")[0].split("-"))
     assert abs(begins - 2000.0) < 100.0 and abs(ends - 4000.0) < 100.0
 
@@ -117,10 +117,9 @@ def test_since_a_reference_fresh_water_is_no_probe_though_it_runs_all_the_time(s
     """3 g/s of 1500 L. Before, the probe was told, 0.25 g/L too low: by free runs, or by process noise."""
     new, old = record(10 + seed, fresh=3.0, on=ALWAYS), record(seed)
     found = find_changes(basin(), [new], [old]).verdict
-    assert found.word == "abstain" and not found.effects and not found.members
-    said = re.match(
-        r"Something differs from .*: something takes (\S+) g/L/s from the balance of salt, and", found.reason
-    )
+    assert found.word in ("abstain", "class")  # beside what wanders the probe may be as good
+    assert found.word == "abstain" or found.members == (("probe", "constant"), ("balance of salt", "constant"))
+    said = re.search(r"something takes (\S+) g/L/s from the balance of salt", found.reason.partition("Error")[0])
     assert said is not None, found.reason
     assert float(said[1]) == pytest.approx(3.0 / VOLUME, rel=0.1)
 
