@@ -25,6 +25,7 @@ OWN = 0.8
 """Share of the gain that is lost without an event beside another effect, at least."""
 SAME_LAG = 0.8
 """Share of the gain from which a lag at another place is not told apart."""
+TOO_LARGE = "what fits best would have to be larger than such a fault can be"
 FOLDS = 5
 BY_CHANCE = 1e-3
 """Probability below which the times of an event are those of an input: then it is no event."""
@@ -86,8 +87,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     possible = [e for e in found if not _beyond(search, e)]
     matters = found[0].criterion - base.criterion >= LEAST_GAIN
     if matters and found[0] not in possible and (not possible or told_apart(search, base, found[0], possible[0])):
-        why = "what fits best would have to be larger than such a fault can be"
-        return Told("abstain", found[0], (), (), (found[0],), why)
+        return Told("abstain", found[0], (), (), (found[0],), TOO_LARGE)
     found = possible or found
     given_up, everything = list[Hypothesis](), found
     while found[0].criterion - base.criterion >= LEAST_GAIN:
@@ -97,6 +97,8 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
         failed = failed or _contradicted(search, best, without)
         if not failed:
             told = _told(search, base, found, without)
+            if told.word != "abstain" and _beyond(search, told.best):  # beside what is left out it was not
+                return replace(told, word="abstain", certain=(), open=(), why=TOO_LARGE)
             return _unless_given_up(search, base, told, given_up, everything)
         given_up.append(failed[0])
         if len(best.hypotheses) == 1:

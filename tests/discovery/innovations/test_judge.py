@@ -134,6 +134,14 @@ def test_a_fault_at_the_end_of_its_range_that_gains_nothing_is_nothing() -> None
     assert told(Given((SPAN,), 1.0, 0.0, slope=0.3)).word == "none"
 
 
+def test_a_fault_that_reaches_the_end_of_its_range_alone_is_not_told_without_what_was_beside_it() -> None:
+    """Heat of a second reaction: a thermometer with a span 30 % larger, once the pump's offset was left out."""
+    beside = lag("pump")
+    pair, alone = Given((SPAN, beside), 500.0, 0.9, slope=0.2), Given((SPAN,), 480.0, 0.5, slope=0.3)
+    said = told(pair, alone, Given((beside,), 30.0, 0.1))
+    assert said.word == "abstain" and "larger than such a fault can be" in said.why
+
+
 def test_pairs_that_share_no_effect_are_no_class_of_single_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each explanation has two effects: "one of these two sites" would be false of all of them."""
     monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
