@@ -138,8 +138,9 @@ def _row_by_row(
         on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return None
-        if on_sites is not told:
-            told, compared = on_sites, _with_words_of_a_balance(compared, told, on_sites.why)
+        if on_sites.word != told.word:
+            compared = _with_words_without_a_site(compared, told, on_sites.why)
+        told = on_sites
         with_it = compared
         if _has_event(told):
             with_it = with_event(compared, search, told)
@@ -166,8 +167,8 @@ def _is_structure(told: Told) -> bool:
     return bool(told.effects) and all(h.kind in STRUCTURE for h in told.effects)
 
 
-def _with_words_of_a_balance(compared: Comparison, vetoed: Told, why: str) -> Comparison:
-    """The comparison with what acts on the balance of a state: a note where another part is told, else first.
+def _with_words_without_a_site(compared: Comparison, vetoed: Told, why: str) -> Comparison:
+    """The comparison with what acts where no site is: a note where another part is told, else first.
 
     What free runs tell at a site of what is `vetoed` with process noise is taken back.
     """

@@ -6,17 +6,20 @@ A basin through which water with a measured concentration flows. The records are
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses import procedure
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
+from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.discovery.hypotheses.without_a_site import with_further_sites
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
+from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -122,6 +125,17 @@ def test_since_a_reference_fresh_water_is_no_probe_though_it_runs_all_the_time(s
     said = re.search(r"something takes (\S+) g/L/s from the balance of salt", found.reason.partition("Error")[0])
     assert said is not None, found.reason
     assert float(said[1]) == pytest.approx(3.0 / VOLUME, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_what_stands_beside_a_name_takes_nothing_back(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """A name with a second explanation is no veto: it was taken for one, with an empty reason."""
+    beside = WithoutSite("balance of salt", "constant", "something takes salt")
+    monkeypatch.setattr(changes, "unless_without_a_site", lambda search, base, told: replace(told, beside=beside))
+    new, old = record(10 + seed, fresh=1.0, on=ALWAYS), record(seed)
+    found = find_changes(basin(), [new], [old]).verdict
+    assert "reference, ." not in found.reason and not any("it is ." in note for note in found.notes)
+    assert found.word in ("named", "class")
 
 
 def test_since_a_reference_a_probe_that_shows_less_all_the_time_is_one() -> None:
