@@ -14,6 +14,7 @@ search/       Which combination it is: successive halving, rounds, joint search,
 background/   What is always a little wrong: a feed that wanders, constants. It is then a part of every fit.
 test_design/  Which input moves would tell the leading alternatives apart.
 verdict/      The word, its reasons, and how they are put.
+further_sites/  What acts where a model has no site: it competes with every cause since a reference, and with events.
 hypotheses/   Named hypotheses about several records: what has changed since a reference.
 innovations/  A second opinion with process noise: when something happened, and what it may be.
 discover.py   What is called for one record: the stages, one after the other.

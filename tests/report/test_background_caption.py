@@ -7,7 +7,7 @@ from pathlib import Path
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.report.discovery.page import write_discovery_report
-from tests.discovery.test_background import record_in_a_room, tank_in_a_room
+from tests.discovery.background.test_background import record_in_a_room, tank_in_a_room
 
 
 def test_the_first_caption_tells_the_course(tmp_path: Path) -> None:

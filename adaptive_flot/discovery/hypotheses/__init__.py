@@ -13,7 +13,7 @@ joint/               One model fitted to several records, each with an initial s
 cross_validation.py  A hypothesis fitted to some stretches and judged on the others.
 comparison.py        Which hypotheses stand on fresh rows, and which the records can not tell apart.
 plausible.py         Whether a fitted fault can be what it says.
-without_a_site.py    What acts where the model has no site: on a balance, or on what an input says.
+without_a_site.py    What is told, beside what acts where the model has no site.
 judgement.py         From these to a word.
 telling.py           The verdict.
 wording.py           A hypothesis in words: size, direction, unit.

@@ -288,6 +288,11 @@ def constant_amount(site: Site, size: float) -> Hypothesis:
     return replace(_offset(site, size), limits={})
 
 
+def constant_change(site: Site, size: float) -> Hypothesis:
+    """A constant change in the way of the site: a factor, or an amount of any size; `size` is an ordinary one."""
+    return _gain(site) if site.mode == "factor" else constant_amount(site, size)
+
+
 def _depends(site: Site, driver: str, d: FloatArray) -> Hypothesis:
     low, high = (float(np.quantile(d, q)) for q in ENDS)
     effect = Effect(site.name, driver, "curve", settings={"knots": (low, high)}, mode="factor")

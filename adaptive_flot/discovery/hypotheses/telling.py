@@ -8,12 +8,12 @@ from itertools import groupby
 
 import numpy as np
 
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import Judged
-from adaptive_flot.discovery.hypotheses.without_a_site import NO_SITE
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.greybox.model import Model

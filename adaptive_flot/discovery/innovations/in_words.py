@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.hypotheses.without_a_site import NO_SITE
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis, constant_amount
+from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis, constant_change
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
 from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
@@ -148,12 +148,12 @@ class Screening:
         suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
 
-    def amount(self, site: Site) -> list[Screened]:
-        """A constant amount at a site, whatever it gains; none where the record says nothing of the site."""
-        by = self._course(site, "offset")
+    def constant(self, site: Site) -> list[Screened]:
+        """A constant change in the way of a site, whatever it gains; none where the record says nothing of the site."""
+        by = self._course(site, site.mode)
         if by is None:
             return []
-        hypothesis = constant_amount(site, float(np.ptp(self._values[site.name])))
+        hypothesis = constant_change(site, float(np.ptp(self._values[site.name])))
         return self._regressions(site.name, [Suspect(hypothesis, by[:, None], ("amplitude",))])
 
     def ramp(self, site: Site) -> Screened | None:

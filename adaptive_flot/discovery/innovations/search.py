@@ -34,6 +34,8 @@ LEAST_GAIN = 12.0
 """Gain of the criterion that another effect must bring."""
 SLOW = ("lag", "store")
 """Kinds of effects that the fit of the model as it is hides in its constants: its stores have become larger."""
+CONSTANT = ("gain", "offset")
+"""Kinds of a constant change: a fit may start far from it, so that a regression on the model as it is overlooks it."""
 FURTHEST = 4.0
 """Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
 
@@ -97,8 +99,10 @@ class Search:
         Kinds of effects that may be found; None for all.
     as_given
         The free constants as the model came, from which what is slow is fitted once more; none where they are known.
-    ramps
-        Whether gradual changes are looked for. What wanders is full of them, so a reference must say how much does.
+    since_reference
+        Whether the constants that are known are those of a reference on which the model was right. Then gradual changes
+        are looked for: what wanders is full of them, so a reference must say how much does. And the first effect is
+        looked for beside those constants as well: without it they have moved to make up for it.
     ends
         Time of `time.monotonic` after which nothing more is looked for.
     """
@@ -112,7 +116,7 @@ class Search:
     processes: int = 1
     kinds: tuple[str, ...] | None = None
     as_given: tuple[float, ...] = ()
-    ramps: bool = False
+    since_reference: bool = False
     ends: float = float("inf")
 
     @property
@@ -171,12 +175,13 @@ class Search:
         """The explanation with one more effect, for each that is worth its numbers."""
         if self.time_is_up:
             return []
-        screening = self.screening(start, [s.name for s in self.model.sites])
-        # one course in time at most: a second one would draw whatever is left
-        events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
-        screened = screening.all(events=events, ramps=events and self.ramps)
-        chosen = _spread([s for s in screened if self._may(s.suspect.hypothesis.kind)])
-        refits = self.all_with(start, chosen)
+        screening, screened = self._screened(start)
+        refits = self.all_with(start, _spread(screened))
+        if self.since_reference and not start.hypotheses:
+            held = self._held(start)
+            beside = self._screened(held)[1]
+            constant = [s for s in beside if s.suspect.hypothesis.kind in CONSTANT and s.gain >= LEAST_GAIN]
+            refits += self.all_with(start, list({id(s): s for s in (*_spread(beside), *constant)}.values()), held)
         switched = [e for e in refits if e.hypotheses[-1].kind == "switch"]
         if switched:
             switch = max(switched, key=lambda e: e.criterion).hypotheses[-1]
@@ -184,9 +189,28 @@ class Search:
             refits += self.all_with(start, there)
         return refits
 
-    def all_with(self, start: Explanation, chosen: Sequence[Screened]) -> list[Explanation]:
-        """The explanations with one of some effects more each, those that are worth their numbers."""
-        refits = parallel_map(lambda s: None if self.time_is_up else self._with(start, s), chosen, self.processes)
+    def _held(self, start: Explanation) -> Explanation:
+        """The model as it is with the constants of the reference, and the noise of a fit to this record."""
+        p, fit = self.model.parameter_values, start.fit
+        return replace(start, fit=replace(fit, p=p, filtered=self.fitter(self.model, ()).run(p, fit.noise)))
+
+    def _screened(self, start: Explanation) -> tuple[Screening, list[Screened]]:
+        """The regressions on an explanation, and what may be found by them, the best first."""
+        screening = self.screening(start, [s.name for s in self.model.sites])
+        # one course in time at most: a second one would draw whatever is left
+        events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
+        screened = screening.all(events=events, ramps=events and self.since_reference)
+        return screening, [s for s in screened if self._may(s.suspect.hypothesis.kind)]
+
+    def all_with(
+        self, start: Explanation, chosen: Sequence[Screened], held: Explanation | None = None
+    ) -> list[Explanation]:
+        """The explanations with one of some effects more each, those that are worth their numbers.
+
+        Fitted from `start`, or from what is `held` in its place.
+        """
+        at = start if held is None else held
+        refits = parallel_map(lambda s: None if self.time_is_up else self._with(at, s), chosen, self.processes)
         return [e for e in refits if e is not None and e.criterion > start.criterion + LEAST_GAIN]
 
     @property

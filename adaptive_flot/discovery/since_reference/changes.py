@@ -265,7 +265,9 @@ def _with_process_noise(
     where = extended.indices("parameters", constants.names)
     known = constants.about(extended.parameter_values[list(where)])
     progress("events in the new record")
-    search = Search(extended, record, columns, floor, constants.names, known, processes, ramps=True, ends=ends)
+    search = Search(
+        extended, record, columns, floor, constants.names, known, processes, since_reference=True, ends=ends
+    )
     base = search.base(extended.parameter_values)
     found = search.run(base, progress)
     if search.time_is_up:

@@ -11,7 +11,7 @@ from adaptive_flot.discovery.fitting.base_fit import prepare, split_record
 from adaptive_flot.discovery.record.problem import CYCLE
 from adaptive_flot.discovery.record.screening import screen
 from adaptive_flot.greybox import Dataset
-from tests.discovery.test_step_length import model
+from tests.discovery.fitting.test_step_length import model
 
 ROWS = 400
 

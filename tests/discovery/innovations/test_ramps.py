@@ -32,7 +32,7 @@ def test_what_wanders_as_on_the_reference_is_no_gradual_change(seed: int) -> Non
 
 def test_a_ramp_costs_its_size_and_both_of_its_times() -> None:
     data, plain = record("fouls"), model()
-    search = Search(plain, data, (0,), noise_floor([data], (0,)), ("ua", "holdup"), ramps=True)
+    search = Search(plain, data, (0,), noise_floor([data], (0,)), ("ua", "holdup"), since_reference=True)
     with np.errstate(all="ignore"):
         screening = search.screening(search.base(plain.parameter_values), ["transfer"])
         found = screening.ramp(next(s for s in plain.sites if s.name == "transfer"))

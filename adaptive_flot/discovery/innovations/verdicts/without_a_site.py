@@ -12,15 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from adaptive_flot.discovery.further_sites.places import further_sites, with_further_sites
+from adaptive_flot.discovery.further_sites.same_meaning import is_meant
+from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
-from adaptive_flot.discovery.hypotheses.without_a_site import (
-    amount_in_words,
-    as_if,
-    further_sites,
-    is_meant,
-    with_further_sites,
-)
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -54,7 +50,9 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     if told_apart(further, base, rivals[0], told.best):
         near = _best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
         return replace(told, word="abstain", certain=(), open=(), why=as_if([_words(further, e) for e in near]))
-    others = [e for e in rivals if not any(is_meant(further.model, h, e.hypotheses[-1].site) for h in told.effects)]
+    others = [
+        e for e in rivals if not any(is_meant(further.model, h.effect, e.hypotheses[-1].site) for h in told.effects)
+    ]
     if told.word == "class" or search.known is None or not others or told_apart(further, base, told.best, others[0]):
         return told
     beside = others[0].hypotheses[-1]
@@ -78,7 +76,7 @@ def _without_a_site(further: Search, rest: Explanation, event: Hypothesis | None
 
 def _at(screening: Screening, site: Site, event: Hypothesis | None) -> Sequence[Screened]:
     if event is None:
-        return screening.amount(site)
+        return screening.constant(site)
     if event.kind == "ramp":
         own = screening.ramp(site)
         return [own] if own is not None else []
@@ -92,4 +90,4 @@ def _words(further: Search, explanation: Explanation) -> str:
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
     amount = model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value
     measured = further.known is not None and not further.known.up_to_a_factor()
-    return amount_in_words(model, h.site, amount, when, measured)
+    return change_in_words(model, h.site, amount, when, measured)

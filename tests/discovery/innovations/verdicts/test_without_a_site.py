@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.further_sites.places import with_further_sites
 from adaptive_flot.discovery.hypotheses import procedure
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import compare
-from adaptive_flot.discovery.hypotheses.without_a_site import with_further_sites
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site

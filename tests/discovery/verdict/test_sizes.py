@@ -14,7 +14,7 @@ from adaptive_flot.discovery.verdict.sizes import words_of_effect, words_of_effe
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.discovery.tables import coefficient_table
-from tests.discovery.test_uncertain_constants import jacketed_tank
+from tests.discovery.background.test_uncertain_constants import jacketed_tank
 
 MODEL = jacketed_tank()
 Settings = Mapping[str, float | tuple[float, ...]]

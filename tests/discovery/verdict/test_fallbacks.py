@@ -15,8 +15,8 @@ from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.stages import tell_background
 from adaptive_flot.discovery.verdict.certain_part import part_alone
 from adaptive_flot.greybox.effects import Effect
-from tests.discovery.test_told_course import OFF, beside_the_room
-from tests.discovery.test_uncertain_constants import jacketed_tank, record
+from tests.discovery.background.test_told_course import OFF, beside_the_room
+from tests.discovery.background.test_uncertain_constants import jacketed_tank, record
 
 FAN, TIME, SENSOR = ("heat_loss", "fan_speed"), ("heat_loss", "time"), ("thermometer", "time")
 

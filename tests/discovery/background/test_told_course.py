@@ -32,7 +32,7 @@ from adaptive_flot.discovery.verdict.wording import beside_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.record import RecordSimulator
-from tests.discovery.test_uncertain_constants import WANDERS_S, fitted, jacketed_tank, record
+from tests.discovery.background.test_uncertain_constants import WANDERS_S, fitted, jacketed_tank, record
 
 OFF, ONE, SEED = 0.02, -1.0, 8
 ROOM = Course("room", 2.0, WANDERS_S, True)

@@ -1,0 +1,67 @@
+"""What says the same at a site of a model as an amount or a factor where it has none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adaptive_flot.discovery.candidates.catalogue import passed_on
+from adaptive_flot.discovery.further_sites.places import BALANCE, READING
+from adaptive_flot.greybox.effects import Effect, Mode
+from adaptive_flot.greybox.model import FloatArray, Model
+
+POINTS, WIDE = 24, 1e6
+"""Points at which the rates of a model are compared, and what stands for no limit of a quantity."""
+SMALL, SAME = 1e-4, 1e-6
+"""Size of a change, and the share of it from which two differ."""
+
+
+def is_meant(model: Model, effect: Effect, place: str) -> bool:
+    """Whether an effect says the same as a change at a further site.
+
+    An amount at a site that stands for one; an input that is asked of the actuator whose site it passes; and whatever
+    else in the process does the same to every state and output, as a capacity does. A drive that alone moves a mass
+    does what another mass would do, but it does not mean that.
+    """
+    site = next(s for s in model.sites if s.name == effect.site)
+    mode = effect.mode or site.mode
+    if place.startswith(READING):
+        return passed_on(model).get(site.name) == place.removeprefix(READING)
+    if site.role == "sensor":
+        return False
+    if place.startswith(BALANCE) and mode == site.mode == "offset":
+        return True
+    return site.role not in ("actuator", "feed") and model.derived(_does_the_same, site.name, mode, place)
+
+
+def _does_the_same(model: Model, site: str, mode: Mode, place: str) -> bool:
+    """Whether small changes at a site and at a place move rates and outputs in one proportion, at random points.
+
+    The points lie within the ranges of states and inputs. Those where the model has no value are left out.
+    """
+    place_mode = next(s.mode for s in model.sites if s.name == place)
+    one, two = _moves(model, site, mode), _moves(model, place, place_mode)
+    known = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
+    one, two = one[known], two[known]
+    if known.sum() < POINTS // 4 or not np.any(one) or not np.any(two):
+        return False
+    factor = float(np.sum(one * two) / np.sum(two * two))
+    return bool(np.abs(one - factor * two).max() <= SAME * np.abs(one).max())
+
+
+def _moves(model: Model, site: str, mode: Mode) -> FloatArray:
+    """How rates and outputs answer to a small change at a site (POINTS, nx + ny), by central differences."""
+    ends = np.array([(q.lower, q.upper) for q in (*model.states, *model.inputs)])
+    low, high = np.clip(ends.T, -WIDE, WIDE)
+    points = np.random.default_rng(0).uniform(low, high, (POINTS, len(low)))
+    nx = len(model.states)
+    changed = model.with_effects([Effect(site, "constant", "shift", {"amplitude": 0.0}, mode=mode)])
+    k = changed.index("parameters", changed.effects[-1].parameter("amplitude"))
+    found = np.full((POINTS, nx + len(model.outputs)), np.nan)
+    for i, point in enumerate(points):
+        ways = []
+        for amplitude in (-SMALL, SMALL):
+            p = changed.parameter_values
+            p[k] = amplitude
+            ways.append(np.concatenate([np.array(v).ravel() for v in changed.ode(0.0, point[:nx], point[nx:], p)[:2]]))
+        found[i] = (ways[1] - ways[0]) / (2 * SMALL)
+    return found

@@ -1,0 +1,61 @@
+"""What acts where a model has no site, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, RATE, READING, loss_size
+from adaptive_flot.greybox.model import Model
+
+NO_SITE = "the model has no site for that"
+MOST_SAID = 3
+"""So many of what is not told apart are said."""
+
+
+def change_in_words(model: Model, site: str, amount: float, when: str, measured: bool) -> str:
+    """``something takes 0.3 m/s from the balance of level (120-340 s)``.
+
+    Parameters
+    ----------
+    model
+        The model, for the unit.
+    site
+        Name of the further site.
+    amount
+        What is added, at a balance in the unit of the state by second; the logarithm of a factor at a rate.
+    when
+        The times in words; empty for the whole record.
+    measured
+        Whether the constants are known by which a rate is measured; else no rate is said.
+    """
+    at = f" ({when})" if when else ""
+    if site.startswith(READING):
+        name = site.removeprefix(READING)
+        unit = model.inputs[model.index("inputs", name)].unit
+        off = f"{abs(amount):.3g} {'' if unit == '-' else unit}".strip()
+        return f"{_plain(name)} were {off} {'more' if amount > 0 else 'less'} than the record says{at}"
+    if site.startswith(RATE):
+        name = _plain(site.removeprefix(RATE))
+        return f"what stores {name} (a capacity, a volume or a mass) were {np.exp(-amount):.2g} times as large{at}"
+    if site.startswith(LOSS):
+        name = site.removeprefix(LOSS)
+        share = abs(amount) / loss_size(model.states[model.index("states", name)])
+        rate = f" {share:.3g} of it a second" if measured else " a share of it"
+        does = "leaves" if amount > 0 else "comes"
+        return f"of {_plain(name)}{rate} {does}, in proportion to it{at}"
+    name = site.removeprefix(BALANCE)
+    unit = model.states[model.index("states", name)].unit
+    rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""
+    does, where = ("adds", "to") if amount > 0 else ("takes", "from")
+    return f"something {does}{rate} {where} the balance of {_plain(name)}{at}"
+
+
+def as_if(words: Sequence[str]) -> str:
+    """What is not told apart, in words: ``as if something ...; or as if ...: the model has no site for that``."""
+    return f"{'; or '.join(f'as if {w}' for w in words[:MOST_SAID])}: {NO_SITE}"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
