@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.greybox.scope import Scope, Site
@@ -81,6 +82,15 @@ def loss_size(state: Quantity) -> float:
 def further_sites(model: Model) -> tuple[Site, ...]:
     """The further sites of such a model."""
     return tuple(s for s in model.sites if is_further(s.name))
+
+
+def stays_in_range(model: Model, record: Dataset, place: str, amount: float) -> bool:
+    """Whether an input that is off by an amount stays within the range of its quantity; of another place, always."""
+    if not place.startswith(READING):
+        return True
+    i = model.index("inputs", place.removeprefix(READING))
+    low, high = np.nanquantile(record.inputs[:, i], (0.05, 0.95)) + amount
+    return bool(model.inputs[i].lower <= low and high <= model.inputs[i].upper)
 
 
 def is_further(site: str) -> bool:

@@ -8,6 +8,7 @@ from adaptive_flot.discovery.candidates.catalogue import passed_on
 from adaptive_flot.discovery.further_sites.places import BALANCE, READING
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.scope import Site
 
 POINTS, WIDE = 24, 1e6
 """Points at which the rates of a model are compared, and what stands for no limit of a quantity."""
@@ -30,15 +31,25 @@ def is_meant(model: Model, effect: Effect, place: str) -> bool:
         return False
     if place.startswith(BALANCE) and mode == site.mode == "offset":
         return True
-    return site.role not in ("actuator", "feed") and model.derived(_does_the_same, site.name, mode, place)
+    own = next(s.mode for s in model.sites if s.name == place)
+    return site.role not in ("actuator", "feed") and model.derived(_does_the_same, site.name, mode, place, own)
 
 
-def _does_the_same(model: Model, site: str, mode: Mode, place: str) -> bool:
+def twins(model: Model, effect: Effect) -> tuple[Site, ...]:
+    """Other sites at which an effect does the same to all states and outputs, up to a constant factor.
+
+    So do forces that add up: what depends on the position may be the spring, the damper or the drive.
+    """
+    mode = effect.mode or next(s.mode for s in model.sites if s.name == effect.site)
+    others = (s for s in model.sites if s.name != effect.site and s.role != "sensor")
+    return tuple(s for s in others if model.derived(_does_the_same, s.name, mode, effect.site, mode))
+
+
+def _does_the_same(model: Model, site: str, mode: Mode | None, place: str, place_mode: Mode | None) -> bool:
     """Whether small changes at a site and at a place move rates and outputs in one proportion, at random points.
 
     The points lie within the ranges of states and inputs. Those where the model has no value are left out.
     """
-    place_mode = next(s.mode for s in model.sites if s.name == place)
     one, two = _moves(model, site, mode), _moves(model, place, place_mode)
     known = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
     one, two = one[known], two[known]
@@ -48,7 +59,7 @@ def _does_the_same(model: Model, site: str, mode: Mode, place: str) -> bool:
     return bool(np.abs(one - factor * two).max() <= SAME * np.abs(one).max())
 
 
-def _moves(model: Model, site: str, mode: Mode) -> FloatArray:
+def _moves(model: Model, site: str, mode: Mode | None) -> FloatArray:
     """How rates and outputs answer to a small change at a site (POINTS, nx + ny), by central differences."""
     ends = np.array([(q.lower, q.upper) for q in (*model.states, *model.inputs)])
     low, high = np.clip(ends.T, -WIDE, WIDE)

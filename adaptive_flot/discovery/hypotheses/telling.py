@@ -191,7 +191,7 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
             return f"{first}: {judged.why}. What wanders in the process may do that. Nearest: {near}."
         return f"Something {differs}, but the records do not say what: {judged.why}. Nearest: {near}."
     said = [_part_in_words(model, judged, t) for t in judged.parts]
-    said += [f"{judged.beside.words}, and {NO_SITE}"] if judged.beside else []
+    said += [f"as if {judged.beside.words}, and {NO_SITE}"] if judged.beside else []
     first = f"{said[0][0].upper()}{said[0][1:]}." if len(said) == 1 else _one_of(said)
     helped = ", ".join(c.words for c in error)
     return f"{first} Error on stretches that did not fit it: {helped}."

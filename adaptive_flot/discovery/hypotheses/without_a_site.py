@@ -102,7 +102,7 @@ def unless_without_a_site(
     said = [t.hypothesis for t in told if t.hypothesis is not None]
     others = [t for t in rivals if t.hypothesis and not any(is_meant(model, h.effect, t.hypothesis.site) for h in said)]
     near = alike(judged.best, others)
-    return replace(judged, beside=words(near[0])) if judged.word == "named" and near else judged
+    return replace(judged, beside=words(near[0])) if near else judged
 
 
 def _changes(model: Model, base: JointFit, rows: Rows) -> Sequence[Hypothesis]:

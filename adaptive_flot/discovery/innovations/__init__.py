@@ -16,5 +16,6 @@ search.py           A few effects together.
 telling_apart.py    Whether the record tells one explanation from another.
 judge.py            What is certain, and what predicts rows that did not fit it.
 in_words.py         What is told, in words.
+places              Names beside what acts where the model has no site.
 verdicts            What may be told of it, beside the free run or a comparison with a reference.
 """

@@ -16,10 +16,13 @@ def told_in_words(search: Search, told: Told) -> str:
     sure = "; and ".join(words_at(search, told.best, h) for h in told.certain)
     said = f"{sure[0].upper()}{sure[1:]}." if sure else ""
     if told.word == "named" and told.beside:
-        return f"One of these, which the record can not tell apart: {sure}; or {told.beside.words}, and {NO_SITE}."
+        return (
+            f"One of these, which the record can not tell apart: {sure}; or as if {told.beside.words}, and {NO_SITE}."
+        )
     if told.word != "class":
         return said
     members = "; or ".join(_open_one(search, told, e, h) for e, h in told.open)
+    members += f"; or as if {told.beside.words}, and {NO_SITE}" if told.beside and not sure else ""
     first = "Besides, one of these" if sure else "One of these"
     return f"{said} {first}, which the record can not tell apart: {members}.".strip()
 

@@ -167,6 +167,8 @@ class Judgement:
         How much worse a criterion must be to tell an alternative from the best (see `judge`).
     part
         (site, driver) of the effects of `best` that are told, where the others are not; empty where all are.
+    beside
+        The last member of a class in words, where it acts where the model has no site; else empty.
     """
 
     word: Word
@@ -175,6 +177,7 @@ class Judgement:
     rivals: tuple[Alternative, ...]
     margin: float
     part: tuple[tuple[str, str], ...] = ()
+    beside: str = ""
 
     def near(self, a: Alternative) -> bool:
         """Whether the record does not tell an alternative from the best."""

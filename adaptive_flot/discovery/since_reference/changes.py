@@ -25,13 +25,13 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short_since_reference
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
-from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_site
 from adaptive_flot.discovery.verdict.sizes import spaced, words_alone
@@ -129,7 +130,10 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
     if judgement.part or all(len(a.names) == 1 for a in sets):
         alone = {a.names[0]: words_alone(a) for a in reversed(sets) if len(a.names) == 1}
-        members = "; or ".join(alone.get(name, " by ".join(name)) for name in judgement.members)
+        each = [alone.get(name, " by ".join(name)) for name in judgement.members]
+        if judgement.beside:
+            each[-1] = f"as if {judgement.beside}, and {NO_SITE}"
+        members = "; or ".join(each)
         said = f"{LACKS_ONE} of these, which this record can not tell apart: {members}."
         if alike := ", ".join(" by ".join(name) for name in alone if name not in judgement.members):
             said += f" At the same places it may as well be: {alike}."

@@ -6,7 +6,6 @@ stretches.py       Errors on held-out stretches, each predicted from the state o
 rivals.py          What the free run has, which a name of the innovations form must beat.
 alternatives.py    What is told beside what the free run has and does not tell, both in innovations form.
 common.py          One effect that every explanation has, alone where the rest stays open.
-without_a_site.py  What is told at a site, beside what acts where the model has none.
 in_time.py         A dependence on what moves slowly, beside a change in time at the same site.
 reach.py           Outputs that effects can change at all.
 members.py         Members of a class as alternatives of a free run.

@@ -24,15 +24,17 @@ FAR = 3.0
 WANDERS = 0.25
 """Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
 MUCH = 100.0
-"""Fall of the Bayesian information criterion by which an alternative explains much."""
+"""Fall of the Bayesian information criterion by which an alternative explains much; half of it where the model errs."""
+ERRS = 1.5
+"""Times the noise from row to row from which the model as it is surely errs."""
 TREND = 100.0
 """Gain of log-likelihood below which a change that lasts to the end of a record may be slow wandering."""
 TELLS = ("named", "class", "unnamed")
 """Words of the free run that tell something."""
 
 
-def leaves_too_much(state: State) -> bool:
-    """By all rows of the record, and by the report rows alone, which fitted nothing.
+def leaves_too_much(state: State, far: float = FAR) -> bool:
+    """Whether an error is more than `far` times the noise: of all rows, or of the report rows, which fitted nothing.
 
     Each row counts up to three standard deviations: outliers are no model error.
     """
@@ -40,7 +42,7 @@ def leaves_too_much(state: State) -> bool:
     residual, noise = after.residual(problem), noise_by_differences(problem.measured)
     splits = (problem.rows(), problem.rows("report"))
     left = [np.where(rows[:, None], residual, np.nan).T for rows in splits if rows.any()]
-    return any(clipped_std(e) > FAR * s for part in left for e, s in zip(part, noise, strict=True) if s > 0)
+    return any(clipped_std(e) > far * s for part in left for e, s in zip(part, noise, strict=True) if s > 0)
 
 
 def follows_time(state: State) -> bool:
@@ -59,14 +61,15 @@ def unexpected_drift(state: State) -> bool:
 
 
 def unconfirmed(state: State) -> bool:
-    """Whether a `none` rests on a search whose best alternative explains much (MUCH), and was not confirmed.
+    """Whether a `none` rests on a search whose best alternative explains much (see MUCH), and was not confirmed.
 
     Then something is there, and the alternative is not it.
     """
     if state.judged.word != "none" or state.judged.best is not None:
         return False
     _, result = state.searched
-    return any(a.delta_bic <= -MUCH for a in result.alternatives)
+    most = min((a.delta_bic for a in result.alternatives), default=0.0)
+    return most <= -MUCH or (most <= -MUCH / 2 and leaves_too_much(state, ERRS))
 
 
 def surely_better(state: State) -> bool:

@@ -19,6 +19,8 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
+from adaptive_flot.discovery.innovations.places import free_run
+from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives, beside_alternatives
@@ -45,7 +47,6 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     unless_it_wanders,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
-from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
@@ -69,7 +70,7 @@ def second_opinion(state: State) -> State:
     given = replace(problem.record, initial_state=before.initial_state)
     record = searchable(given, before.model) if is_asked(state) else None
     if record is None:
-        return state
+        return free_run.unless_without_a_site(state)
     if time.monotonic() > state.ends:
         return _not_asked(state)
     state.progress("ask the innovations form")
@@ -237,8 +238,11 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
 def _judgement(state: State, told: Told, best: Alternative) -> Judgement:
     """The word for what is told: as in free runs, a dependence that its site has no reason for has no name."""
     nameless = not all(_is_nameable(state.model, *name) for name in best.names)
-    members = tuple((h.site, h.driver) for h in told.effects) if told.open else ()  # what is certain is in all of them
-    word: Word = "class" if told.word != "named" else "unnamed" if nameless else "named"
+    members = (
+        tuple((h.site, h.driver) for h in told.effects) if told.open or told.beside else ()
+    )  # with what is certain
+    members += ((told.beside.place, told.beside.driver),) if told.beside else ()
+    word: Word = "class" if told.word != "named" or told.beside else "unnamed" if nameless else "named"
     return Judgement(word, best, members, (), 0.0)
 
 

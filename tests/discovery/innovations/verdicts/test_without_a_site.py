@@ -17,8 +17,8 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search import Explanation, Search
-from adaptive_flot.discovery.innovations.verdicts.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope

@@ -27,8 +27,8 @@ from adaptive_flot.greybox.scope import Site
 def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told:
     """What is told; nothing where the record tells it from a better explanation without a site, see `Told.beside`.
 
-    An event always; a cause of the whole record where a reference says what the constants are. Without one, these make
-    up for a constant amount.
+    An event, and a cause of the whole record. Without a reference, free constants make up for much of a constant change
+    at such a place: it then explains no more than the model as it is.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
         What was judged.
     """
     event = next((h for h in told.best.hypotheses if h.kind in EVENTS), None)
-    cause = told.effects[0] if told.effects and search.known is not None else None
+    cause = told.effects[0] if told.effects else None
     left_out = event if event is not None else cause
     if told.word not in ("named", "class") or left_out not in told.best.hypotheses:
         return told
@@ -53,7 +53,8 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     others = [
         e for e in rivals if not any(is_meant(further.model, h.effect, e.hypotheses[-1].site) for h in told.effects)
     ]
-    if told.word == "class" or search.known is None or not others or told_apart(further, base, told.best, others[0]):
+    one_of_them = told.word == "named" or not told.certain
+    if not one_of_them or not others or told_apart(further, base, told.best, others[0]):
         return told
     beside = others[0].hypotheses[-1]
     return replace(told, beside=WithoutSite(beside.site, beside.driver, _words(further, others[0])))

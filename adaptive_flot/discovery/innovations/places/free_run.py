@@ -1,0 +1,120 @@
+"""What a free run tells without a reference, beside what acts where the model has no site.
+
+A shaft carries more than the model's fixed inertia, and a friction that follows its twist explains that as well. So
+before one effect is told, a constant change is fitted at each further place, with the constants free. Where one
+explains the record surely better, nothing is told; where it explains as much, it is a member of the class.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
+from adaptive_flot.discovery.candidates.catalogue import nameable
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.parallel import parallel_map
+from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
+from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
+from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
+from adaptive_flot.discovery.innovations.thinning import searchable
+from adaptive_flot.discovery.results import Alternative, State
+from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.scope import Site
+
+
+def unless_without_a_site(state: State) -> State:
+    """The state; its name or class taken back, or with one more member, where a place without a site asks for that.
+
+    Only for a model that is small enough for the innovations form: a large one takes too long.
+    """
+    state = _with_twins(state)
+    judged, (problem, result) = state.judged, state.searched
+    best = judged.best
+    told = judged.word in ("named", "class") and not state.contradiction and not state.sentence
+    if not told or best is None or len(best.names) != 1 or judged.part or problem.background is not None:
+        return state
+    if searchable(problem.record, result.base.model) is None or time.monotonic() > state.ends:
+        return state
+    state.progress("compare with what has no site")
+    rivals = _rivals(state)
+    if not rivals:
+        return state
+    first = rivals[0]
+    least = LEAST_MARGIN * result.rows_per_effective_sample
+    words = [_words(a) for a in rivals if a.near(first, least)]
+    if not best.near(first, least):
+        return replace(
+            state,
+            judgement=replace(judged, word="abstain", members=()),
+            contradiction=f"what has no site explains more, {as_if(words)}",
+        )
+    of_a_class = judged.word == "class"
+    # what comes as near as the members of a class do is one of them
+    if not first.near(best, judged.margin if of_a_class else least):
+        return state
+    members = (*(judged.members if of_a_class else best.names), *first.names)
+    return replace(state, judgement=replace(judged, word="class", members=members, beside=words[0]))
+
+
+def _with_twins(state: State) -> State:
+    """The state; a name of several effects is a class where one of them does the same at another site.
+
+    A search beside the first effect has the others at that site only. What depends on the same as that one may make up
+    for its shape: it is not told.
+    """
+    judged = state.judged
+    best = judged.best
+    if judged.word != "named" or best is None or len(best.names) < 2 or state.sentence or judged.part:
+        return state
+    model = state.searched[1].base.model
+    alike = []
+    for k, effect in enumerate(best.effects):
+        for site in twins(model, effect):
+            if nameable(model, site, effect.driver):
+                names = (*best.names[:k], (site.name, effect.driver), *best.names[k + 1 :])
+                alike.append(replace(best, names=names))
+    if not alike:
+        return state
+    members = tuple(dict.fromkeys(name for a in (best, *alike) for name in a.names))
+    drivers = {driver for _, driver in members}
+    changing = tuple(n for n in members if not all(n in a.names for a in (best, *alike)))
+    part = changing[:1] if len(drivers) == 1 and len(changing) < len(members) else ()
+    members = changing if part else members
+    judged = replace(judged, word="class", members=members, part=part, rivals=(*alike, *judged.rivals))
+    return replace(state, judgement=judged)
+
+
+def _rivals(state: State) -> list[Alternative]:
+    """A constant change at each place, fitted; the best first, without what says the same as what is told."""
+    (problem, result), judged = state.searched, state.judged
+    assert judged.best is not None  # something is told
+    base, model = result.base, with_further_sites(result.base.model)
+    told = judged.best.effects[0]
+
+    def fitted(site: Site) -> Alternative | None:
+        effect = Effect(site.name, "constant", "shift", mode=site.mode)
+        extended = model.with_effects([effect])
+        fit = Fitter(problem).fit(extended, (effect.parameter("amplitude"),), like=base)
+        if fit is None or not stays_in_range(model, problem.record, site.name, fit.values[-1]):
+            return None
+        return Alternative(((site.name, "constant"),), (False,), fit, base.loss - fit.loss, fit.bic - base.bic)
+
+    with np.errstate(all="ignore"):
+        sites = [s for s in further_sites(model) if not is_meant(model, told, s.name)]
+        found = [a for a in parallel_map(fitted, sites, state.processes) if a is not None]
+    found = [a for a in found if a.delta_bic < -LEAST_MARGIN]
+    if not found:
+        return []
+    sds = loglik_difference_sds(problem, judged.best.fit, [a.fit for a in found])
+    return sorted(
+        (replace(a, loglik_difference_sd=sd) for a, sd in zip(found, sds, strict=True)), key=lambda a: a.fit.bic
+    )
+
+
+def _words(a: Alternative) -> str:
+    effect, model = a.effects[0], a.fit.model
+    return change_in_words(model, effect.site, effect.coefficients["amplitude"], "", measured=False)
