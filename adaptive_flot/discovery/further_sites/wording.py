@@ -42,9 +42,8 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
     if site.startswith(LOSS):
         name = site.removeprefix(LOSS)
         share = abs(amount) / loss_size(model.states[model.index("states", name)])
-        rate = f" {share:.3g} of it a second" if measured else " a share of it"
-        does = "leaves" if amount > 0 else "comes"
-        return f"of {_plain(name)}{rate} {does}, in proportion to it{at}"
+        rate = f"{100 * share:.3g} % of itself every second" if measured else "a share of itself"
+        return f"{_plain(name)} {'lost' if amount > 0 else 'gained'} {rate}{at}"
     name = site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit
     rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""

@@ -11,6 +11,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.search import Explanation
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.discovery.since_reference.searched_change import AT_NOISE
 
@@ -33,8 +34,8 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     """The comparison, its name taken back where the innovations form does not know it.
 
     That is where it leaves more than the reference and another part is named there, or far more and no explanation
-    there has that effect. And it is where the errors are not far above those of the reference: so little may be what
-    wanders.
+    there has that effect. And it is where the errors are not far above those of the reference, and the best explanation
+    there does not have it either: so little may be what wanders.
     """
     verdict, found = compared.verdict, told.effects
     sites = sites_told(verdict)
@@ -45,7 +46,7 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
         why = f"it leaves more than the reference, and with process noise {said} explains more"
     elif not _known_by(told, verdict) and any(c.after > FAR_ABOVE * c.noise for c in verdict.error):
         why = "it leaves far more than the reference, and with process noise nothing speaks for it"
-    elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error):
+    elif all(c.before <= FAR_ABOVE * c.noise for c in verdict.error) and not _is_in(told.best, verdict):
         why = "errors are not far above those of the reference, and with process noise it is not confirmed"
         return taken_back(compared, why, said="No change is told")
     else:
@@ -55,8 +56,13 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
 
 def _known_by(told: Told, verdict: Verdict) -> bool:
     """Whether an explanation of the innovations form has one of the effects that are told."""
+    return any(_is_in(e, verdict) for e in told.alike)
+
+
+def _is_in(explanation: Explanation, verdict: Verdict) -> bool:
+    """Whether an explanation has one of the effects that are told."""
     said = {(e.effect.site, e.effect.driver) for e in verdict.effects} | set(verdict.members)
-    return bool(said & {(h.site, h.driver) for e in told.alike for h in e.hypotheses})
+    return bool(said & {(h.site, h.driver) for h in explanation.hypotheses})
 
 
 def unless_much_is_left(compared: Comparison) -> Comparison:

@@ -20,9 +20,10 @@ from adaptive_flot.discovery.further_sites.places import further_sites, stays_in
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.innovations.thinning import searchable
-from adaptive_flot.discovery.results import Alternative, State
+from adaptive_flot.discovery.results import Alternative, Judgement, State
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.scope import Site
 
 
@@ -31,8 +32,9 @@ def unless_without_a_site(state: State) -> State:
 
     Only for a model that is small enough for the innovations form: a large one takes too long.
     """
-    state = _with_twins(state)
-    judged, (problem, result) = state.judged, state.searched
+    problem, result = state.searched
+    judged = state.judged if state.sentence else with_twins(result.base.model, state.judged)
+    state = replace(state, judgement=judged)
     best = judged.best
     told = judged.word in ("named", "class") and not state.contradiction and not state.sentence
     if not told or best is None or len(best.names) != 1 or judged.part or problem.background is not None:
@@ -52,25 +54,32 @@ def unless_without_a_site(state: State) -> State:
             judgement=replace(judged, word="abstain", members=()),
             contradiction=f"what has no site explains more, {as_if(words)}",
         )
-    of_a_class = judged.word == "class"
-    # what comes as near as the members of a class do is one of them
-    if not first.near(best, judged.margin if of_a_class else least):
+    # what comes as near as the farthest member of a class is one of them
+    members = judged.members if judged.word == "class" else best.names
+    others = (a for a in result.alternatives if len(a.names) == 1 and a.names[0] in members and judged.near(a))
+    farthest = max((a.worse_than(best) for a in others), default=0.0)
+    if not first.near(best, max(farthest, least)):
         return state
-    members = (*(judged.members if of_a_class else best.names), *first.names)
-    return replace(state, judgement=replace(judged, word="class", members=members, beside=words[0]))
+    judged = replace(judged, word="class", members=(*members, *first.names), beside=words[0])
+    return replace(state, judgement=judged)
 
 
-def _with_twins(state: State) -> State:
-    """The state; a name of several effects is a class where one of them does the same at another site.
+def with_twins(model: Model, judged: Judgement) -> Judgement:
+    """The judgement; a name of several effects is a class where one of them does the same at another site.
 
     A search beside the first effect has the others at that site only. What depends on the same as that one may make up
     for its shape: it is not told.
+
+    Parameters
+    ----------
+    model
+        The model as it is.
+    judged
+        What a free run tells.
     """
-    judged = state.judged
     best = judged.best
-    if judged.word != "named" or best is None or len(best.names) < 2 or state.sentence or judged.part:
-        return state
-    model = state.searched[1].base.model
+    if judged.word != "named" or best is None or len(best.names) < 2 or judged.part:
+        return judged
     alike = []
     for k, effect in enumerate(best.effects):
         for site in twins(model, effect):
@@ -78,14 +87,13 @@ def _with_twins(state: State) -> State:
                 names = (*best.names[:k], (site.name, effect.driver), *best.names[k + 1 :])
                 alike.append(replace(best, names=names))
     if not alike:
-        return state
+        return judged
     members = tuple(dict.fromkeys(name for a in (best, *alike) for name in a.names))
-    drivers = {driver for _, driver in members}
     changing = tuple(n for n in members if not all(n in a.names for a in (best, *alike)))
-    part = changing[:1] if len(drivers) == 1 and len(changing) < len(members) else ()
-    members = changing if part else members
-    judged = replace(judged, word="class", members=members, part=part, rivals=(*alike, *judged.rivals))
-    return replace(state, judgement=judged)
+    same_driver = len({driver for _, driver in members}) == 1
+    part = changing[:1] if same_driver and len(changing) < len(members) else ()
+    rivals = (*alike, *judged.rivals)
+    return replace(judged, word="class", members=changing if part else members, part=part, rivals=rivals)
 
 
 def _rivals(state: State) -> list[Alternative]:

@@ -215,6 +215,17 @@ def test_much_that_is_found_and_not_confirmed_is_not_nothing(word: str, fall: fl
     assert rivals.unconfirmed(given) == asked
 
 
+@pytest.mark.parametrize(("errs", "fall", "asked"), [(True, -60.0, True), (False, -60.0, False), (True, -40.0, False)])
+def test_less_is_asked_about_where_the_model_errs(
+    monkeypatch: pytest.MonkeyPatch, errs: bool, fall: float, asked: bool
+) -> None:
+    """A late thermometer left an error twice the noise, and was `none`: no alternative stood on fresh rows."""
+    monkeypatch.setattr(rivals, "leaves_too_much", lambda state, far: errs)
+    result = SimpleNamespace(alternatives=(SimpleNamespace(delta_bic=fall),))
+    given: Any = SimpleNamespace(judged=SimpleNamespace(word="none", best=None), searched=(None, result))
+    assert rivals.unconfirmed(given) == asked
+
+
 @pytest.mark.parametrize(
     ("site", "driver", "word"),
     [("loss", "air", "named"), ("thermometer", "power", "unnamed"), ("thermometer", "time", "named")],
