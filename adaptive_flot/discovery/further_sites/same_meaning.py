@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import passed_on
@@ -10,10 +11,9 @@ from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
-POINTS, WIDE = 24, 1e6
-"""Points at which the rates of a model are compared, and what stands for no limit of a quantity."""
-SMALL, SAME = 1e-4, 1e-6
-"""Size of a change, and the share of it from which two differ."""
+POINTS, WIDE, SAME = 24, 1e6, 1e-9
+"""Points at which the rates of a model are compared, what stands for no limit of a quantity, and the share of a change
+from which two differ."""
 
 
 def is_meant(model: Model, effect: Effect, place: str) -> bool:
@@ -60,19 +60,17 @@ def _does_the_same(model: Model, site: str, mode: Mode | None, place: str, place
 
 
 def _moves(model: Model, site: str, mode: Mode | None) -> FloatArray:
-    """How rates and outputs answer to a small change at a site (POINTS, nx + ny), by central differences."""
+    """How rates and outputs answer to a small change at a site (POINTS, nx + ny): their derivatives by its size."""
     ends = np.array([(q.lower, q.upper) for q in (*model.states, *model.inputs)])
     low, high = np.clip(ends.T, -WIDE, WIDE)
     points = np.random.default_rng(0).uniform(low, high, (POINTS, len(low)))
-    nx = len(model.states)
     changed = model.with_effects([Effect(site, "constant", "shift", {"amplitude": 0.0}, mode=mode)])
     k = changed.index("parameters", changed.effects[-1].parameter("amplitude"))
-    found = np.full((POINTS, nx + len(model.outputs)), np.nan)
-    for i, point in enumerate(points):
-        ways = []
-        for amplitude in (-SMALL, SMALL):
-            p = changed.parameter_values
-            p[k] = amplitude
-            ways.append(np.concatenate([np.array(v).ravel() for v in changed.ode(0.0, point[:nx], point[nx:], p)[:2]]))
-        found[i] = (ways[1] - ways[0]) / (2 * SMALL)
-    return found
+    x, u, p = (
+        ca.SX.sym(name, len(kind))
+        for name, kind in (("x", model.states), ("u", model.inputs), ("p", changed.parameters))
+    )
+    rates, outputs, *_ = changed.ode(0.0, x, u, p)
+    by = ca.Function("by", [x, u, p], [ca.densify(ca.jacobian(ca.vertcat(rates, outputs), p[k]))])
+    nx, values = len(model.states), changed.parameter_values
+    return np.array([np.array(by(point[:nx], point[nx:], values)).ravel() for point in points])

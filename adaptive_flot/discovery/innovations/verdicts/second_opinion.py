@@ -238,9 +238,8 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
 def _judgement(state: State, told: Told, best: Alternative) -> Judgement:
     """The word for what is told: as in free runs, a dependence that its site has no reason for has no name."""
     nameless = not all(_is_nameable(state.model, *name) for name in best.names)
-    members = (
-        tuple((h.site, h.driver) for h in told.effects) if told.open or told.beside else ()
-    )  # with what is certain
+    several = bool(told.open or told.beside)  # what is certain is in all of them
+    members = tuple((h.site, h.driver) for h in told.effects) if several else ()
     members += ((told.beside.place, told.beside.driver),) if told.beside else ()
     word: Word = "class" if told.word != "named" or told.beside else "unnamed" if nameless else "named"
     return Judgement(word, best, members, (), 0.0)

@@ -238,6 +238,6 @@ def test_a_dependence_that_its_site_has_no_reason_for_has_no_name_here_either(
     A feed by the concentration in the reactor was named as well, where no alternative of the free run had that pair.
     """
     state: Any = SimpleNamespace(model=model())
-    told: Any = SimpleNamespace(word="named", open=(), effects=())
+    told: Any = SimpleNamespace(word="named", open=(), effects=(), beside=None)
     best: Any = SimpleNamespace(names=((site, driver),))
     assert asking._judgement(state, told, best).word == word
