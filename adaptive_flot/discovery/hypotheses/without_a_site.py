@@ -15,7 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, further_sites, with_further_sites
+from adaptive_flot.discovery.further_sites.places import (
+    BALANCE,
+    LOSS,
+    further_sites,
+    stays_in_range,
+    with_further_sites,
+)
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
@@ -33,6 +39,8 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.greybox.model import Model
+
+LEAVES_MORE = ", and even so the errors stay above those of the reference"
 
 
 def unless_without_a_site(
@@ -81,14 +89,19 @@ def unless_without_a_site(
             return test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
 
     found = parallel_map(tested, _changes(model, base, rows), processes, lambda: None)
+
+    def change(t: Tested) -> tuple[str, float]:
+        assert t.hypothesis is not None  # each changes something at a place
+        return t.hypothesis.site, t.fit.value(t.hypothesis.effect.parameter("amplitude"))
+
     stand = (t for t in found if t is not None and stands(rows, blocks, null, t, usual.errors))
-    rivals = sorted(stand, key=lambda t: t.total)
+    possible = (t for t in stand if all(stays_in_range(model, record, *change(t)) for record in rows.records))
+    rivals = sorted(possible, key=lambda t: t.total)
     if not rivals:
         return judged
 
     def words(t: Tested) -> WithoutSite:
-        assert t.hypothesis is not None  # each adds an amount
-        amount, place = t.fit.value(t.hypothesis.effect.parameter("amplitude")), t.hypothesis.site
+        place, amount = change(t)
         said = change_in_words(model, place, amount, "", not constants.up_to_a_factor())
         return WithoutSite(place, "constant", said)
 
@@ -98,7 +111,8 @@ def unless_without_a_site(
     best, told = rivals[0], [judged.best, *judged.alike]
     if best.total < judged.best.total and not alike(best, told):
         near = (best, *alike(best, rivals[1:]))
-        return replace(judged, word="abstain", why=as_if([words(t).words for t in near]))
+        more = "" if usual.exceeded(best, rows.count, len(blocks.edges)) is None else LEAVES_MORE
+        return replace(judged, word="abstain", why=as_if([words(t).words for t in near]) + more)
     said = [t.hypothesis for t in told if t.hypothesis is not None]
     others = [t for t in rivals if t.hypothesis and not any(is_meant(model, h.effect, t.hypothesis.site) for h in said)]
     near = alike(judged.best, others)

@@ -189,11 +189,14 @@ def _outliers(values: FloatArray) -> float:
 
     Far is more than eight times the noise and more than what the signal itself does: fits bear smaller ones. The noise
     is judged by the quietest quarter of the deviations, since in a storm their median is wild. Davies & Gather, *J. Am.
-    Statist. Assoc.* 88 (1993) 782.
+    Statist. Assoc.* 88 (1993) 782. It must be as far from both samples beside it: what swings within NEIGHBOURS rows
+    has a median that stands still, and goes there step by step.
     """
     middle = median_filter(values, NEIGHBOURS, mode="nearest")
     away = np.abs(values - middle)
     noise = float(np.quantile(away, 0.25)) / QUARTER
+    step = np.abs(np.diff(values))
+    away = np.minimum(away, np.minimum(np.append(step, np.inf), np.append(np.inf, step)))
     return float(np.mean(away > max(8 * noise, float(np.quantile(middle, 0.9) - np.quantile(middle, 0.1)))))
 
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.record.screening import screen
+from adaptive_flot.discovery.record.screening import OUTLIER_SHARE, _outliers, screen
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Scope
 from tests.discovery.heated import Truth, changed, heated_tank, tank_record
@@ -50,6 +50,14 @@ def _dead(y: FloatArray) -> FloatArray:
 
 def _nothing(y: FloatArray) -> FloatArray:
     return np.full(len(y), np.nan)
+
+
+@given(st.floats(6.0, 40.0), st.floats(0.0, 4.0))
+def test_what_swings_fast_is_no_storm(rows: float, sharp: float) -> None:
+    """The acceleration of a hardening spring has narrow peaks: a healthy accelerometer was left out for them."""
+    angle = 2 * np.pi * np.arange(900) / rows
+    swing = np.sinh((1 + sharp) * np.sin(angle)) + 0.02 * np.random.default_rng(0).normal(size=900)
+    assert _outliers(swing) <= OUTLIER_SHARE
 
 
 @given(st.integers(0, 200), st.integers(250, 900))

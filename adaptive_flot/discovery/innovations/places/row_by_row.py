@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.further_sites.places import further_sites, with_further_sites
+from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
@@ -44,7 +44,9 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
         return told
     further = replace(search, model=with_further_sites(search.model))
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, left_out)
-    rivals = sorted(further.all_with(rest, _without_a_site(further, rest, event)), key=lambda e: -e.criterion)
+    found = further.all_with(rest, _without_a_site(further, rest, event))
+    possible = (e for e in found if stays_in_range(search.model, search.record, *_change(further, e)))
+    rivals = sorted(possible, key=lambda e: -e.criterion)
     if not rivals:
         return told
     if told_apart(further, base, rivals[0], told.best):
@@ -85,10 +87,15 @@ def _at(screening: Screening, site: Site, event: Hypothesis | None) -> Sequence[
     return [*screening.at_times_of(event, site), *([own] if own is not None else [])]
 
 
+def _change(further: Search, explanation: Explanation) -> tuple[str, float]:
+    """The place of an explanation, and its amount there."""
+    h, model = explanation.hypotheses[-1], further.model_of(explanation)
+    return h.site, float(model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value)
+
+
 def _words(further: Search, explanation: Explanation) -> str:
     """What acts where and when; how much, where the constants are known by which a rate is measured."""
-    h, model = explanation.hypotheses[-1], further.model_of(explanation)
+    h, (place, amount) = explanation.hypotheses[-1], _change(further, explanation)
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
-    amount = model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value
     measured = further.known is not None and not further.known.up_to_a_factor()
-    return change_in_words(model, h.site, amount, when, measured)
+    return change_in_words(further.model, place, amount, when, measured)
