@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import passed_on
-from adaptive_flot.discovery.further_sites.places import BALANCE, READING
+from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, READING
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -19,7 +19,7 @@ from which two differ."""
 def is_meant(model: Model, effect: Effect, place: str) -> bool:
     """Whether an effect says the same as a change at a further site.
 
-    An amount at a site that stands for one; an input that is asked of the actuator whose site it passes; and whatever
+    An amount at a site that stands for one, such as a leak that is none as yet; an input that is asked of the actuator whose site it passes; and whatever
     else in the process does the same to every state and output, as a capacity does. A drive that alone moves a mass
     does what another mass would do, but it does not mean that.
     """
@@ -29,8 +29,10 @@ def is_meant(model: Model, effect: Effect, place: str) -> bool:
         return passed_on(model).get(site.name) == place.removeprefix(READING)
     if site.role == "sensor":
         return False
-    if place.startswith(BALANCE) and mode == site.mode == "offset":
+    if mode == site.mode == "offset" and place.startswith(BALANCE):
         return True
+    if mode == site.mode == "offset" and place.startswith(LOSS):
+        return model.derived(_acts_on, site.name, place.removeprefix(LOSS))
     own = next(s.mode for s in model.sites if s.name == place)
     return site.role not in ("actuator", "feed") and model.derived(_does_the_same, site.name, mode, place, own)
 
@@ -43,6 +45,12 @@ def twins(model: Model, effect: Effect) -> tuple[Site, ...]:
     mode = effect.mode or next(s.mode for s in model.sites if s.name == effect.site)
     others = (s for s in model.sites if s.name != effect.site and s.role != "sensor")
     return tuple(s for s in others if model.derived(_does_the_same, s.name, mode, effect.site, mode))
+
+
+def _acts_on(model: Model, site: str, state: str) -> bool:
+    """Whether a site takes part in the balance of a state."""
+    moved = _moves(model, site, "offset")[:, model.index("states", state)]
+    return bool(np.any(np.isfinite(moved) & (moved != 0)))
 
 
 def _does_the_same(model: Model, site: str, mode: Mode | None, place: str, place_mode: Mode | None) -> bool:

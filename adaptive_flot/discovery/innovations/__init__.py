@@ -13,6 +13,7 @@ noise_fit.py        How large process and measurement noise are.
 refit.py            A model with effects, fitted.
 thinning.py         A long record with fewer rows.
 search.py           A few effects together.
+pauses.py           Events that stop for short pauses only.
 telling_apart.py    Whether the record tells one explanation from another.
 judge.py            What is certain, and what predicts rows that did not fit it.
 in_words.py         What is told, in words.

@@ -25,12 +25,13 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import is_short_since_reference
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
-from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend
+from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend, unless_hardly_off
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
@@ -140,7 +141,7 @@ def _row_by_row(
             return None
         if on_sites.word != told.word:
             compared = _with_words_without_a_site(compared, told, on_sites.why)
-        told = on_sites
+        told = unless_hardly_off(on_sites)
         with_it = compared
         if _has_event(told):
             with_it = with_event(compared, search, told)
@@ -269,7 +270,7 @@ def _with_process_noise(
         extended, record, columns, floor, constants.names, known, processes, since_reference=True, ends=ends
     )
     base = search.base(extended.parameter_values)
-    found = search.run(base, progress)
+    found = with_pauses_closed(search, search.run(base, progress))
     if search.time_is_up:
         return None
     before = replace(before, model=extended)

@@ -6,6 +6,7 @@ The processes are simulated here by Euler's rule, apart from the package.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -170,6 +171,21 @@ def test_a_capacity_says_what_its_place_says_and_a_heater_does_not() -> None:
     model = with_further_sites(block())
     shift = [Effect(site, "constant", "shift") for site in ("capacity", "heater", "loss", "thermometer")]
     assert [is_meant(model, e, "rate of temperature") for e in shift] == [True, False, False, False]
+
+
+def test_an_amount_at_a_site_that_stands_for_one_means_a_loss_of_its_own_state_alone() -> None:
+    """A leak that is none as yet, by the law of an orifice, is a loss from that vessel."""
+    plain = vessel()
+
+    def leaking(m: Scope) -> None:
+        plain.equations(m)
+        area = m.site("leak", ca.SX(0), "process", "offset", unit="-")
+        m.derivatives["pressure"] = m.derivatives["pressure"] - area * ca.sqrt(m.state("pressure"))
+
+    model = with_further_sites(replace(plain, equations=leaking))
+    leak, valve = (Effect(site, "constant", "shift", mode="offset") for site in ("leak", "valve"))
+    assert is_meant(model, leak, "loss of pressure") and is_meant(model, leak, "balance of pressure")
+    assert not is_meant(model, valve, "loss of pressure")
 
 
 def test_forces_that_add_up_are_twins_and_a_sensor_is_none() -> None:

@@ -11,6 +11,7 @@ from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.pauses import has_short_pause
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.telling_apart import NEAR
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
@@ -192,6 +193,20 @@ def unless_a_trend(base: Explanation, told: Told) -> Told:
     if told.word not in ("named", "class") or not lasting or told.best.criterion - base.criterion >= TREND:
         return told
     why = "a change that lasts to the end, and is so small, may be what wanders in the process"
+    return replace(told, word="abstain", certain=(), open=(), why=why)
+
+
+def unless_hardly_off(told: Told) -> Told:
+    """Nothing where an event is told that stops for short pauses only, which the record asks for.
+
+    What is switched off for 6 s between spells of 180 s is hardly switched. A lasting change of another form looks like
+    that: a ship whose inertia has doubled was told as a rudder, in five spells. Where what has no site is told beside
+    it, that is said already.
+    """
+    event = next((h for h in told.best.hypotheses if has_short_pause(h) and h in told.effects), None)
+    if told.word not in ("named", "class") or event is None or told.beside:
+        return told
+    why = f"{event.site} would be as usual only for short pauses, so that it stands in for something that lasts"
     return replace(told, word="abstain", certain=(), open=(), why=why)
 
 

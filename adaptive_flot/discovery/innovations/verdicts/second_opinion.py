@@ -19,6 +19,7 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
+from adaptive_flot.discovery.innovations.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.places import free_run
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -44,6 +45,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     unconfirmed,
     unexpected_drift,
     unless_a_trend,
+    unless_hardly_off,
     unless_it_wanders,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
@@ -87,7 +89,7 @@ def second_opinion(state: State) -> State:
     )
     with np.errstate(all="ignore"):
         base = search.base(before.model.parameter_values)
-        found = search.run(base, state.progress)
+        found = with_pauses_closed(search, search.run(base, state.progress))
         if search.time_is_up:
             return _not_asked(state)
         told = one_that_all_have(state, search, base, found, judge(search, base, found))
@@ -95,15 +97,16 @@ def second_opinion(state: State) -> State:
         on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return _not_asked(state)
-    if on_sites is not told:
-        state, told = _noted(state, on_sites.why), on_sites
+    if on_sites.word != told.word:
+        state = _noted(state, on_sites.why)
+    told = unless_hardly_off(on_sites)
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
     if asked.judged.word in TELLS or time.monotonic() > state.ends:
         return asked
     with np.errstate(all="ignore"):
         among = among_alternatives(state, search, base, found)
         if among is not None:  # what a balance explains better is not told by this way either
-            among = unless_without_a_site(search, base, _by_the_rules(state, search, base, among))
+            among = unless_hardly_off(unless_without_a_site(search, base, _by_the_rules(state, search, base, among)))
     if among is None or among.word not in TELLS:
         return asked
     return _told(state, search, base, among, among=True)
