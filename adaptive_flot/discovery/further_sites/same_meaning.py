@@ -19,7 +19,7 @@ from which two differ."""
 def is_meant(model: Model, effect: Effect, place: str) -> bool:
     """Whether an effect says the same as a change at a further site.
 
-    An amount at a site that stands for one, such as a leak that is none as yet; an input that is asked of the actuator whose site it passes; and whatever
+    An amount at a site that stands for one; an input that is asked of the actuator whose site it passes; and whatever
     else in the process does the same to every state and output, as a capacity does. A drive that alone moves a mass
     does what another mass would do, but it does not mean that.
     """
