@@ -100,8 +100,28 @@ def test_only_what_is_there_all_the_time_speaks_for_a_name(
     compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
     base: Any = SimpleNamespace(criterion=10.0)
     there = SimpleNamespace(site="pump", kind=kind)
-    found: Any = SimpleNamespace(alike=(SimpleNamespace(hypotheses=(there,), criterion=10.0 + gain),))
+    best = SimpleNamespace(hypotheses=(there,), criterion=10.0 + gain)
+    found: Any = SimpleNamespace(alike=(best,), best=best)
     assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("gain", "most", "stays"), [(360.0, 980.0, False), (360.0, 500.0, True), (20.0, 25.0, False)])
+def test_another_part_must_not_explain_far_more(
+    monkeypatch: pytest.MonkeyPatch, gain: float, most: float, stays: bool
+) -> None:
+    """A healthy pipeline at another load was a class of two valves at their limits: a meter explains three times more."""
+    said: list[str] = []
+    monkeypatch.setattr(supported, "_gain", lambda *given: gain)
+    monkeypatch.setattr(supported, "taken_back", lambda compared, why: said.append(why))
+    verdict = SimpleNamespace(word="named", effects=(SimpleNamespace(effect=SimpleNamespace(site="pump")),), members=())
+    compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
+    base: Any = SimpleNamespace(criterion=10.0)
+    best = SimpleNamespace(
+        hypotheses=(SimpleNamespace(site="meter", kind="span", label="meter span"),), criterion=10 + most
+    )
+    found: Any = SimpleNamespace(alike=(best,), best=best)
+    assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
+    assert stays or ("meter span explains far more" in said[0]) == (gain > supported.SUPPORT)
 
 
 @pytest.mark.parametrize(
