@@ -109,7 +109,7 @@ def test_only_what_is_there_all_the_time_speaks_for_a_name(
 def test_another_part_must_not_explain_far_more(
     monkeypatch: pytest.MonkeyPatch, gain: float, most: float, stays: bool
 ) -> None:
-    """A healthy pipeline at another load was a class of two valves at their limits: a meter explains three times more."""
+    """A healthy pipeline at another load was a class of two parts at their limits: a meter explains much more."""
     said: list[str] = []
     monkeypatch.setattr(supported, "_gain", lambda *given: gain)
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: said.append(why))
