@@ -16,8 +16,8 @@ POINTS, WIDE, SAME = 24, 1e6, 1e-9
 from which two differ."""
 
 
-def is_meant(model: Model, effect: Effect, place: str) -> bool:
-    """Whether an effect says the same as a change at a further site.
+def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = False) -> bool:
+    """Whether an effect says the same as a change at a further site; or does the same, whatever it says.
 
     An amount at a site that stands for one; an input that is asked of the actuator whose site it passes; and whatever
     else in the process does the same to every state and output, as a capacity does. A drive that alone moves a mass
@@ -34,7 +34,8 @@ def is_meant(model: Model, effect: Effect, place: str) -> bool:
     if mode == site.mode == "offset" and place.startswith(LOSS):
         return model.derived(_acts_on, site.name, place.removeprefix(LOSS))
     own = next(s.mode for s in model.sites if s.name == place)
-    return site.role not in ("actuator", "feed") and model.derived(_does_the_same, site.name, mode, place, own)
+    means = does_the_same or site.role not in ("actuator", "feed")
+    return means and model.derived(_does_the_same, site.name, mode, place, own)
 
 
 def twins(model: Model, effect: Effect) -> tuple[Site, ...]:

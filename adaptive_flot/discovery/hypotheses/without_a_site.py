@@ -114,7 +114,13 @@ def unless_without_a_site(
         more = "" if usual.exceeded(best, rows.count, len(blocks.edges)) is None else LEAVES_MORE
         return replace(judged, word="abstain", why=as_if([words(t).words for t in near]) + more)
     said = [t.hypothesis for t in told if t.hypothesis is not None]
-    others = [t for t in rivals if t.hypothesis and not any(is_meant(model, h.effect, t.hypothesis.site) for h in said)]
+    is_open = len({h.site for h in said}) > 1  # what does the same as a member of a class adds nothing to it
+
+    def adds(t: Tested) -> bool:
+        place = change(t)[0]
+        return not any(is_meant(model, h.effect, place, does_the_same=is_open) for h in said)
+
+    others = [t for t in rivals if adds(t)]
     near = alike(judged.best, others)
     return replace(judged, beside=words(near[0])) if near else judged
 

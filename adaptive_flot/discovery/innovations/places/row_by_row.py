@@ -52,9 +52,13 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     if told_apart(further, base, rivals[0], told.best):
         near = _best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
         return replace(told, word="abstain", certain=(), open=(), why=as_if([_words(further, e) for e in near]))
-    others = [
-        e for e in rivals if not any(is_meant(further.model, h.effect, e.hypotheses[-1].site) for h in told.effects)
-    ]
+    is_open = len({h.site for h in told.effects}) > 1  # what does the same as a member of a class adds nothing to it
+
+    def adds(e: Explanation) -> bool:
+        place = e.hypotheses[-1].site
+        return not any(is_meant(further.model, h.effect, place, does_the_same=is_open) for h in told.effects)
+
+    others = [e for e in rivals if adds(e)]
     one_of_them = told.word == "named" or not told.certain
     if not one_of_them or not others or told_apart(further, base, told.best, others[0]):
         return told
