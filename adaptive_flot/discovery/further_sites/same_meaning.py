@@ -25,8 +25,8 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
     """
     site = next(s for s in model.sites if s.name == effect.site)
     mode = effect.mode or site.mode
-    if place.startswith(READING):
-        return passed_on(model).get(site.name) == place.removeprefix(READING)
+    if place.startswith(READING) and passed_on(model).get(site.name) == place.removeprefix(READING):
+        return True
     if site.role == "sensor":
         return False
     if mode == site.mode == "offset" and place.startswith(BALANCE):
@@ -34,6 +34,8 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
     if mode == site.mode == "offset" and place.startswith(LOSS):
         return model.derived(_acts_on, site.name, place.removeprefix(LOSS))
     own = next(s.mode for s in model.sites if s.name == place)
+    if place.startswith(READING) and not (does_the_same or mode == site.mode == "offset"):
+        return False
     means = does_the_same or site.role not in ("actuator", "feed")
     return means and model.derived(_does_the_same, site.name, mode, place, own)
 

@@ -188,6 +188,23 @@ def test_an_amount_at_a_site_that_stands_for_one_means_a_loss_of_its_own_state_a
     assert not is_meant(model, valve, "loss of pressure")
 
 
+def test_an_amount_of_heat_at_its_own_site_is_no_power_that_is_read_wrongly() -> None:
+    """A box with a site for heat that nobody counts: that the power is another does the same, and is not said."""
+    plain = block()
+
+    def with_heat(m: Scope) -> None:
+        plain.equations(m)
+        heat = m.site("other_heat", ca.SX(0), "process", "offset", unit="W")
+        m.derivatives["temperature"] = m.derivatives["temperature"] + heat / CAPACITY
+
+    model = with_further_sites(replace(plain, equations=with_heat))
+    heat, loss = (Effect(site, "constant", "shift", mode="offset") for site in ("other_heat", "loss"))
+    assert is_meant(model, heat, "reading of heating")
+    assert not is_meant(model, loss, "reading of heating")
+    # of a class that is open anyway, what does the same adds nothing
+    assert is_meant(model, loss, "reading of heating", does_the_same=True)
+
+
 def test_forces_that_add_up_are_twins_and_a_sensor_is_none() -> None:
     curve = Effect("damper", "position", "curve", settings={"knots": (-0.5, 0.5)}, mode="offset")
     assert [s.name for s in twins(drive(), curve)] == ["drive", "spring"]

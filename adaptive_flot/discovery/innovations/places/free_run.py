@@ -34,7 +34,7 @@ def unless_without_a_site(state: State) -> State:
     """
     problem, result = state.searched
     judged = state.judged if state.sentence else with_twins(result.base.model, state.judged)
-    state = replace(state, judgement=judged)
+    state = state if judged is state.judged else replace(state, judgement=judged)
     best = judged.best
     told = judged.word in ("named", "class") and not state.contradiction and not state.sentence
     if not told or best is None or len(best.names) != 1 or judged.part or problem.background is not None:

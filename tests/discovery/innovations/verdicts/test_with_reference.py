@@ -66,6 +66,7 @@ class Compared:
     [
         (1.2, 0.9, (), "abstain"),  # hardly above the reference, and not confirmed
         (1.2, 0.9, ("gauge",), "named"),  # confirmed
+        (1.2, 0.9, ("gauge", "open"), "named"),  # it is in the best explanation, though others are as good
         (5.0, 1.1, (), "named"),  # far above the reference, and brought down to it
         (5.0, 2.2, (), "abstain"),  # far more is left than the reference has, and nothing else speaks for it
         (5.0, 2.2, ("gauge",), "named"),
@@ -81,9 +82,14 @@ def test_a_name_of_the_comparison_is_taken_back_where_the_innovations_form_does_
     compared: Any = Compared(
         Verdict(word="named", reason="Gauge shows more.", effects=(effect,), members=(), error=error, split="fresh")
     )
-    found = tuple(SimpleNamespace(site=s, label=s, driver="time") for s in sites)
+    is_open = "open" in sites
+    found = tuple(SimpleNamespace(site=s, label=s, driver="time") for s in sites if s != "open")
+    best = SimpleNamespace(hypotheses=found)
     told: Any = SimpleNamespace(
-        word="named" if sites else "none", effects=found, alike=(SimpleNamespace(hypotheses=found),)
+        word="abstain" if is_open else "named" if sites else "none",
+        effects=() if is_open else found,
+        alike=(best,),
+        best=best,
     )
     assert unless_contradicted(compared, told).verdict.word == word
 
