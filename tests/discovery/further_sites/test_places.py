@@ -218,10 +218,10 @@ def test_an_input_stays_within_its_range() -> None:
     assert not stays_in_range(model, data, "reading of room", -25.0)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_another_capacity_is_no_weak_heater_for_sure(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "processes"), [(0, 1), (1, 2)])
+def test_another_capacity_is_no_weak_heater_for_sure(seed: int, processes: int) -> None:
     """With the conductance free both are the same. Before, "heater is 33 % less than was asked" was named."""
-    found = discover(block(with_capacity=False), heated(seed, 1.5 * CAPACITY)).verdict
+    found = discover(block(with_capacity=False), heated(seed, 1.5 * CAPACITY), processes=processes).verdict
     assert found.word == "class"
     assert found.members == (("heater", "constant"), ("rate of temperature", "constant"))
     assert "what stores temperature (a capacity, a volume or a mass) were 1.5 times as large" in found.reason

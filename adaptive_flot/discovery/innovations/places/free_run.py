@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.candidates.catalogue import nameable
+from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
@@ -24,7 +26,6 @@ from adaptive_flot.discovery.results import Alternative, Judgement, State
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.scope import Site
 
 
 def unless_without_a_site(state: State) -> State:
@@ -103,17 +104,20 @@ def _rivals(state: State) -> list[Alternative]:
     base, model = result.base, with_further_sites(result.base.model)
     told = judged.best.effects[0]
 
-    def fitted(site: Site) -> Alternative | None:
-        effect = Effect(site.name, "constant", "shift", mode=site.mode)
-        extended = model.with_effects([effect])
-        fit = Fitter(problem).fit(extended, (effect.parameter("amplitude"),), like=base)
-        if fit is None or not stays_in_range(model, problem.record, site.name, fit.values[-1]):
-            return None
-        return Alternative(((site.name, "constant"),), (False,), fit, base.loss - fit.loss, fit.bic - base.bic)
+    sites = [s for s in further_sites(model) if not is_meant(model, told, s.name)]
+    effects = [Effect(s.name, "constant", "shift", mode=s.mode) for s in sites]
 
-    with np.errstate(all="ignore"):
-        sites = [s for s in further_sites(model) if not is_meant(model, told, s.name)]
-        found = [a for a in parallel_map(fitted, sites, state.processes) if a is not None]
+    def fitted(effect: Effect) -> Fit | None:
+        with np.errstate(all="ignore"):
+            return Fitter(problem).fit(model.with_effects([effect]), (effect.parameter("amplitude"),), like=base)
+
+    found = []
+    for effect, own in zip(effects, parallel_map(fitted, effects, state.processes), strict=True):
+        if own is None or not stays_in_range(model, problem.record, effect.site, own.values[-1]):
+            continue
+        fit = own.with_model(partial(model.with_effects, [effect]))
+        place = ((effect.site, "constant"),)
+        found.append(Alternative(place, (False,), fit, base.loss - fit.loss, fit.bic - base.bic))
     found = [a for a in found if a.delta_bic < -LEAST_MARGIN]
     if not found:
         return []
