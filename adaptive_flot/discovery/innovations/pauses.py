@@ -39,7 +39,8 @@ def without_short_pauses(search: Search, explanation: Explanation) -> Explanatio
         return explanation
     whole, rest = _whole(parted), search.without(explanation, parted)
     model, extended = search.model_of(explanation), model_with(search.model_of(rest), whole)
-    known = {q.name: q.value for q in model.parameters}
+    held = {whole.effect.parameter(c) for c in whole.effect.coefficients} - set(whole.parameters)  # its times
+    known = {q.name: q.value for q in model.parameters if q.name not in held}
     p = np.array([known.get(q.name, q.value) for q in extended.parameters])
     again = search.added(rest, whole, p)
     return again if again.criterion > explanation.criterion - LEAST_GAIN else explanation
