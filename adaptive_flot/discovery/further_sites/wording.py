@@ -56,5 +56,10 @@ def as_if(words: Sequence[str]) -> str:
     return f"{'; or '.join(f'as if {w}' for w in words[:MOST_SAID])}: {NO_SITE}"
 
 
+def too_many(parts: int, words: str) -> str:
+    """Why nothing is told where so many parts, and what acts at a further place, explain as much."""
+    return f"{parts} parts explain it about as well, or it is as if {words}"
+
+
 def _plain(name: str) -> str:
     return name.replace("_", " ")

@@ -23,7 +23,7 @@ from adaptive_flot.discovery.further_sites.places import (
     with_further_sites,
 )
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
-from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
+from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words, too_many
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, stands, tied
 from adaptive_flot.discovery.hypotheses.cross_validation import (
@@ -36,7 +36,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
 from adaptive_flot.discovery.hypotheses.families import Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
-from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, WithoutSite
+from adaptive_flot.discovery.hypotheses.judgement import LARGEST_CLASS, Judged, UsualLoss, WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.greybox.model import Model
 
@@ -122,6 +122,8 @@ def unless_without_a_site(
 
     others = [t for t in rivals if adds(t)]
     near = alike(judged.best, others)
+    if near and len(judged.parts) >= LARGEST_CLASS:
+        return replace(judged, word="abstain", why=too_many(len(judged.parts), words(near[0]).words))
     return replace(judged, beside=words(near[0])) if near else judged
 
 

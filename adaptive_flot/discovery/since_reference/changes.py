@@ -19,6 +19,7 @@ import numpy as np
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_words
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE, Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
@@ -139,7 +140,7 @@ def _row_by_row(
         on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return None
-        if on_sites.word != told.word:
+        if on_sites.word != told.word and NO_SITE in on_sites.why:
             compared = _with_words_without_a_site(compared, told, on_sites.why)
         told = unless_hardly_off(on_sites)
         with_it = compared

@@ -15,7 +15,8 @@ import pytest
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
-from adaptive_flot.discovery.further_sites.wording import change_in_words
+from adaptive_flot.discovery.further_sites.wording import NO_SITE, change_in_words
+from adaptive_flot.discovery.hypotheses import without_a_site
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.effects import Effect
@@ -235,6 +236,19 @@ def test_since_a_reference_gas_that_is_lost_is_no_gauge_for_sure(seed: int) -> N
     said = re.search(r"pressure lost (\S+) % of itself every second", found.reason)
     assert said is not None, found.reason
     assert float(said[1]) == pytest.approx(0.1, rel=0.05)
+
+
+def test_beside_three_parts_what_has_no_site_makes_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A healthy spring was a class of three parts and one place. So many explain as much that nothing is told."""
+    new, old = gas(11, leak=1e-3), gas(1)
+    alone = compare(vessel(), [new], [old])
+    assert NO_SITE in alone.verdict.reason
+    monkeypatch.setattr(without_a_site, "tied", lambda blocks, null, best, others, adequate: tuple(others))
+    for most, word in ((1, "abstain"), (9, "class")):
+        monkeypatch.setattr(without_a_site, "LARGEST_CLASS", most)
+        found = compare(vessel(), [new], [old]).verdict
+        assert found.word == word
+        assert (", or it is as if pressure lost" in found.reason or "parts explain it" in found.reason) == (most == 1)
 
 
 def test_since_a_reference_a_gauge_that_shows_too_much_is_one() -> None:

@@ -23,7 +23,7 @@ from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.results import Alternative, Judgement, State
-from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
+from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 
@@ -61,6 +61,8 @@ def unless_without_a_site(state: State) -> State:
     farthest = max((a.worse_than(best) for a in others), default=0.0)
     if not first.near(best, max(farthest, least)):
         return state
+    if len(members) >= LARGEST_CLASS:
+        return replace(state, judgement=replace(judged, word="abstain", members=()))
     judged = replace(judged, word="class", members=(*members, *first.names), beside=words[0])
     return replace(state, judgement=judged)
 

@@ -14,10 +14,10 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
-from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
+from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words, too_many
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
-from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
@@ -62,6 +62,9 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     one_of_them = told.word == "named" or not told.certain
     if not one_of_them or not others or told_apart(further, base, told.best, others[0]):
         return told
+    if len(told.open) >= LARGEST_CLASS:
+        why = too_many(len(told.open), _words(further, others[0]))
+        return replace(told, word="abstain", certain=(), open=(), why=why)
     beside = others[0].hypotheses[-1]
     return replace(told, beside=WithoutSite(beside.site, beside.driver, _words(further, others[0])))
 

@@ -15,6 +15,7 @@ import numpy as np
 from adaptive_flot.discovery.candidates.catalogue import nameable
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
@@ -97,7 +98,7 @@ def second_opinion(state: State) -> State:
         on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return _not_asked(state)
-    if on_sites.word != told.word:
+    if on_sites.word != told.word and NO_SITE in on_sites.why:
         state = _noted(state, on_sites.why)
     told = unless_hardly_off(on_sites)
     asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
