@@ -221,7 +221,8 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         both = beside_alternatives(state, search, base, told)
         if both is None:
             return _kept(state, told) if names_one_of(state.judged, told) else _taken_back(state, _other_name(told))
-        told, judgement = both, _judgement(state, both, best)
+        told = with_what_stood_beside(both, told)
+        judgement = _judgement(state, told, best)
     _, result = state.searched
     members = [e for e, _ in told.open]
     rivals = others(told.best, members, lambda e: _free_run(state, search, e, before), before)
@@ -237,6 +238,15 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside else "",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
+
+
+def with_what_stood_beside(both: Told, before: Told) -> Told:
+    """What is told beside alternatives, with what had explained as much where the model has no site.
+
+    Not where a part is certain, and one of others open: the place stood beside that part.
+    """
+    is_part = both.word == "class" and bool(both.certain)
+    return both if before.beside is None or is_part else replace(both, beside=before.beside)
 
 
 def _judgement(state: State, told: Told, best: Alternative) -> Judgement:

@@ -1,12 +1,13 @@
 """When the innovations form is asked, and what its name must beat: judgements that are given, not searched."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
@@ -213,6 +214,21 @@ def test_much_that_is_found_and_not_confirmed_is_not_nothing(word: str, fall: fl
     result = SimpleNamespace(alternatives=(SimpleNamespace(delta_bic=fall), SimpleNamespace(delta_bic=3.0)))
     given: Any = SimpleNamespace(judged=SimpleNamespace(word=word, best=None), searched=(None, result))
     assert rivals.unconfirmed(given) == asked
+
+
+@pytest.mark.parametrize(
+    ("word", "certain", "kept"), [("named", ("pump",), True), ("class", (), True), ("class", ("pump",), False)]
+)
+def test_what_has_no_site_stays_beside_a_name_that_alternatives_leave(
+    word: Any, certain: tuple[str, ...], kept: bool
+) -> None:
+    """Else what a place explains as well would be a name again, once it has been compared with the free run's."""
+    place = WithoutSite("balance of level", "time", "something adds to the balance of level")
+    best: Any = SimpleNamespace(hypotheses=())
+    before = Told("named", best, (), (), (best,), "", place)
+    both = Told(word, best, certain, (), (best,), "")  # type: ignore[arg-type]
+    assert asking.with_what_stood_beside(both, before).beside == (place if kept else None)
+    assert asking.with_what_stood_beside(both, replace(before, beside=None)) is both
 
 
 @pytest.mark.parametrize(("errs", "fall", "asked"), [(True, -60.0, True), (False, -60.0, False), (True, -40.0, False)])
