@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
+from adaptive_flot.discovery.innovations.places.free_run import compare_with_what_has_no_site
 from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
 from adaptive_flot.discovery.later_inputs import with_later_inputs
 from adaptive_flot.discovery.record.screening import Screening
@@ -194,6 +195,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     tell_part_alone,
     tell_background,
     second_opinion,
+    compare_with_what_has_no_site,
     plan_test,
     conclude,
 )

@@ -81,7 +81,7 @@ def loss_size(state: Quantity) -> float:
 
 def further_sites(model: Model) -> tuple[Site, ...]:
     """The further sites of such a model."""
-    return tuple(s for s in model.sites if is_further(s.name))
+    return tuple(s for s in model.sites if s.name.startswith((BALANCE, LOSS, RATE, READING)))
 
 
 def stays_in_range(model: Model, record: Dataset, place: str, amount: float) -> bool:
@@ -91,8 +91,3 @@ def stays_in_range(model: Model, record: Dataset, place: str, amount: float) -> 
     i = model.index("inputs", place.removeprefix(READING))
     low, high = np.nanquantile(record.inputs[:, i], (0.05, 0.95)) + amount
     return bool(model.inputs[i].lower <= low and high <= model.inputs[i].upper)
-
-
-def is_further(site: str) -> bool:
-    """Whether a site is one of these places, by its name."""
-    return site.startswith((BALANCE, LOSS, RATE, READING))

@@ -23,21 +23,21 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
     else in the process does the same to every state and output, as a capacity does. A drive that alone moves a mass
     does what another mass would do, but it does not mean that.
     """
-    site = next(s for s in model.sites if s.name == effect.site)
+    site = _site(model, effect.site)
     mode = effect.mode or site.mode
     if place.startswith(READING) and passed_on(model).get(site.name) == place.removeprefix(READING):
         return True
     if site.role == "sensor":
         return False
-    if mode == site.mode == "offset" and place.startswith(BALANCE):
+    is_amount = mode == site.mode == "offset"
+    if is_amount and place.startswith(BALANCE):
         return True
-    if mode == site.mode == "offset" and place.startswith(LOSS):
-        return model.derived(_acts_on, site.name, place.removeprefix(LOSS))
-    own = next(s.mode for s in model.sites if s.name == place)
-    if place.startswith(READING) and not (does_the_same or mode == site.mode == "offset"):
+    if is_amount and place.startswith(LOSS):
+        moved = _moves(model, site.name, mode)[:, model.index("states", place.removeprefix(LOSS))]
+        return bool(np.any(np.isfinite(moved) & (moved != 0)))
+    if not does_the_same and (site.role in ("actuator", "feed") or (place.startswith(READING) and not is_amount)):
         return False
-    means = does_the_same or site.role not in ("actuator", "feed")
-    return means and model.derived(_does_the_same, site.name, mode, place, own)
+    return _are_the_same(_moves(model, site.name, mode), _moves(model, place, _site(model, place).mode))
 
 
 def twins(model: Model, effect: Effect) -> tuple[Site, ...]:
@@ -45,23 +45,18 @@ def twins(model: Model, effect: Effect) -> tuple[Site, ...]:
 
     So do forces that add up: what depends on the position may be the spring, the damper or the drive.
     """
-    mode = effect.mode or next(s.mode for s in model.sites if s.name == effect.site)
+    mode = effect.mode or _site(model, effect.site).mode
+    own = _moves(model, effect.site, mode)
     others = (s for s in model.sites if s.name != effect.site and s.role != "sensor")
-    return tuple(s for s in others if model.derived(_does_the_same, s.name, mode, effect.site, mode))
+    return tuple(s for s in others if _are_the_same(_moves(model, s.name, mode), own))
 
 
-def _acts_on(model: Model, site: str, state: str) -> bool:
-    """Whether a site takes part in the balance of a state."""
-    moved = _moves(model, site, "offset")[:, model.index("states", state)]
-    return bool(np.any(np.isfinite(moved) & (moved != 0)))
+def _site(model: Model, name: str) -> Site:
+    return next(s for s in model.sites if s.name == name)
 
 
-def _does_the_same(model: Model, site: str, mode: Mode | None, place: str, place_mode: Mode | None) -> bool:
-    """Whether small changes at a site and at a place move rates and outputs in one proportion, at random points.
-
-    The points lie within the ranges of states and inputs. Those where the model has no value are left out.
-    """
-    one, two = _moves(model, site, mode), _moves(model, place, place_mode)
+def _are_the_same(one: FloatArray, two: FloatArray) -> bool:
+    """Whether two changes move rates and outputs (POINTS, nx + ny) in one proportion, where the model has values."""
     known = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
     one, two = one[known], two[known]
     if known.sum() < POINTS // 4 or not np.any(one) or not np.any(two):
@@ -70,8 +65,11 @@ def _does_the_same(model: Model, site: str, mode: Mode | None, place: str, place
     return bool(np.abs(one - factor * two).max() <= SAME * np.abs(one).max())
 
 
-def _moves(model: Model, site: str, mode: Mode | None) -> FloatArray:
-    """How rates and outputs answer to a small change at a site (POINTS, nx + ny): their derivatives by its size."""
+def _moves(model: Model, site: str, mode: Mode) -> FloatArray:
+    """How rates and outputs answer to a small change at a site (POINTS, nx + ny): their derivatives by its size.
+
+    The points are random, within the ranges of states and inputs.
+    """
     ends = np.array([(q.lower, q.upper) for q in (*model.states, *model.inputs)])
     low, high = np.clip(ends.T, -WIDE, WIDE)
     points = np.random.default_rng(0).uniform(low, high, (POINTS, len(low)))

@@ -179,9 +179,10 @@ class Search:
         refits = self.all_with(start, _spread(screened))
         if self.since_reference and not start.hypotheses:
             held = self._held(start)
-            beside = self._screened(held)[1]
+            _, beside = self._screened(held)
             constant = [s for s in beside if s.suspect.hypothesis.kind in CONSTANT and s.gain >= LEAST_GAIN]
-            refits += self.all_with(start, list({id(s): s for s in (*_spread(beside), *constant)}.values()), held)
+            spread = [s for s in _spread(beside) if not any(s is c for c in constant)]
+            refits += self.all_with(start, [*spread, *constant], held)
         switched = [e for e in refits if e.hypotheses[-1].kind == "switch"]
         if switched:
             switch = max(switched, key=lambda e: e.criterion).hypotheses[-1]

@@ -21,6 +21,7 @@ from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.stepping.record import RecordSimulator
+from tests.discovery.whole_records.test_hardening_spring import oscillator
 
 DT, ROWS, NOISE = 10.0, 800, 0.05
 POWER, CONDUCTANCE, CAPACITY = 100.0, 2.2, 2000.0
@@ -101,32 +102,7 @@ def gas(seed: int, leak: float = 0.0) -> Dataset:
     return Dataset("vessel", DT * np.arange(ROWS, dtype=float), DT, opening[:, None], seen[:, None])
 
 
-def drive() -> Model:
-    """A mass on a spring with a damper and a drive: three forces that add up."""
-
-    def equations(m: Scope) -> None:
-        position, speed = m.state("position"), m.state("speed")
-        force = m.site("drive", m.parameter("gain") * m.input("voltage"), "actuator", "offset", unit="N")
-        spring = m.site("spring", 20.0 * position, "process", "offset", unit="N")
-        damper = m.site("damper", 3.0 * speed, "process", "offset", unit="N")
-        m.derivative("position", speed)
-        m.derivative("speed", force - spring - damper)
-        m.output("encoder", m.site("encoder", position, "sensor", "offset", unit="m"))
-
-    return Model(
-        name="drive",
-        states=(Quantity("position", "m", "", -1.0, 1.0), Quantity("speed", "m/s", "", -5.0, 5.0)),
-        inputs=(Quantity("voltage", "V", "", -5.0, 5.0),),
-        parameters=(Parameter("gain", 1.0, "N/V", "", "", 0.1, 10.0, 0.2, role="estimated"),),
-        outputs=(Quantity("encoder", "m", "", -1.0, 1.0),),
-        equations=equations,
-        max_step_s=0.01,
-        initial_guess={"position": 0.0, "speed": 0.0},
-        starts_steady=False,
-    )
-
-
-@pytest.mark.parametrize("model", [block(), vessel(), drive()])
+@pytest.mark.parametrize("model", [block(), vessel(), oscillator()])
 def test_a_model_with_further_sites_gives_the_same_run(model: Model) -> None:
     """Reduction: without an effect nothing has changed."""
     rng = np.random.default_rng(0)
@@ -140,7 +116,7 @@ def test_a_model_with_further_sites_gives_the_same_run(model: Model) -> None:
 
 
 def test_what_has_no_store_or_no_zero_has_no_such_place() -> None:
-    names = {s.name for s in further_sites(with_further_sites(drive()))}
+    names = {s.name for s in further_sites(with_further_sites(oscillator()))}
     assert "rate of position" not in names and "rate of speed" in names  # a position is moved by its speed alone
     assert "loss of temperature" not in {s.name for s in further_sites(with_further_sites(block()))}  # degC
     assert "loss of pressure" in {s.name for s in further_sites(with_further_sites(vessel()))}
@@ -208,8 +184,10 @@ def test_an_amount_of_heat_at_its_own_site_is_no_power_that_is_read_wrongly() ->
 
 def test_forces_that_add_up_are_twins_and_a_sensor_is_none() -> None:
     curve = Effect("damper", "position", "curve", settings={"knots": (-0.5, 0.5)}, mode="offset")
-    assert [s.name for s in twins(drive(), curve)] == ["drive", "spring"]
-    assert not twins(drive(), Effect("encoder", "position", "curve", settings={"knots": (-0.5, 0.5)}, mode="offset"))
+    assert [s.name for s in twins(oscillator(), curve)] == ["drive", "spring"]
+    assert not twins(
+        oscillator(), Effect("sensor", "position", "curve", settings={"knots": (-0.5, 0.5)}, mode="offset")
+    )
 
 
 def test_an_input_stays_within_its_range() -> None:

@@ -28,10 +28,11 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 
 
-def unless_without_a_site(state: State) -> State:
-    """The state; its name or class taken back, or with one more member, where a place without a site asks for that.
+def compare_with_what_has_no_site(state: State) -> State:
+    """Take a name or a class of the free run back, or add a member to it, where a place without a site asks for that.
 
-    Only for a model that is small enough for the innovations form: a large one takes too long.
+    What the innovations form tells has been compared already. Only for a model that is small enough for that form: a
+    large one takes too long.
     """
     problem, result = state.searched
     judged = state.judged if state.sentence else with_twins(result.base.model, state.judged)

@@ -1,10 +1,9 @@
-"""What is told at a site, beside what acts where the model has none: on the balance of a state, on an input.
+"""What the innovations form tells at a site, beside what acts where the model has none: see `further_sites.places`.
 
 A probe that shows 15 % less for an hour, and fresh water that nobody measures, look alike to a model that has a site
 for the first alone. Their edges differ: what a sensor shows changes at once, and a basin takes its time. So before an
-event is told, an amount of its own is put into the balance of each state in turn, and added to each input. Where one of
-these explains the record better, the model has no place for what has happened. Since a reference, a cause of the whole
-record is compared with a constant amount in the same way.
+event is told, one is tried at each further place, at its times and at times of its own. A cause of the whole record is
+compared with a constant change there.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ def _best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
 
 
 def _without_a_site(further: Search, rest: Explanation, event: Hypothesis | None) -> list[Screened]:
-    """An amount at each balance and input: at the times of the event, and at its own; without one, all the time."""
+    """A change at each further place: at the times of the event, and at its own; without one, all the time."""
     sites = further_sites(further.model)
     screening = further.screening(rest, [s.name for s in sites])
     return [s for site in sites for s in _at(screening, site, event)]

@@ -21,7 +21,6 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.pauses import with_pauses_closed
-from adaptive_flot.discovery.innovations.places import free_run
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.thinning import searchable
@@ -73,7 +72,7 @@ def second_opinion(state: State) -> State:
     given = replace(problem.record, initial_state=before.initial_state)
     record = searchable(given, before.model) if is_asked(state) else None
     if record is None:
-        return free_run.unless_without_a_site(state)
+        return state
     if time.monotonic() > state.ends:
         return _not_asked(state)
     state.progress("ask the innovations form")
