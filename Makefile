@@ -76,11 +76,11 @@ bench-live: $(READY) ## The live link under faults: unsafe writes, lost rows, ti
 	@$(BIN)/python -m benchmarks.live $(BENCH_ARGS)
 
 bench-lanes: $(READY) ## Many members side by side, beside SciPy and (BENCH_ARGS="--jax PYTHON") JAX (minutes)
-	@$(BIN)/python -m benchmarks.lanes $(BENCH_ARGS)
+	@$(BIN)/python -m benchmarks.timing.lanes $(BENCH_ARGS)
 
 bench-measured: $(READY) ## Discovery on measured records and shared examples in ../shared (minutes)
-	@$(BIN)/python -m benchmarks.measured $(BENCH_ARGS)
-	@$(BIN)/python -m benchmarks.mining_plant
+	@$(BIN)/python -m benchmarks.real_records.measured $(BENCH_ARGS)
+	@$(BIN)/python -m benchmarks.real_records.mining_plant
 	@$(BIN)/python -m benchmarks.real_records
 	@$(BIN)/python -m benchmarks.real_records.unchanged
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.solve_times import do_mpc_figures, hour_figures, solver_figures
-from benchmarks.speed import rpem_figures, simulation_figures, start_figures
+from benchmarks.timing.solve_times import do_mpc_figures, hour_figures, solver_figures
+from benchmarks.timing.speed import rpem_figures, simulation_figures, start_figures
 
 
 def main() -> None:

@@ -19,8 +19,8 @@ from scipy.optimize import brentq
 
 from adaptive_flot.greybox.sensors import without_sensor_effects
 from adaptive_flot.runner.scenario.scenario import Scenario
+from benchmarks.control.value_of_knowledge import Steady
 from benchmarks.mismatched_plants.plants import COUNT, plant
-from benchmarks.value_of_knowledge import Steady
 
 KEPT = 0.01
 """Distance that the controller keeps from the limit of the grade."""

@@ -8,6 +8,8 @@ heat_exchanger.py      A steam heat exchanger whose gain falls with the flow; ju
 lamp.py                A lamp over a plate: a negative example.
 asked.py               The figures that were asked for, with targets and what was measured.
 folder.py              Where the records are.
+measured.py            Single measured records and the shared examples of the cell: `make bench-measured`.
+mining_plant.py        An industrial iron-ore flotation plant.
 unchanged.py           False alarms: two records of a plant that nobody changed.
 __main__.py            Every verdict beside the truth; the cascaded tanks of the package too.
 """

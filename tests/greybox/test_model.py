@@ -14,7 +14,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Kind, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.steady_state import steady_state
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from benchmarks import scipy_reference as reference
+from benchmarks.timing import scipy_reference as reference
 
 Equations = Callable[[Scope], None]
 

@@ -10,7 +10,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
 from adaptive_flot.greybox.stepping.fastcall import FastCall
-from benchmarks import scipy_reference as reference
+from benchmarks.timing import scipy_reference as reference
 
 NOMINAL = np.array([1.5e-3, 1.67e-4, 0.38])
 operating_point = st.tuples(st.floats(9.05e-4, 2.17e-3), st.floats(1e-4, 3e-4), st.floats(0.345, 0.42)).map(np.array)

@@ -11,7 +11,7 @@ from adaptive_flot.greybox.data.dataset import read_dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.greybox.stepping.trajectory import Trajectory
-from benchmarks import scipy_reference as reference
+from benchmarks.timing import scipy_reference as reference
 
 GIVEN = {"time_s", "air_flow_m3_s", "feed_flow_m3_s", "level_setpoint_m", "n", "C"}
 TOLERANCE = {"accurate": 1e-6, "fast": 1e-4}

@@ -14,7 +14,7 @@ from adaptive_flot.errors import DataError
 from adaptive_flot.greybox import Dataset, Stepper, steady_state
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.processes.iron_columns import HOUR, fresh, make_model, read_record
-from benchmarks.mining_plant import corrected, last_seen, regression
+from benchmarks.real_records.mining_plant import corrected, last_seen, regression
 
 USUAL = {
     "silica_feed": 0.15, "iron_feed": 0.56, "starch_flow": 2900.0, "amine_flow": 490.0, "pulp_flow": 400.0, "ph": 9.8,

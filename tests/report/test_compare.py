@@ -13,7 +13,7 @@ from adaptive_flot.report.compare.page import compare_report
 from adaptive_flot.report.compare.tables import compare_tables, markdown, overview_table, quantile_table
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.runner.commands.comparison import Comparison, compare
-from benchmarks.readme_table import BEGIN, END, PAGE, put
+from benchmarks.pictures.readme_table import BEGIN, END, PAGE, put
 from tests.report.test_run_report import Links
 
 VALUES = {("mpc", "rpem"): 11.5, ("mpc", "fixed"): 10.0, ("mpc", "oracle"): 12.0, ("pi", "fixed"): 9.0}

@@ -1,4 +1,7 @@
-"""A shared example with an answer beside it. The others, and measured data, are judged by `benchmarks.measured`."""
+"""A shared example with an answer beside it.
+
+The others, and measured data, are judged by `benchmarks.real_records.measured`.
+"""
 
 from __future__ import annotations
 

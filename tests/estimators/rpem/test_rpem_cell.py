@@ -10,7 +10,7 @@ import pytest
 
 from adaptive_flot.contracts import AnyEstimator, Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import Model, Parameter
-from benchmarks import scipy_reference
+from benchmarks.timing import scipy_reference
 from estimators.fixed import Fixed
 from estimators.rpem.estimator import Rpem
 from tests.estimators import toys

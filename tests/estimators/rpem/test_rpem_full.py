@@ -15,7 +15,7 @@ from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, 
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.cascaded_tanks import read_benchmark
 from adaptive_flot.processes.registry import make_model
-from benchmarks.forgetting import Recursion, stabilised
+from benchmarks.estimation.forgetting import Recursion, stabilised
 from estimators.rpem.estimator import Rpem
 from estimators.rpem.full import rpem_full
 from estimators.rpem.state import RpemState
@@ -178,7 +178,7 @@ def test_a_known_start_of_state_and_parameters_is_used(cell_case: CellCase) -> N
 
 
 def test_the_compiled_update_is_the_recursion_written_out_in_numpy(cell_case: CellCase) -> None:
-    """The study of forgetting (`benchmarks.forgetting`) measures what `rpem_full` does."""
+    """The study of forgetting (`benchmarks.estimation.forgetting`) measures what `rpem_full` does."""
     prior, samples = cell_case.prior, cell_case.samples
     thetas, predictions = Recursion(cell_case.setup).run(prior, list(samples), stabilised(0.9, 0.05))
     # the study forgets after a sample, the estimator before the next: the first differs by what the prior forgets

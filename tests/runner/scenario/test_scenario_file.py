@@ -16,7 +16,7 @@ from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.measurement_noise import noise_std
 from adaptive_flot.runner.scenario.realisation import Realisation
-from benchmarks import scipy_reference
+from benchmarks.timing import scipy_reference
 from tests.runner.conftest import WriteScenario
 
 PROFILE = "inputs.air_flow_m3_s"

@@ -1,4 +1,4 @@
-"""How well n and C can be told apart depends on the inputs: `python -m benchmarks.excitation`.
+"""How well n and C can be told apart depends on the inputs: `python -m benchmarks.estimation.excitation`.
 
 The plant of paper scenario 1 (ramps of C, then n; the grade alone measured) under other input sequences: the fits that
 two posterior Cramer-Rao bounds allow, with the grade alone and with more sensors, and those that the estimators reach.

@@ -1,7 +1,7 @@
 """What RPEM absorbs of an effect that no model has, and what discovery in the loop finds.
 
 The table is in `docs/results/closed_loop.md`.
-`python -m benchmarks.undeclared_effect` runs the scenario of that name over three seeds, two minutes.
+`python -m benchmarks.estimation.undeclared_effect` runs the scenario of that name over three seeds, two minutes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from adaptive_flot.runner.results.prediction import one_move_errors, one_step_er
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks.freezing import spread
+from benchmarks.control.freezing import spread
 
 SCENARIO, SEEDS, OUTPUT = "undeclared_effect", (1, 2, 3), "concentrate_grade"
 LABELS = ("n", "C")

@@ -1,4 +1,4 @@
-"""What the first 600 s tell of a drift that comes later: `python -m benchmarks.likely_drift`.
+"""What the first 600 s tell of a drift that comes later: `python -m benchmarks.estimation.likely_drift`.
 
 Most likely drift of the joint filter (`estimators/ekf/likely_drift.py`) and the largest that is not rejected at 95 %:
 from the record before the estimators start and, in hindsight, from the whole run. In the scenarios of the paper

@@ -1,4 +1,4 @@
-"""What probing costs and what it is good for: `python -m benchmarks.probing`, about a minute a seed.
+"""What probing costs and what it is good for: `python -m benchmarks.control.probing`, about a minute a seed.
 
 Runs `closed_loop_drift_down`, where the economic MPC at its constraints starves its estimator:
 

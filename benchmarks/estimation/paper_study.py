@@ -1,4 +1,4 @@
-"""Why the printed RPEM stays below the published fits: `python -m benchmarks.paper_study`.
+"""Why the printed RPEM stays below the published fits: `python -m benchmarks.estimation.paper_study`.
 
 Variants of the paper's scenarios, one change each, medians over ten seeds; then the stability of the Gauss-Newton step
 along the ridge on which errors of n and C cancel.

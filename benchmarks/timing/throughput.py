@@ -1,8 +1,8 @@
 """Throughput of a study: scenario 1 x RPEM with one and two workers, plain and compiled, and simulated ones beyond.
 
-`python -m benchmarks.throughput [--runs 40]`. Wall-clock time is that of the machine at this hour; processor time is
-what a quiet one needs. With more workers than cores the runs are simulated: each sleeps for the time a compiled run
-takes and hands back a real row, so that scheduler, transport and writing of results are the real ones.
+`python -m benchmarks.timing.throughput [--runs 40]`. Wall-clock time is that of the machine at this hour; processor
+time is what a quiet one needs. With more workers than cores the runs are simulated: each sleeps for the time a
+compiled run takes and hands back a real row, so that scheduler, transport and writing of results are the real ones.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks import scipy_reference
+from benchmarks.timing import scipy_reference
 from estimators.rpem.estimator import Rpem
 
 REPEATS = 7

@@ -1,4 +1,6 @@
-"""What knowing the parameters is worth, and what probing for it brings: `python -m benchmarks.value_of_knowledge`.
+"""What knowing the parameters is worth, and what probing for it brings.
+
+Command: `python -m benchmarks.control.value_of_knowledge`.
 
 Two tables. The first needs a minute: what is lost at steady state by a controller that sees the right grade, but takes
 one parameter for another. That is the most that any probing could win, an hour. The second runs the closed loop of

@@ -1,4 +1,4 @@
-"""What correcting the state by level and tails flow is worth: `python -m benchmarks.state_correction`.
+"""What correcting the state by level and tails flow is worth: `python -m benchmarks.estimation.state_correction`.
 
 The laboratory cell with moving air and level set-point, n and C at rest, measured with the noise of the closed-loop
 scenarios; over 300 to 700 s the feed flow is a fifth larger than what the estimator is told, or not.

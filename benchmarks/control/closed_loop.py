@@ -1,10 +1,10 @@
-"""Every closed-loop scenario with every controller over ten seeds: `python -m benchmarks.closed_loop`.
+"""Every closed-loop scenario with every controller over ten seeds: `python -m benchmarks.control.closed_loop`.
 
 Runs in two processes (`--processes`) and writes one Parquet part for each scenario and seed into the folder of `--out`
 (default `results/closed_loop`). Parts that are there already are not run again, so that a run that was stopped goes on;
 remove the folder after a change. Prints what was asked of the closed loop and what was reached; `adaptive-flot compare
-results/closed_loop` shows the same runs in full, `python -m benchmarks.readme_table results/closed_loop` puts them into
-`docs/results/closed_loop.md`.
+results/closed_loop` shows the same runs in full. `python -m benchmarks.pictures.readme_table
+results/closed_loop` puts them into `docs/results/closed_loop.md`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.commands.run_files import run_summary
 from adaptive_flot.runner.commands.runs_table import read_runs, run_rows
 from adaptive_flot.runner.scenario.loading import load_scenario
-from benchmarks.speed import Figure
+from benchmarks.timing.speed import Figure
 
 SCENARIOS = (
     "closed_loop_drift",

@@ -26,7 +26,7 @@ from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks.speed import Figure
+from benchmarks.timing.speed import Figure
 from controllers.economic_mpc.controller import EconomicMpc
 from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS
 
@@ -148,7 +148,7 @@ def do_mpc_figures() -> list[Figure]:
     """The same problem in do-mpc (ipopt) beside ours, in turn; nothing where do-mpc is not installed."""
     if find_spec("do_mpc") is None:
         return [Figure("do-mpc on the same problem", "do-mpc is not installed", "", None)]
-    from benchmarks.do_mpc_reference import DoMpc
+    from benchmarks.timing.do_mpc_reference import DoMpc
 
     scenario = load_scenario("closed_loop_drift")
     ours = {name: Ours(scenario, name) for name in SOLVERS}

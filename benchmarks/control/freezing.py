@@ -1,4 +1,4 @@
-"""What freezing is worth in a closed loop that starves the estimator: `python -m benchmarks.freezing`.
+"""What freezing is worth in a closed loop that starves the estimator: `python -m benchmarks.control.freezing`.
 
 The economic MPC holds its inputs at constraints in `closed_loop_drift_down`, and the grade then says little about n and
 C apart. Three estimators in the loop, five seeds each; takes about a minute a run.

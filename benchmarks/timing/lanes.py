@@ -1,7 +1,7 @@
 """Simulations, sensitivities and RPEM in lanes, each beside today's other ways, SciPy and JAX, timed in one run.
 
-`python -m benchmarks.lanes [--jax PYTHON]`; PYTHON is the interpreter of an environment with JAX, which this project
-does not need. Times are processor time on one core: other work on the machine does not count, and two cores
+`python -m benchmarks.timing.lanes [--jax PYTHON]`; PYTHON is the interpreter of an environment with JAX, which this
+project does not need. Times are processor time on one core: other work on the machine does not count, and two cores
 give twice the rate where both are free. Ratios are those of median times taken in turn.
 """
 
@@ -37,8 +37,8 @@ from adaptive_flot.runner.commands.side_by_side import run_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
-from benchmarks import jax_step, scipy_reference
-from benchmarks.speed import in_turn
+from benchmarks.timing import jax_step, scipy_reference
+from benchmarks.timing.speed import in_turn
 from estimators.rpem.estimator import Rpem
 
 MEMBERS, ROWS, REPEATS = 64, 300, 7

@@ -1,4 +1,4 @@
-"""Discovery on an industrial iron-ore flotation plant: `python -m benchmarks.mining_plant [hourly.csv]`.
+"""Discovery on an industrial iron-ore flotation plant: `python -m benchmarks.real_records.mining_plant [hourly.csv]`.
 
 The first 70 % of the record are searched and fitted; the last 30 % only report, once. Hour-ahead predictions may use
 what was measured until the hour before; free runs may not. The data are not part of the repository: default ../shared.
@@ -30,7 +30,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.iron_columns import make_model, read_record
 
-DATA = Path(__file__).parents[1].parent / "shared" / "data" / "mining-flotation-plant" / "hourly.csv"
+DATA = Path(__file__).parents[2].parent / "shared" / "data" / "mining-flotation-plant" / "hourly.csv"
 TRAIN = 0.7
 SHOWN = 6
 
@@ -38,7 +38,10 @@ SHOWN = 6
 def main(path: Path) -> int:
     """Search, predict, print; 2 where the data are absent."""
     if not path.is_file():
-        print(f"{path}: no such file; give the hourly table of the plant: python -m benchmarks.mining_plant hourly.csv")
+        print(
+            f"{path}: no such file; give the hourly table of the plant: "
+            "python -m benchmarks.real_records.mining_plant hourly.csv"
+        )
         return 2
     record, model = read_record(path), make_model()
     cut = round(TRAIN * len(record))

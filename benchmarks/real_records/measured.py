@@ -1,4 +1,4 @@
-"""Discovery on measured data and on the shared examples: `python -m benchmarks.measured [FOLDER]`.
+"""Discovery on measured data and on the shared examples: `python -m benchmarks.real_records.measured [FOLDER]`.
 
 FOLDER holds `examples/` (records with answers beside them) and `data/` (measured records); default ../shared beside the
 repository. Nothing of it is part of the repository. Every verdict is printed, whatever it is; nothing is tuned to it.
@@ -21,7 +21,7 @@ from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.runner.commands.discover import discover_file
 
-SHARED = Path(__file__).parents[1].parent / "shared"
+SHARED = Path(__file__).parents[2].parent / "shared"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,10 @@ def main(folder: Path) -> int:
     """Judge and print; 2 where there is nothing to judge."""
     present = [record for record in records(folder) if record.path.is_file()]
     if not present:
-        print(f"{folder}: no examples/ and no data/ there; give their folder: python -m benchmarks.measured FOLDER")
+        print(
+            f"{folder}: no examples/ and no data/ there; give their folder: "
+            "python -m benchmarks.real_records.measured FOLDER"
+        )
         return 2
     table = Table("record", "verdict", "effects", "first output: before -> after (noise)", "ok", "s", show_lines=True)
     console = Console(width=None if Console().is_terminal else 150)

@@ -1,4 +1,6 @@
-"""How soon a reader sees the first chart of a page, and how large pages are: `python -m benchmarks.report_pages`.
+"""How soon a reader sees the first chart of a page, and how large pages are.
+
+Command: `python -m benchmarks.timing.report_pages`.
 
 Needs Chromium. With names of pages (HTML) it measures those too.
 """

@@ -1,4 +1,4 @@
-"""How accurate and how honest each estimator is over many seeds: `python -m benchmarks.accuracy`.
+"""How accurate and how honest each estimator is over many seeds: `python -m benchmarks.estimation.accuracy`.
 
 Both paper scenarios with ramps, the grade alone, every estimator with its defaults. Writes one Parquet part for each
 scenario, estimator and seed into the folder of `--out` (default `results/accuracy`); parts that are there are not run

@@ -1,4 +1,6 @@
-"""Put the comparison of closed loops into its page: `python -m benchmarks.readme_table results/a results/b ...`.
+"""Put the comparison of closed loops into its page.
+
+Command: `python -m benchmarks.pictures.readme_table results/a results/b ...`.
 
 The results are folders that `adaptive-flot run` wrote, one or more a scenario. What stands between the two marks in
 docs/results/closed_loop.md is replaced by the overview that `adaptive-flot compare` prints.
@@ -16,8 +18,8 @@ from adaptive_flot.report.compare.tables import markdown, overview_table
 from adaptive_flot.runner.commands.comparison import compare
 from adaptive_flot.runner.commands.runs_table import read_runs
 
-PAGE = Path(__file__).parents[1] / "docs" / "results" / "closed_loop.md"
-BEGIN = "<!-- comparison: begin, written by `python -m benchmarks.readme_table` -->"
+PAGE = Path(__file__).parents[2] / "docs" / "results" / "closed_loop.md"
+BEGIN = "<!-- comparison: begin, written by `python -m benchmarks.pictures.readme_table` -->"
 END = "<!-- comparison: end -->"
 
 

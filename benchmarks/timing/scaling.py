@@ -1,4 +1,4 @@
-"""Does the cost of an online estimator grow with the record? `python -m benchmarks.scaling` (some minutes).
+"""Does the cost of an online estimator grow with the record? `python -m benchmarks.timing.scaling` (some minutes).
 
 Replays scenario 1 round and round for 1e3 to 1e6 updates and keeps nothing but the state. Time is that of the
 processor; memory is the largest the process ever held, beyond what it held after the first thousand updates.
@@ -21,7 +21,7 @@ from rich.table import Table
 from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.plugins import ESTIMATORS, load
 from adaptive_flot.runner.scenario.loading import load_scenario
-from benchmarks.forgetting import record
+from benchmarks.estimation.forgetting import record
 
 ONLINE = ("rpem", "rpem_full")
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)

@@ -1,4 +1,6 @@
-"""How should RPEM forget? Rules of the literature on own seeds of both scenarios: `python -m benchmarks.forgetting`.
+"""How should RPEM forget? Rules of the literature on own seeds of both scenarios.
+
+Command: `python -m benchmarks.estimation.forgetting`.
 
 The recursion with propagated sensitivities, written out in NumPy for any rule that turns the last covariance into the
 one before the next sample; every rule has one tuning for both scenarios. The seeds are not those of published tables.

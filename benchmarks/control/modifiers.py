@@ -1,4 +1,4 @@
-"""What modifiers of the MPC win where the slopes of its model are wrong: `python -m benchmarks.modifiers`.
+"""What modifiers of the MPC win where the slopes of its model are wrong: `python -m benchmarks.control.modifiers`.
 
 It takes seven minutes a seed.
 
@@ -24,7 +24,7 @@ from adaptive_flot.greybox.sensors import without_sensor_effects
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
-from benchmarks.value_of_knowledge import HOUR, Steady
+from benchmarks.control.value_of_knowledge import HOUR, Steady
 
 BASE, DURATION_S = "interior_optimum", 4 * 3600
 EFFECTS: dict[str, tuple[str, float] | None] = {

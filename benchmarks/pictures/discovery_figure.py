@@ -1,4 +1,6 @@
-"""Draw the README's picture of discovery: `python -m benchmarks.discovery_figure` writes docs/pictures/discovery.png.
+"""Draw the README's picture of discovery.
+
+`python -m benchmarks.pictures.discovery_figure` writes docs/pictures/discovery.png.
 
 Residual, cause, error before and after: one record of `benchmarks.hidden_effects`, whose generator is a package apart.
 Its cell entrains less rock when the froth is deep, with a kink that the catalogue of discovery does not hold.
@@ -30,7 +32,7 @@ from benchmarks.hidden_effects.generate.folder import record_file, write_record
 from benchmarks.hidden_effects.generate.record import make_record
 
 SEED, RECORD = 1, 32
-PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "discovery.png"
+PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "discovery.png"
 OUTPUT = "concentrate_grade"
 
 

@@ -1,4 +1,4 @@
-"""Draw the README's pictures: `python -m benchmarks.readme_figure` writes them to docs/pictures/."""
+"""Draw the README's pictures: `python -m benchmarks.pictures.readme_figure` writes them to docs/pictures/."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from adaptive_flot.report.run import closed_loop, series
 from adaptive_flot.runner.commands.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 
-FOLDER = Path(__file__).parents[1] / "docs" / "pictures"
+FOLDER = Path(__file__).parents[2] / "docs" / "pictures"
 CLOSED_LOOP = ("air flow", "concentrate grade", "recovery")
 
 
