@@ -16,7 +16,7 @@ import pytest
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.errors import AdaptiveFlotError, DataError
-from tests.cli.test_discover import write_tank
+from tests.cli.discover.test_discover import write_tank
 
 PATIENCE_S = 120.0
 

@@ -55,7 +55,7 @@ FOLDERS = [
 """A result in the folder of the results has the name of an input."""
 INPUT_OPTIONS = {"--map", "--record", "--reference", "--certificates"}
 READS_NOTHING = {("certificates", "--out")}
-"""It writes into a folder, and refuses to where one of its files is: see `tests/live/test_server.py`."""
+"""It writes into a folder, and refuses to where one of its files is: see `tests/live/processes/test_server.py`."""
 
 SPELLINGS: dict[str, Callable[[Path], str]] = {
     "as given": str,

@@ -12,8 +12,8 @@ from adaptive_flot.greybox import Model, steady_state
 from controllers.economic_mpc.output_bias import OutputBias
 from controllers.economic_mpc.problem.layout import StageLayout
 from controllers.economic_mpc.taking_over import with_further_states
-from tests.controllers.test_collocation import HELD, LIMITS
-from tests.controllers.test_extended_models import GROWTH, LATE_FEED
+from tests.controllers.plan.test_collocation import HELD, LIMITS
+from tests.controllers.plan.test_extended_models import GROWTH, LATE_FEED
 
 
 def test_a_widened_plan_is_the_same_plan_with_the_further_states_held(model: Model) -> None:

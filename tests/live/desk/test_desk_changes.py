@@ -25,7 +25,7 @@ from adaptive_flot.live.shadow.process import Shadow, ShadowView
 from adaptive_flot.live.shadow.worker import ShadowPlan
 from adaptive_flot.live.store.beside import ShadowResult
 from tests.live.desk_bench import DeskBench
-from tests.live.test_desk import FOUND
+from tests.live.desk.test_desk import FOUND
 
 LATER = Finding("abstained", "nothing explains what is left")
 
@@ -159,7 +159,7 @@ def test_a_process_that_can_not_be_started_is_a_status_and_an_alarm(
 
 
 def test_the_last_words_of_a_shadow_stay(link: Link) -> None:
-    from tests.live.test_shadow import failing
+    from tests.live.cycle.test_shadow import failing
 
     shadow = Shadow(link.path.absolute(), ShadowPlan("unbuilt", "rpem"), ("level",), failing)
     limit = time.monotonic() + 120

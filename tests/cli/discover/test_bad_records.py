@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.test_discover import write_tank
+from tests.cli.discover.test_discover import write_tank
 
 Change = Callable[[pd.DataFrame], pd.DataFrame]
 

@@ -21,7 +21,7 @@ from controllers.economic_mpc.problem.stage import OutputModifiers
 from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS, make_solver
 from controllers.economic_mpc.taking_over import with_further_states
 from estimators.fixed import Fixed
-from tests.controllers.test_collocation import BOUNDS, HORIZON, LIMITS, MOVE_S, arguments, cell_problem, cold
+from tests.controllers.plan.test_collocation import BOUNDS, HORIZON, LIMITS, MOVE_S, arguments, cell_problem, cold
 
 DT, START = 5.0, 1.5
 """Sampling interval [s] and pump voltage at the start [V]."""

@@ -22,7 +22,7 @@ from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
 from controllers.economic_mpc.tree.scenario_tree import ScenarioTree
 from controllers.economic_mpc.tree.tree_programme import TreeProgramme
 from controllers.economic_mpc.tree.tree_step import TreeStep
-from tests.controllers.test_collocation import BOUNDS, HELD, MOVE_S, arguments, cell_problem, cold
+from tests.controllers.plan.test_collocation import BOUNDS, HELD, MOVE_S, arguments, cell_problem, cold
 
 COUNT, BRANCH = 3, 4
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from tests.cli.conftest import Call
-from tests.cli.test_discover import write_tank
+from tests.cli.discover.test_discover import write_tank
 
 
 def test_the_command_in_the_message_puts_a_record_on_a_grid(call: Call, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from adaptive_flot.greybox import Model
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.derivatives import Assembled
 from controllers.economic_mpc.problem.layout import DEGREE
-from tests.controllers.test_collocation import arguments, cell_problem, cold
+from tests.controllers.plan.test_collocation import arguments, cell_problem, cold
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 
 from adaptive_flot import load_scenario, run
 from tests.cli.conftest import Call, WriteScenario
-from tests.cli.test_import import MAP
+from tests.cli.records.test_import import MAP
 from tests.records.exports import Plant, text
 
 SHORT = {"duration_s": 200, "initial_estimate.until_s": 100, "fits_after_s": 100}

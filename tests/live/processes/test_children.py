@@ -24,7 +24,7 @@ from adaptive_flot.live.link.discovery import LiveDiscovery
 from adaptive_flot.live.link_file import load_link
 from adaptive_flot.live.shadow.process import Shadow
 from adaptive_flot.live.shadow.worker import ShadowPlan
-from tests.live.test_children import builds, searches
+from tests.live.processes.test_children import builds, searches
 
 link = load_link(Path(sys.argv[1]))
 discovery = LiveDiscovery(link, searches)

@@ -19,7 +19,7 @@ from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.store.memory import Memory, open_database
 from adaptive_flot.live.store.record import stretches
 from tests.live.bench import Bench
-from tests.live.test_server import free_port
+from tests.live.processes.test_server import free_port
 
 PLACES = os.pathsep.join([os.environ.get("PATH", ""), *map(str, Path("/usr/lib/postgresql").glob("*/bin"))])
 SERVER, INIT = shutil.which("pg_ctl", path=PLACES), shutil.which("initdb", path=PLACES)

@@ -16,7 +16,7 @@ from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS, make_solver
 from controllers.economic_mpc.solvers.real_time_iteration import MOST_STEPS
 from controllers.economic_mpc.solvers.verification import NlpSolution, Validity
-from tests.controllers.test_collocation import BOUNDS, HORIZON, arguments, cell_problem, cold
+from tests.controllers.plan.test_collocation import BOUNDS, HORIZON, arguments, cell_problem, cold
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.memory import open_database
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.live.page_bench import ACT, Visitor, page_keys
-from tests.live.test_server import SPEED, free_port, together
+from tests.live.processes.test_server import SPEED, free_port, together
 
 
 def test_a_person_at_the_page_lowers_the_mode_and_lets_it_up_again(

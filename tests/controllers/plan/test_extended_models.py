@@ -11,7 +11,7 @@ from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.stage import Arguments
 from controllers.economic_mpc.solvers.nlp_solvers import SOLVERS, make_solver
 from controllers.economic_mpc.solvers.verification import Validity
-from tests.controllers.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES, cell_problem
+from tests.controllers.plan.test_collocation import BOUNDS, HELD, HORIZON, MOVE_S, PRICES, cell_problem
 
 NOW = 360.0
 GROWTH = Effect("bubble_size", "air_flow", "power", {"exponent": 0.3}, {"reference": 1.5e-3})

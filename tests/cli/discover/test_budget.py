@@ -8,7 +8,7 @@ import pytest
 
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from tests.cli.conftest import Call
-from tests.cli.test_discover import write_tank
+from tests.cli.discover.test_discover import write_tank
 from tests.discovery.hypotheses.tank import record, tank
 
 

@@ -21,7 +21,7 @@ from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store import schema
 from adaptive_flot.live.store.memory import open_database
 from adaptive_flot.runner.scenario.scenario import Scenario
-from tests.live.test_server import SPEED, client, free_port, together, write
+from tests.live.processes.test_server import SPEED, client, free_port, together, write
 
 HANGING = """
 import sys, time

@@ -20,7 +20,7 @@ from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.running.run import SILENT_INTERVALS
 from adaptive_flot.live.store import schema
 from adaptive_flot.runner.scenario.scenario import Scenario
-from tests.live.test_server import free_port
+from tests.live.processes.test_server import free_port
 
 MAIN = [sys.executable, "-m", "adaptive_flot"]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import psutil
 
-from tests.live.test_kill import wait_for
-from tests.live.test_server import free_port
+from tests.live.processes.test_kill import wait_for
+from tests.live.processes.test_server import free_port
 
 PATIENCE_S = 180
 
