@@ -24,8 +24,8 @@ from adaptive_flot.live.shadow.comparison import Compared
 from adaptive_flot.live.shadow.process import Shadow, ShadowView
 from adaptive_flot.live.shadow.worker import ShadowPlan
 from adaptive_flot.live.store.beside import ShadowResult
-from tests.live.desk_bench import DeskBench
 from tests.live.desk.test_desk import FOUND
+from tests.live.desk_bench import DeskBench
 
 LATER = Finding("abstained", "nothing explains what is left")
 

@@ -19,9 +19,9 @@ from adaptive_flot.live.running.progress import Stage
 from adaptive_flot.live.safety.modes import Mode
 from adaptive_flot.live.store.memory import Memory, open_database
 from tests.live.bench import INITIAL
-from tests.live.desk_bench import DeskBench
 from tests.live.desk.test_desk import EFFECT, FOUND
 from tests.live.desk.test_desk_changes import left, shadowed
+from tests.live.desk_bench import DeskBench
 
 
 def started(link: Link, folder: Path) -> DeskBench:
