@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from adaptive_flot.console import print_fits, progress_bar
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.console.lines import print_fits, progress_bar
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.report.run.page import write_run_report
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_files import run_summary, write_json
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_files import run_summary, write_json
 from adaptive_flot.runner.scenario.loading import load_scenario
 
 SCENARIOS = ("paper_scenario_1", "paper_scenario_2", "paper_scenario_1_step", "paper_scenario_2_step")

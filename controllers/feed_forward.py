@@ -6,8 +6,8 @@ import control
 import numpy as np
 
 from adaptive_flot.contracts import ControllerSetup, Sample
-from adaptive_flot.greybox.linear import linearise
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.steady.linear import linearise
 
 
 class FeedForward:

@@ -14,8 +14,8 @@ import numpy as np
 
 from adaptive_flot.contracts import ControllerSetup, Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.steady.linear import linearise, pi_gains
 from controllers.feed_forward import FeedForward, has_disturbances
 
 MOST_LAG_DEG = 80.0

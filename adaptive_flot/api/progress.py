@@ -12,7 +12,7 @@ def counted(shown: bool, label: str, total: int) -> Iterator[Callable[[], None]]
     if not shown:
         yield lambda: None
         return
-    from adaptive_flot.console import progress_bar
+    from adaptive_flot.console.lines import progress_bar
 
     with progress_bar(label, total) as advance:
         yield advance
@@ -24,7 +24,7 @@ def staged(shown: bool, label: str) -> Iterator[Callable[[str], None]]:
     if not shown:
         yield lambda stage: None
         return
-    from adaptive_flot.console import stage_bar
+    from adaptive_flot.console.lines import stage_bar
 
     with stage_bar(label) as progress:
         yield progress

@@ -20,9 +20,9 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import named
 from adaptive_flot.processes.registry import read_measurements
 from adaptive_flot.report.kit.wording import seed_list
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_files import run_files, run_summary, write_json, write_runs
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_files import run_files, run_summary, write_json, write_runs
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plugin
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.recorded_inputs import on_record

@@ -5,6 +5,7 @@
 `commands`            the list of commands, and the options before a command
 `run` ... `scenarios` one file a command: its options, and what it calls
 `options`             options that several commands share
+`live/`               commands of the live link and its test plant
 `import_preview`      what `import` shows and asks before it writes
 ===================== =================================================================
 

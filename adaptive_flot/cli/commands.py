@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.cli.certificates import certificates
 from adaptive_flot.cli.compare import compare
 from adaptive_flot.cli.discover import discover
 from adaptive_flot.cli.estimate import estimate
-from adaptive_flot.cli.export import export
 from adaptive_flot.cli.import_ import import_
-from adaptive_flot.cli.live import live
+from adaptive_flot.cli.live.certificates import certificates
+from adaptive_flot.cli.live.export import export
+from adaptive_flot.cli.live.link import live
+from adaptive_flot.cli.live.plant import serve_plant
 from adaptive_flot.cli.options import ignore_unknown_backend
 from adaptive_flot.cli.run import run
 from adaptive_flot.cli.scenarios import scenarios
-from adaptive_flot.cli.serve_plant import serve_plant
 from adaptive_flot.cli.simulate import simulate
 from adaptive_flot.cli.sweep import sweep
 

@@ -20,14 +20,14 @@ def compare(
     markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables as Markdown here.")] = None,
 ) -> None:
     """Put controllers and estimators of one or several results side by side, scenario by scenario."""
-    from adaptive_flot.console import print_comparison
+    from adaptive_flot.console.lines import print_comparison
     from adaptive_flot.files import write_text
     from adaptive_flot.report.compare import tables as compare_tables
     from adaptive_flot.report.compare.findings import findings
     from adaptive_flot.report.compare.page import write_compare_report
     from adaptive_flot.runner.commands import comparison
-    from adaptive_flot.runner.commands.run_files import write_json
-    from adaptive_flot.runner.commands.runs_table import read_runs, result_files
+    from adaptive_flot.runner.commands.runs.run_files import write_json
+    from adaptive_flot.runner.commands.runs.runs_table import read_runs, result_files
 
     check_targets(
         result_files(results),

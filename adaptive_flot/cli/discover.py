@@ -51,14 +51,14 @@ def discover(
 
     With a reference, or with several records, it tells what has changed, or what the model lacks in all of them.
     """
-    from adaptive_flot.console import print_verdict, stage_bar
+    from adaptive_flot.console.lines import print_verdict, stage_bar
     from adaptive_flot.discovery.fitting.parallel import available_processes
     from adaptive_flot.errors import ModelError
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.discover import check_model_path, discover_file, read_limits, save_discovered
     from adaptive_flot.runner.commands.discover_records import discover_records, save_extended
-    from adaptive_flot.runner.commands.run_files import write_json
+    from adaptive_flot.runner.commands.runs.run_files import write_json
 
     check_model_path(save_model)
     references, first = list(reference or ()), data[0]

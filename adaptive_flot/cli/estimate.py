@@ -50,7 +50,7 @@ def estimate(
     compile_: Compile = False,
 ) -> None:
     """Replay a measured record through fixed, recursive and batch estimation."""
-    from adaptive_flot.console import print_estimate, progress_bar
+    from adaptive_flot.console.lines import print_estimate, progress_bar
     from adaptive_flot.errors import CellError
     from adaptive_flot.processes.registry import find_cell, make_model
     from adaptive_flot.records.tag_map import load_tag_map
@@ -64,7 +64,7 @@ def estimate(
         write_replays,
     )
     from adaptive_flot.runner.commands.record_blocks import read_blocks
-    from adaptive_flot.runner.commands.run_files import write_json
+    from adaptive_flot.runner.commands.runs.run_files import write_json
 
     if save_cell is not None and model != "flotation":
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")

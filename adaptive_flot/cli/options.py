@@ -43,7 +43,7 @@ def can_compile(asked: bool) -> bool:
     """Whether to compile; where it is asked for and nothing can be compiled, one line says why."""
     if not asked:
         return False
-    from adaptive_flot.greybox.stepping.compiled import compiler_problem
+    from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 
     problem = compiler_problem()
     if problem is not None:

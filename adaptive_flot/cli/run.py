@@ -31,12 +31,12 @@ def run(
     compile_: Compile = False,
 ) -> None:
     """Run a scenario: plant, estimators and controller together."""
-    from adaptive_flot.console import print_closed_loop, print_fits, print_sentences, progress_bar
+    from adaptive_flot.console.lines import print_closed_loop, print_fits, print_sentences, progress_bar
     from adaptive_flot.errors import ScenarioError
     from adaptive_flot.processes.registry import read_measurements
     from adaptive_flot.records.tag_map import load_tag_map
-    from adaptive_flot.runner.commands.run import run_scenario
-    from adaptive_flot.runner.commands.run_files import run_summary, write_json, write_runs
+    from adaptive_flot.runner.commands.runs.run import run_scenario
+    from adaptive_flot.runner.commands.runs.run_files import run_summary, write_json, write_runs
     from adaptive_flot.runner.scenario.loading import load_scenario
     from adaptive_flot.runner.scenario.recorded_inputs import on_record
 

@@ -60,12 +60,12 @@ def _simulate_draws(
 ) -> None:
     from dataclasses import replace
 
-    from adaptive_flot.console import print_sentences
+    from adaptive_flot.console.lines import print_sentences
     from adaptive_flot.files import write_text
     from adaptive_flot.greybox.data.dataset import read_dataset
     from adaptive_flot.greybox.data.tables import check_table_path, write_table
     from adaptive_flot.processes.flotation import read_cell
-    from adaptive_flot.runner.commands.run_files import write_json
+    from adaptive_flot.runner.commands.runs.run_files import write_json
     from adaptive_flot.uncertainty.default_inputs import default_inputs
     from adaptive_flot.uncertainty.draws import blocks_of, draw
     from adaptive_flot.uncertainty.in_words import ranked_outputs, sentences, summary

@@ -37,7 +37,7 @@ def sweep(
     )
     if scheduler is None:
         start_fork_server()  # it imports while this process does
-    from adaptive_flot.console_study import print_study
+    from adaptive_flot.console.study import print_study
     from adaptive_flot.studies.progress import live
     from adaptive_flot.studies.sweep import sweep as run_study
 

@@ -50,8 +50,8 @@ from adaptive_flot.discovery.verdict.judge import (
     least_separation,
     undecided_rivals,
 )
-from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.rescaled import factors_of, rescaled
+from adaptive_flot.greybox.steady.assumed_start import wrong_start
 
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5
 """How long the last fits, and the proposed test, take: about so many times what the fit of the model as it is took."""

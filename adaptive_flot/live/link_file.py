@@ -28,8 +28,8 @@ from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.scenario import Scenario
-from adaptive_flot.yaml_files import read_yaml
-from adaptive_flot.yaml_problems import first_problem
+from adaptive_flot.yaml_files.problems import first_problem
+from adaptive_flot.yaml_files.read import read_yaml
 
 ShadowName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 TRIED = "extended"

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from adaptive_flot.errors import ModelError, located
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.yaml_part import Part
+from adaptive_flot.yaml_files.part import Part
 
 
 class _Entry(Part):

@@ -26,9 +26,9 @@ from pydantic import Field, ValidationError
 from adaptive_flot.errors import ModelError, located
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.effect_entry import EffectEntry, attach
-from adaptive_flot.yaml_files import read_yaml
-from adaptive_flot.yaml_part import Part
-from adaptive_flot.yaml_problems import first_problem
+from adaptive_flot.yaml_files.part import Part
+from adaptive_flot.yaml_files.problems import first_problem
+from adaptive_flot.yaml_files.read import read_yaml
 
 SUFFIXES = (".yaml", ".yml")
 

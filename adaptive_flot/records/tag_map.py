@@ -23,8 +23,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.records.map_values import Codes, Duration, TimeForm, UnitText, Zone
 from adaptive_flot.records.units import seconds
-from adaptive_flot.yaml_files import line_of, read_yaml
-from adaptive_flot.yaml_problems import first_problem
+from adaptive_flot.yaml_files.problems import first_problem
+from adaptive_flot.yaml_files.read import line_of, read_yaml
 
 SECTIONS = ("file", "time", "grid")
 """Keys of the outermost level that are no quantities."""

@@ -16,9 +16,9 @@ from adaptive_flot.runner.loop.prepared import controller_plugin, estimator_plug
 from adaptive_flot.runner.scenario.keys import LARGEST_SEED, Plugin, Seed
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
-from adaptive_flot.yaml_files import read_yaml
-from adaptive_flot.yaml_part import Part
-from adaptive_flot.yaml_problems import first_problem
+from adaptive_flot.yaml_files.part import Part
+from adaptive_flot.yaml_files.problems import first_problem
+from adaptive_flot.yaml_files.read import read_yaml
 
 MOST_SEEDS = 1_000_000
 """Largest study: its list of runs still fits into memory."""

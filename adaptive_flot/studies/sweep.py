@@ -17,7 +17,7 @@ import pandas as pd
 from distributed import Client, Future, KilledWorker, as_completed
 
 from adaptive_flot.errors import AdaptiveFlotError, StudyError, located
-from adaptive_flot.runner.commands.side_by_side import can_go_side_by_side
+from adaptive_flot.runner.commands.runs.side_by_side import can_go_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.studies import worker

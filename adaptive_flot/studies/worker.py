@@ -16,11 +16,11 @@ from typing import Any
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.errors import PluginError, StudyError
 from adaptive_flot.plugins import plugin_failure
-from adaptive_flot.runner.commands.run import initial_fit, run_one
-from adaptive_flot.runner.commands.run_files import plain, run_summary
-from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.runs_table import run_rows
-from adaptive_flot.runner.commands.side_by_side import run_side_by_side
+from adaptive_flot.runner.commands.runs.run import initial_fit, run_one
+from adaptive_flot.runner.commands.runs.run_files import plain, run_summary
+from adaptive_flot.runner.commands.runs.run_result import Run
+from adaptive_flot.runner.commands.runs.runs_table import run_rows
+from adaptive_flot.runner.commands.runs.side_by_side import run_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario

@@ -20,7 +20,7 @@ from adaptive_flot.contracts import (
     Status,
 )
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.testing.processes import ROWS, CaseProcess, flotation_process
 

@@ -13,7 +13,7 @@ from adaptive_flot.errors import ModelError, RangeError
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.uncertainty.ranges_file import Uncertain
 from adaptive_flot.uncertainty.ranking import Share, shares_of

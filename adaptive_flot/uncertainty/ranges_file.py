@@ -13,8 +13,8 @@ from scipy import stats
 from adaptive_flot.errors import CellError, located
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter
 from adaptive_flot.processes.registry import find_cell, make_model
-from adaptive_flot.yaml_files import read_yaml
-from adaptive_flot.yaml_problems import first_problem
+from adaptive_flot.yaml_files.problems import first_problem
+from adaptive_flot.yaml_files.read import read_yaml
 
 HINT = "give `cell:` and `uncertain:` with a range for each constant, for example `n: {share: 0.05}`"
 

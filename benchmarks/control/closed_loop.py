@@ -25,9 +25,9 @@ from rich.table import Table
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.commands.comparison import Comparison, Contender, compare
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_files import run_summary
-from adaptive_flot.runner.commands.runs_table import read_runs, run_rows
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_files import run_summary
+from adaptive_flot.runner.commands.runs.runs_table import read_runs, run_rows
 from adaptive_flot.runner.scenario.loading import load_scenario
 from benchmarks.timing.speed import Figure
 

@@ -21,7 +21,7 @@ from rich.progress import track
 from rich.table import Table
 
 from adaptive_flot.greybox.sensors import without_sensor_effects
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks.control.value_of_knowledge import HOUR, Steady

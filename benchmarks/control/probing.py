@@ -21,8 +21,8 @@ from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot.runner.commands.comparison import SeedSpread
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.keys import CaseEntry
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario

@@ -26,12 +26,12 @@ from scipy.optimize import brentq, minimize_scalar
 from adaptive_flot.contracts import OperatingPoint
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.commands.comparison import SeedSpread
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 

@@ -30,8 +30,8 @@ from scipy.stats import chi2
 
 from adaptive_flot.greybox.data.tables import read_table, write_table
 from adaptive_flot.metrics import normalised_error_squared
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation

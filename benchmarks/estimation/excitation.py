@@ -20,12 +20,12 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from adaptive_flot.greybox.cramer_rao_bound import random_walk
+from adaptive_flot.greybox.filtering.cramer_rao_bound import random_walk
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun
+from adaptive_flot.runner.scenario.inputs.profiles import InputProfile
 from adaptive_flot.runner.scenario.loading import load_scenario
-from adaptive_flot.runner.scenario.profiles import InputProfile
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 

@@ -18,7 +18,7 @@ from rich.table import Table
 from adaptive_flot import metrics
 from adaptive_flot.contracts import Decision, PlantRecord, Prior, Sample, Setup, Status, full_parameters
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.loop.prepared import Prepared

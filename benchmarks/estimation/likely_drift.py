@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from adaptive_flot.contracts import Prior, full_parameters
-from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
+from adaptive_flot.greybox.steady.steady_state import steady_state, steady_state_gradient
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation

@@ -17,7 +17,7 @@ from rich.table import Table
 from adaptive_flot.contracts import Prior, full_parameters
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.keys import Measurement, Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
 from estimators.rpem.full import rpem_full

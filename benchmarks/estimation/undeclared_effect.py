@@ -17,8 +17,8 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.run.series import cases
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.adaptation.whiteness_watch import watch
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.loading import load_scenario

@@ -7,7 +7,7 @@ import time
 from rich.console import Console
 
 from adaptive_flot.plugins import ESTIMATORS, load
-from adaptive_flot.runner.commands.run import initial_fit
+from adaptive_flot.runner.commands.runs.run import initial_fit
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.loading import load_scenario

@@ -11,8 +11,8 @@ from scipy.stats import chi2
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.metrics import fit, normalised_error_squared
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks.kinds_of_change.best_fit import best_fit

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.greybox.cramer_rao_bound import ParameterDrift
+from adaptive_flot.greybox.filtering.cramer_rao_bound import ParameterDrift
 from adaptive_flot.greybox.model import FloatArray
 from estimators.imm.modes import stationary
 

@@ -26,7 +26,7 @@ from rich.progress import track as track_progress
 from rich.table import Table
 
 from adaptive_flot.contracts import Setup
-from adaptive_flot.greybox.cramer_rao_bound import (
+from adaptive_flot.greybox.filtering.cramer_rao_bound import (
     LinearisedTrajectory,
     ParameterDrift,
     drift_of_time_profile,

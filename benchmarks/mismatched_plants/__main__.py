@@ -15,7 +15,7 @@ from rich.progress import track
 from rich.table import Table
 
 from adaptive_flot.greybox.data.tables import read_table, write_table
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from benchmarks.mismatched_plants.plants import CHANCE, COUNT, EARLY, FASTEST, LESS_CAREFUL, MODIFIERS, TREE, plant
 

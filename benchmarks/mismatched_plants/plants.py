@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 
 from adaptive_flot.errors import AdaptiveFlotError
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.processes.flotation.cell_file import default_cell, save_cell
 from adaptive_flot.resources import cell_file
 from adaptive_flot.runner.scenario.loading import find_scenario, load_scenario

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from adaptive_flot.files import replace_path
 from adaptive_flot.report.kit import figures
-from adaptive_flot.report.run import closed_loop, series
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.report.run import series
+from adaptive_flot.report.run.control import closed_loop
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 
 FOLDER = Path(__file__).parents[2] / "docs" / "pictures"

@@ -16,7 +16,7 @@ from adaptive_flot.errors import ResultError
 from adaptive_flot.files import write_text
 from adaptive_flot.report.compare.tables import markdown, overview_table
 from adaptive_flot.runner.commands.comparison import compare
-from adaptive_flot.runner.commands.runs_table import read_runs
+from adaptive_flot.runner.commands.runs.runs_table import read_runs
 
 PAGE = Path(__file__).parents[2] / "docs" / "results" / "closed_loop.md"
 BEGIN = "<!-- comparison: begin, written by `python -m benchmarks.pictures.readme_table` -->"

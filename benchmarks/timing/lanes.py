@@ -27,13 +27,13 @@ from adaptive_flot.greybox.ensemble import lane_library
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.step_functions import sensitivity_step, step
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import InstructionSet, supported
-from adaptive_flot.runner.commands.run import AT_ONCE, run_one
-from adaptive_flot.runner.commands.side_by_side import run_side_by_side
+from adaptive_flot.runner.commands.runs.run import AT_ONCE, run_one
+from adaptive_flot.runner.commands.runs.side_by_side import run_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation

@@ -18,8 +18,8 @@ import numpy as np
 
 from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.loading import load_scenario

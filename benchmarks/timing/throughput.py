@@ -22,7 +22,7 @@ from distributed import Client, LocalCluster
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.rows import core_count
 from adaptive_flot.studies import sweep as module
 from adaptive_flot.studies import worker

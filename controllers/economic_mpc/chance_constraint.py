@@ -16,7 +16,7 @@ from scipy.stats import norm
 from adaptive_flot.contracts import ControllerSetup
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 

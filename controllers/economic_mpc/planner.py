@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.contracts import ControllerSetup, Estimate, Sample, Status, full_parameters
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.chance_constraint import ChanceConstraint, quantile_of
 from controllers.economic_mpc.modifiers.learning import Modifiers
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem

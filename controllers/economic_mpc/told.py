@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adaptive_flot.contracts import Plan
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.planner import Found
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.softening import by_name, in_words

@@ -12,7 +12,7 @@ from adaptive_flot.contracts.ensemble_record import EnsembleRecord
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles
 from estimators.adaptive_imm.disturbances import extended, with_disturbances
 from estimators.adaptive_imm.ensemble import track_members

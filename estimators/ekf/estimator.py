@@ -16,7 +16,7 @@ from adaptive_flot.contracts.track import Track
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.drift import Drift, drift_of
 from estimators.shared.ensemble import Flags, driving, known_parameters, samples_of, statuses

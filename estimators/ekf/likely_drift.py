@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from adaptive_flot.contracts import Prior, Sample, Setup
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.ekf.estimator import Ekf
 from estimators.shared.joint_filter import filter_step
 from estimators.shared.measured import driving_outputs

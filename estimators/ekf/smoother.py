@@ -20,7 +20,7 @@ import numpy as np
 
 from adaptive_flot.contracts import Prior, Sample, Setup, Status
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.ekf.estimator import Ekf
 from estimators.shared.coordinates import Coordinates
 from estimators.shared.joint_filter import Layout, linearise_interval, parameters_of

@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.imm.mixing import combine_function, mix_function
 from estimators.imm.modes import Kind, Mode, make_modes, stationary, transitions
 from estimators.shared.coordinates import Coordinates

@@ -10,7 +10,7 @@ import numpy as np
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.mhe.arrival import arrival_step
 from estimators.mhe.problem import SOLVERS, HorizonWindow, MovingHorizon
 from estimators.shared.coordinates import Coordinates

@@ -13,7 +13,7 @@ from adaptive_flot.errors import DataError, RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.ensemble.one_member import OneMember
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
+from adaptive_flot.greybox.steady.steady_state import steady_state, steady_state_gradient
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from estimators.pem.problem import Problem, Search
 from estimators.shared.outliers import belief

@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED
 from estimators.pem.free_runs import MOST_EVALUATIONS, NOISE_CONVERGED, WEIGHT_PASSES, FreeRuns
 from estimators.pem.free_runs_in_step import Batch, FreeRunsInStep, RunsInStep

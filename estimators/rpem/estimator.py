@@ -13,7 +13,7 @@ from adaptive_flot.contracts.ensemble_record import EnsembleRecord
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.rpem.ensemble import RpemEnsemble
 from estimators.rpem.record import BLOCK_ROWS, RecordBlock
 from estimators.rpem.state import RpemState

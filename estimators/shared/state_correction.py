@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError, solve_discrete_are
 from adaptive_flot.contracts import Setup
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 REACH = 10.0

@@ -12,7 +12,7 @@ from adaptive_flot.contracts import Setup
 from adaptive_flot.errors import ModelError, ScenarioError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.plugins import ESTIMATORS, construct, load
 from adaptive_flot.runner.commands.estimate import estimate_record

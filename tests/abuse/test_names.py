@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from adaptive_flot.console_study import print_study
+from adaptive_flot.console.study import print_study
 from tests.cli.conftest import Call
 
 RUN = ["[/bold]", "data[1]", "<script>", "$\\frac"]

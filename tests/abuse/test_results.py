@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.errors import StudyError
-from adaptive_flot.runner.commands.run_files import plain
+from adaptive_flot.runner.commands.runs.run_files import plain
 from adaptive_flot.studies.folder import RUNS, TIMINGS, locked
 from adaptive_flot.studies.study_file import load_study
 from adaptive_flot.studies.sweep import sweep

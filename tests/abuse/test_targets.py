@@ -14,7 +14,7 @@ from typer.models import ArgumentInfo
 from adaptive_flot.cli import app
 from adaptive_flot.live.plant.link_text import link_text
 from adaptive_flot.resources import cell_file
-from adaptive_flot.runner.commands.run_files import write_json
+from adaptive_flot.runner.commands.runs.run_files import write_json
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.cli.conftest import Call, Result, WriteScenario, WriteTable
 from tests.runner.commands.test_runs_table import closed_loop_summary

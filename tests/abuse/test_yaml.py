@@ -12,14 +12,14 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot import yaml_files
 from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.model_file import load_model_file
 from adaptive_flot.resources import cell_file
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.studies.study_file import load_study, shipped_studies
-from adaptive_flot.yaml_files import DEEPEST, MOST_BYTES
+from adaptive_flot.yaml_files import read as yaml_files
+from adaptive_flot.yaml_files.read import DEEPEST, MOST_BYTES
 
 READERS: dict[str, Callable[[Path], object]] = {
     "scenario": load_scenario,

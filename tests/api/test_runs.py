@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 import adaptive_flot as af
 from adaptive_flot.api.runs import Runs
 from adaptive_flot.errors import AdaptiveFlotError, PluginError, ResultError, ScenarioError
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.runs_table import read_runs
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.runs_table import read_runs
 from adaptive_flot.runner.scenario.scenario import Scenario
 from estimators.fixed import Fixed
 from estimators.rpem import Rpem

@@ -11,7 +11,7 @@ from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.run.page import write_run_report
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.browser.conftest import Check
 from tests.cli.conftest import Call, WriteTable, plant, table  # noqa: F401  # fixtures

@@ -83,7 +83,7 @@ def test_help_does_not_import_the_heavy_libraries() -> None:
 def test_a_run_and_a_live_link_start_without_what_only_a_search_needs() -> None:
     """Its libraries take longer to load than all others together."""
     code = (
-        "import sys, adaptive_flot.console, adaptive_flot.live.program, adaptive_flot.live.shadow.worker; "
+        "import sys, adaptive_flot.console.lines, adaptive_flot.live.program, adaptive_flot.live.shadow.worker; "
         "print(sorted({'adaptive_flot.discovery', 'matplotlib', 'scipy.stats', 'statsmodels'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from adaptive_flot.console import print_comparison, print_sentences
-from adaptive_flot.console_tables import fitted, print_table
+from adaptive_flot.console.lines import print_comparison, print_sentences
+from adaptive_flot.console.tables import fitted, print_table
 from adaptive_flot.report.compare.tables import compare_tables
 from adaptive_flot.report.kit.parts import Table
-from adaptive_flot.runner.commands.run_files import write_json
+from adaptive_flot.runner.commands.runs.run_files import write_json
 from tests.cli.conftest import Call
 from tests.report.test_compare import comparison
 from tests.runner.commands.test_runs_table import closed_loop_summary

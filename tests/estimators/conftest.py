@@ -9,7 +9,7 @@ import pytest
 
 from adaptive_flot.contracts import AnyEstimator, Estimate, Prior, Sample, Setup, full_parameters
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.greybox.stepping.trajectory import Trajectory
 

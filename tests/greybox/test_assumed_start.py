@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adaptive_flot.greybox import Dataset
-from adaptive_flot.greybox.assumed_start import wrong_start
+from adaptive_flot.greybox.steady.assumed_start import wrong_start
 from tests.greybox.test_model_checks import box
 
 

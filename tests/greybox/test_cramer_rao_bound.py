@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.contracts import Prior
-from adaptive_flot.greybox.cramer_rao_bound import (
+from adaptive_flot.greybox.filtering.cramer_rao_bound import (
     ParameterDrift,
     drift_of_time_profile,
     linearise_trajectory,

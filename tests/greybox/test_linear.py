@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from adaptive_flot.greybox.linear import linearise
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.linear import linearise
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 
 
 def test_linear_model_is_the_derivative_of_the_cell(model: Model) -> None:

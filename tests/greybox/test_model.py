@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from adaptive_flot.errors import ModelError, RangeError
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Kind, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from benchmarks.timing import scipy_reference as reference
 
 Equations = Callable[[Scope], None]

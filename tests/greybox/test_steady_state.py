@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state, steady_state_gradient
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from benchmarks.timing import scipy_reference as reference
 
 NOMINAL = np.array([1.5e-3, 1.67e-4, 0.38])

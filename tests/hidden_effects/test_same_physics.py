@@ -12,7 +12,7 @@ import pytest
 
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation import make_model
 from benchmarks.hidden_effects.cell.sites import OUTPUTS

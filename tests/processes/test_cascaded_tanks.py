@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from adaptive_flot.contracts import Setup, Status
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.metrics import rmse

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation import make_model
 

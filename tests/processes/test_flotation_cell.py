@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes.flotation import make_model, read_cell
 from adaptive_flot.processes.flotation.level_loop import loop_poles

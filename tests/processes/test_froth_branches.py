@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.processes.flotation import froth
 
 VG, SETTLING, D_INT, D_FROTH, DEPTH, AXIAL, AREA, K1, BORDER = 8e-3, 6.5e-4, 6e-4, 8e-3, 0.1, 5e-5, 0.18, 5e4, 6.815

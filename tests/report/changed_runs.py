@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 
 
 def with_table(run: Run, table: pd.DataFrame) -> Run:

@@ -12,12 +12,13 @@ import pytest
 from adaptive_flot.charts.plotdata import Chart, Role, Strip
 from adaptive_flot.greybox.data.tables import read_table
 from adaptive_flot.report.kit.figures import chart_figure, time_figure
-from adaptive_flot.report.run import closed_loop, series
+from adaptive_flot.report.run import series
+from adaptive_flot.report.run.control import closed_loop
 from adaptive_flot.report.run.page import run_report
 from adaptive_flot.report.run.series import CaseRuns
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_files import write_runs
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_files import write_runs
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.report.changed_runs import with_table

@@ -15,8 +15,8 @@ from adaptive_flot.report.run.page import run_report
 from adaptive_flot.runner.adaptation import supervisor
 from adaptive_flot.runner.adaptation.extension import Extension
 from adaptive_flot.runner.adaptation.search import Finding
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_files import plain, run_summary
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_files import plain, run_summary
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.runner.adaptation.test_discovery_in_the_loop import CLOSED, GROWTH, OPTIONS

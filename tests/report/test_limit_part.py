@@ -11,7 +11,7 @@ from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.run.cramer_rao_limit import limit_part
 from adaptive_flot.report.run.series import CaseRuns, cases
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import TrueRun
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation

@@ -19,8 +19,8 @@ from adaptive_flot.report.run.absorbed import absorbed
 from adaptive_flot.report.run.findings import below_published, candidates, findings, swing_share
 from adaptive_flot.report.run.page import run_report, write_run_report
 from adaptive_flot.report.run.tables import fits_table, status_table
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.report.changed_runs import with_table

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.edits import edit

@@ -14,7 +14,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 
 DIRECTION_PRIOR = 5.0
 """Standard deviation of the weak prior of a direction of the initial state, in units of the states' scales."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from adaptive_flot.greybox.ensemble.lane_source import lane_source
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, load_library
 from adaptive_flot.greybox.stepping.rows import worker_threads
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import InstructionSet, supported
 

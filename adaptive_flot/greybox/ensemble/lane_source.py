@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 import casadi as ca
 
-from adaptive_flot.greybox.stepping.compiled import CompileError
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
 from adaptive_flot.greybox.stepping.whole_record.statements import BINARY, CODES, UNARY
 
 _HEAD = """

@@ -13,8 +13,8 @@ from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
 from adaptive_flot.greybox.ensemble.loop_library import LoopLibrary
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError, CompileWarning
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, CompileWarning
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.rows import over_rows
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import InstructionSet
 

@@ -14,7 +14,7 @@ from functools import partial
 import casadi as ca
 
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary, opened
-from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, library_of, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import FLAGS, CompileError, library_of, load_library
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import SCALAR
 
 _SOURCE = """

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import SCALAR
 

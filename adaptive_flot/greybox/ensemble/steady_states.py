@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import CONVERGED, solve_for_slope
+from adaptive_flot.greybox.steady.steady_state import CONVERGED, solve_for_slope
 
 MOST_STEPS = 50
 SETTLED = 1e-14

@@ -8,6 +8,7 @@ filter.py       The filter over a whole record: innovations, their variances, th
 smoother.py     The states and walking parameters given the whole record, with their standard deviations.
 prediction.py   Errors k steps ahead of the filtered state.
 likelihood.py   Parameters and noise by maximum likelihood.
+cramer_rao_bound.py  Posterior Cramer-Rao bound: the smallest error that any estimator can have.
 """
 
 from adaptive_flot.greybox.filtering.filter import Filtered, RecordFilter

@@ -14,8 +14,8 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering.noise_model import STUDENT, NoiseModel
 from adaptive_flot.greybox.filtering.step import filter_step, first_correction
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.compiled import CompileError
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 

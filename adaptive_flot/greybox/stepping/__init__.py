@@ -6,9 +6,7 @@ step_functions.py  The compiled functions of one interval: the step, its derivat
 stepper.py    Simulation of a record, with or without sensitivities.
 trajectory.py What a simulation returns.
 fast_step.py  The same in fewer operations, where the model allows.
-compiled.py   Machine code with the system's C compiler, and its cache.
-safe_folder.py Whether a file is this user's own, before it is loaded as code.
-fastcall.py   Calls of a compiled function without copies.
+compiling/    Machine code with the system's C compiler, its cache, and calls without copies.
 recursion.py  Many intervals in one call.
 nodes.py      A densely sampled record in longer intervals.
 graded_nodes.py  A coarsely sampled one in short steps after a move, and long ones at rest.

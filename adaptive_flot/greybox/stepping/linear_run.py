@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.greybox.quantities import FloatArray
-from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import FLAGS, CompileError, load_library
 
 _SOURCE = """
 #include <stdint.h>

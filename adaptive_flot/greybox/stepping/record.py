@@ -10,7 +10,7 @@ import numpy as np
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.nodes import Nodes, NodeStepper
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory

@@ -10,8 +10,8 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 NESTED = 10

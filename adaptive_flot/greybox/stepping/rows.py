@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from adaptive_flot.greybox.stepping.compiled import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiled
 
 CHUNK = 64
 """Most rows a `mapaccum` call takes at once: what it costs to make grows with its rows, what it saves does not."""

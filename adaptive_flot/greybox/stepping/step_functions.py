@@ -11,7 +11,7 @@ import casadi as ca
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.stepping.compiled import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiled
 from adaptive_flot.greybox.stepping.fast_step import Moving, Symbols, fast_step, fast_step_along
 
 IDAS_TOLERANCE = 1e-11

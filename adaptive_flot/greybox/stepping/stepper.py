@@ -21,7 +21,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping import step_functions
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.rows import chunks
 from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.trajectory import Sensitivities, Trajectory

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from adaptive_flot.contracts import AnyEstimator, Decision, Estimate, PlantRecord, Prior, Sample, Status
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.runner.loop.loop import Step
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.returned import checked_estimate

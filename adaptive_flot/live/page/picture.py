@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.contracts import Estimate, OperatingPoint, Plan, Sample, Status, full_parameters
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.page.axes import Axes, plain
 from adaptive_flot.live.page.beside import BesideTheChart

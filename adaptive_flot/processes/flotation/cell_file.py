@@ -16,7 +16,7 @@ from adaptive_flot.files import replace_file
 from adaptive_flot.greybox.model import Parameter
 from adaptive_flot.processes.flotation.parameters import OPERATION_UNITS, PARAMETERS, Cell, Spec
 from adaptive_flot.resources import cell_file
-from adaptive_flot.yaml_files import read_yaml
+from adaptive_flot.yaml_files.read import read_yaml
 
 HIGHEST_GAS_VELOCITY = 0.03
 """Superficial gas velocity [m/s] up to which a cell file without `air_flow_valid` is trusted."""

@@ -12,8 +12,8 @@ import control
 import numpy as np
 
 from adaptive_flot.errors import RangeError
-from adaptive_flot.greybox.linear import linearise, pi_gains
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.steady.linear import linearise, pi_gains
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from adaptive_flot.report.kit.parts import Part, Picture, Section, present
 from adaptive_flot.report.kit.plotdata import Spread
 from adaptive_flot.report.kit.wording import seed_list
 from adaptive_flot.runner.commands.comparison import Comparison, seeds_of
-from adaptive_flot.runner.commands.runs_table import SUMMARY
+from adaptive_flot.runner.commands.runs.runs_table import SUMMARY
 
 SPREADS = (("recovery", "recovery [–]", 1.0), ("below_limit", "below limit [% of time]", 100.0))
 """Columns, axis labels and factors of the panels beside that of the value."""

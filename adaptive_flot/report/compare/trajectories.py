@@ -16,7 +16,7 @@ from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Picture
 from adaptive_flot.report.kit.wording import spaced
 from adaptive_flot.runner.commands.comparison import ORACLE, Comparison, Contender
-from adaptive_flot.runner.commands.run_files import time_series_file
+from adaptive_flot.runner.commands.runs.run_files import time_series_file
 
 OPERATION = ("concentrate_grade", "recovery")
 

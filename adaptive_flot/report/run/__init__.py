@@ -11,10 +11,7 @@ tables.py               Fits, errors, innovations, statuses.
 series.py               From runs to what the figures draw.
 pictures.py             Charts of inputs, parameters, outputs, residuals.
 cramer_rao_limit.py     What the measurements say at best.
-closed_loop.py          Operation, plans against what happened, who decided.
-closed_loop_figures.py  Charts of the closed loop.
+control/                Operation, plans, limits that no plan kept, optimisations that failed.
 inquiries.py            Effects that were searched for while the loop ran.
 fault_table.py          Faults that were injected.
-unsolved.py             Optimisations without a valid solution.
-softened.py             Limits that no plan kept.
 """

@@ -9,13 +9,13 @@ from adaptive_flot.report.kit import distributions
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Bullets, Part, Picture, present
 from adaptive_flot.report.run import pictures, series, tables
-from adaptive_flot.report.run.closed_loop_figures import operation_picture, plan_pictures
+from adaptive_flot.report.run.control.closed_loop_figures import operation_picture, plan_pictures
+from adaptive_flot.report.run.control.softened import softened_table
+from adaptive_flot.report.run.control.unsolved import unsolved_table
 from adaptive_flot.report.run.cramer_rao_limit import limit_part
 from adaptive_flot.report.run.fault_table import fault_table
 from adaptive_flot.report.run.inquiries import watch_section
 from adaptive_flot.report.run.series import CaseRuns
-from adaptive_flot.report.run.softened import softened_table
-from adaptive_flot.report.run.unsolved import unsolved_table
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Picture, Table
 from adaptive_flot.report.kit.wording import number, seed_list
 from adaptive_flot.report.run.series import CaseRuns
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit, limits
 from adaptive_flot.runner.scenario.realisation import Realisation
 

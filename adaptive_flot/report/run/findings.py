@@ -15,7 +15,7 @@ from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.absorbed import absorbed
 from adaptive_flot.report.run.series import CaseRuns, residuals
 from adaptive_flot.report.run.tables import SIGNIFICANT, coverage, median, quantities, relative_error
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 
 TIED = 0.8
 """Correlation of the errors of two parameters from which they are said to lie along one line."""

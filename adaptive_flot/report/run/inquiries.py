@@ -13,7 +13,7 @@ from adaptive_flot.greybox.model import FloatArray, Quantity
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Picture, Table
 from adaptive_flot.report.kit.wording import joined, number, p_text, spaced
-from adaptive_flot.report.run.closed_loop import colours
+from adaptive_flot.report.run.control.closed_loop import colours
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.adaptation.inquiry import Inquiry
 from adaptive_flot.runner.results.prediction import one_move_errors, one_step_errors, rms

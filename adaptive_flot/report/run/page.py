@@ -14,14 +14,14 @@ from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Section
 from adaptive_flot.report.kit.wording import joined, seed_list, spaced
 from adaptive_flot.report.run import answer, series
 from adaptive_flot.report.run.chapter import Topic, spread_picture, title, topics
-from adaptive_flot.report.run.closed_loop_figures import contenders_picture
+from adaptive_flot.report.run.control.closed_loop_figures import contenders_picture
 from adaptive_flot.report.run.findings import below_published, candidates
 from adaptive_flot.report.run.inquiries import told_at_the_top
 from adaptive_flot.report.run.pictures import parameter_picture
 from adaptive_flot.report.run.series import CaseRuns
 from adaptive_flot.runner.commands.comparison import Comparison, compare_runs
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 Results = Sequence[tuple[Scenario, Sequence[Run]]]

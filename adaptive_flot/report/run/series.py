@@ -14,7 +14,7 @@ from adaptive_flot.charts.plotdata import Panel, Role, Trace
 from adaptive_flot.charts.units import amount
 from adaptive_flot.greybox.model import FloatArray, Quantity
 from adaptive_flot.report.kit.plotdata import Residuals, Spread
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.results.whiteness import ljung_box_p
 from adaptive_flot.runner.scenario.scenario import Scenario
 

@@ -12,7 +12,7 @@ from adaptive_flot.metrics import rmse
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.kit.wording import number, p_text, seed_list
 from adaptive_flot.report.run.series import CaseRuns, residuals
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.results.whiteness import WHITENESS_LAGS
 
 SIGNIFICANT = 0.05

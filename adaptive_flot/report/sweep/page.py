@@ -16,7 +16,7 @@ from adaptive_flot.report.kit.wording import seed_list
 from adaptive_flot.report.sweep import answer
 from adaptive_flot.report.sweep.seeds import Failed, worst_table
 from adaptive_flot.runner.commands.comparison import Comparison, compare, seeds_of
-from adaptive_flot.runner.commands.runs_table import read_runs
+from adaptive_flot.runner.commands.runs.runs_table import read_runs
 from adaptive_flot.studies.study_file import Study
 
 

@@ -18,7 +18,7 @@ from scipy.optimize import root
 
 from adaptive_flot.contracts import AnyController, AnyEstimator, Estimate, Prior, Setup, TakesOver, full_parameters
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.adaptation.extension import Extension
 from adaptive_flot.runner.loop.loop import Running, Step

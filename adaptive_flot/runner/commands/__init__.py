@@ -2,11 +2,7 @@
 
 Map
 ---
-run.py             Run a scenario for estimators, controllers and seeds.
-side_by_side/      Runs of many seeds at once, where nothing that is decided depends on an estimate.
-run_result.py      What one run leaves behind.
-run_files.py       Files that a run writes.
-runs_table.py      One row a run.
+runs/              Runs of a scenario for estimators, controllers and seeds; what they leave.
 comparison.py      Controllers and estimators side by side.
 fingerprint.py     What a scenario asks of its controllers: only like is compared with like.
 estimate.py        A batch fit to a measured record, then a replay through each estimator.

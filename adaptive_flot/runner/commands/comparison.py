@@ -13,9 +13,9 @@ import pandas as pd
 from adaptive_flot.described import Described
 from adaptive_flot.errors import ResultError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.commands.run_files import run_summary
-from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.runs_table import run_rows
+from adaptive_flot.runner.commands.runs.run_files import run_summary
+from adaptive_flot.runner.commands.runs.run_result import Run
+from adaptive_flot.runner.commands.runs.runs_table import run_rows
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 FIXED, ORACLE = "fixed", "oracle"

@@ -13,8 +13,8 @@ from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
 from adaptive_flot.errors import DataError, ModelError, PluginError, located, near_match
-from adaptive_flot.greybox.assumed_start import wrong_start
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.steady.assumed_start import wrong_start
 from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, OF_A_RECORD, construct, load
 from adaptive_flot.runner.commands.innovations.estimate import (

@@ -9,7 +9,7 @@ from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import Source
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 

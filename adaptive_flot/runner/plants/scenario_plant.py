@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from adaptive_flot.contracts import PlantRecord
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.runner.plants.plant import SimulatedPlant
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario

@@ -6,7 +6,7 @@ import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.sensors import without_sensor_effects
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 
 
 class TrueOutputs:

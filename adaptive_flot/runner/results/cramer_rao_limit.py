@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from adaptive_flot.greybox.cramer_rao_bound import (
+from adaptive_flot.greybox.filtering.cramer_rao_bound import (
     LinearisedTrajectory,
     ParameterDrift,
     drift_of_time_profile,
@@ -17,7 +17,7 @@ from adaptive_flot.greybox.cramer_rao_bound import (
     posterior_cramer_rao_bound,
 )
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state_gradient
+from adaptive_flot.greybox.steady.steady_state import steady_state_gradient
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.plants.scenario_plant import initial_state
 from adaptive_flot.runner.scenario.measurement_noise import measured_at, noise_std

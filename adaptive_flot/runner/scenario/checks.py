@@ -7,8 +7,8 @@ from adaptive_flot.greybox.data.tables import MOST_ROWS
 from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.runner.scenario.discovery_options import FEWEST
 from adaptive_flot.runner.scenario.faults import ControllerFault, SlowAnalyser, Stuck
+from adaptive_flot.runner.scenario.inputs.recorded import Recorded
 from adaptive_flot.runner.scenario.realisation import Realisation
-from adaptive_flot.runner.scenario.recorded import Recorded
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 MOST_INTERVALS = MOST_ROWS

@@ -13,8 +13,8 @@ from adaptive_flot.processes.effect_entry import EffectEntry
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.discovery_options import DiscoveryOptions
 from adaptive_flot.runner.scenario.faults import Fault
-from adaptive_flot.runner.scenario.profiles import FeedWalk, InputProfile, ParameterProfile
-from adaptive_flot.yaml_part import Part
+from adaptive_flot.runner.scenario.inputs.profiles import FeedWalk, InputProfile, ParameterProfile
+from adaptive_flot.yaml_files.part import Part
 
 LARGEST_SEED = 2**63 - 1
 """Seeds are a column of 64-bit integers in the table of runs."""

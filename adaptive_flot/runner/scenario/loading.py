@@ -16,8 +16,8 @@ from adaptive_flot.runner.scenario.checks import check_scenario
 from adaptive_flot.runner.scenario.keys import ScenarioFile
 from adaptive_flot.runner.scenario.recorded_inputs import with_values
 from adaptive_flot.runner.scenario.scenario import Scenario
-from adaptive_flot.yaml_files import read_yaml
-from adaptive_flot.yaml_problems import first_problem
+from adaptive_flot.yaml_files.problems import first_problem
+from adaptive_flot.yaml_files.read import read_yaml
 
 
 def shipped_scenarios() -> dict[str, Path]:

@@ -10,8 +10,8 @@ import numpy as np
 from adaptive_flot.described import Described
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.runner.scenario.disturbances import Disturbances, draw_disturbances
+from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.measurement_noise import draw_measurement_noise
-from adaptive_flot.runner.scenario.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 

@@ -14,8 +14,8 @@ from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.registry import read_measurements
 from adaptive_flot.records.tag_map import load_tag_map
 from adaptive_flot.runner.scenario.checks import check_scenario
-from adaptive_flot.runner.scenario.profiles import InputProfile
-from adaptive_flot.runner.scenario.recorded import Recorded, beside
+from adaptive_flot.runner.scenario.inputs.profiles import InputProfile
+from adaptive_flot.runner.scenario.inputs.recorded import Recorded, beside
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 

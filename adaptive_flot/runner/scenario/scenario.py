@@ -13,9 +13,9 @@ from adaptive_flot.described import Described
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.faults import ControllerFault, PlantFault, SlowAnalyser
+from adaptive_flot.runner.scenario.inputs.profiles import FeedWalk, ParameterProfile
+from adaptive_flot.runner.scenario.inputs.recorded import Recorded
 from adaptive_flot.runner.scenario.keys import ScenarioFile
-from adaptive_flot.runner.scenario.profiles import FeedWalk, ParameterProfile
-from adaptive_flot.runner.scenario.recorded import Recorded
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,7 +24,7 @@ import numpy as np
 from adaptive_flot.contracts import ControllerSetup, Economics, Estimate, Limits
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.planner import Found
 from controllers.economic_mpc.probing.information import Information
 from controllers.economic_mpc.probing.stakes import Stakes

@@ -20,8 +20,8 @@ from adaptive_flot.contracts import ControllerSetup, Economics, OperatingPoint
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.sensors import without_sensor_effects
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.problem.layout import StageLayout
 
 STEP = 0.01

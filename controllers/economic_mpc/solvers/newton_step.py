@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.condensing import Condensed, LinearisedStages
 from controllers.economic_mpc.problem.derivatives import Derivatives

@@ -16,7 +16,7 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.problem.collocation import OptimalControlProblem
 from controllers.economic_mpc.problem.derivatives import Assembled
 from controllers.economic_mpc.problem.layout import Multipliers

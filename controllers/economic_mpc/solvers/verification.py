@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.problem.layout import Multipliers
 
 LARGEST_VIOLATION = 1e-4

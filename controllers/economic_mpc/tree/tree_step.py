@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from controllers.economic_mpc.problem.condensing import Condensed, LinearisedStages
 from controllers.economic_mpc.problem.derivatives import Derivatives
 from controllers.economic_mpc.problem.layout import Multipliers

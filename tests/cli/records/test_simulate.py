@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from tests.cli.conftest import Call
 from tests.runner.records import PlantRecord
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from adaptive_flot import console
-from adaptive_flot.runner.commands.run_files import write_json
+from adaptive_flot.console import lines as console
+from adaptive_flot.runner.commands.runs.run_files import write_json
 from tests.cli.conftest import Call, WriteScenario
 from tests.runner.commands.test_runs_table import closed_loop_summary
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.cli.conftest import Call, WriteScenario
 

@@ -10,7 +10,7 @@ import pytest
 
 from adaptive_flot.contracts import ControllerSetup
 from adaptive_flot.errors import ModelError
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.testing import controller_case
 from controllers.economic_mpc.chance_constraint import ChanceConstraint
 from controllers.economic_mpc.controller import EconomicMpc

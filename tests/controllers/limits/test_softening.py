@@ -10,8 +10,8 @@ import pytest
 
 from adaptive_flot.contracts import Decision, Status
 from adaptive_flot.errors import ModelError
-from adaptive_flot.report.run.softened import softened_table
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.report.run.control.softened import softened_table
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.results.timeseries import SOFTENED
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.testing import ControllerCase, controller_case

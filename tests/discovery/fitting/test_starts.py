@@ -19,7 +19,7 @@ from adaptive_flot.discovery.search.simplify import simpler
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.processes import flotation
 from tests.discovery.heated import DT, EXPONENT, NOISE, Truth, changed, heated_tank, tank_record

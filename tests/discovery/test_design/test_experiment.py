@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.console import print_verdict
+from adaptive_flot.console.lines import print_verdict
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.test_design.experiment import plan_experiment

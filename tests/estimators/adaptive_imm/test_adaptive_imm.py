@@ -11,7 +11,7 @@ import pytest
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.adaptive_imm import AdaptiveImm
 from estimators.adaptive_imm.bank import Contamination, Mixing, Triangles
 from estimators.ekf import Ekf

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from adaptive_flot.contracts import Prior, Sample, Setup
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from estimators.ekf import Ekf
 from estimators.imm.estimator import Imm
 from estimators.imm.mixing import combine_function, mix_function

@@ -17,8 +17,8 @@ from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping import compiled
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.compiling import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from estimators.pem import Pem
 from estimators.pem.free_runs import InitialState
 from estimators.pem.trust_region import Mask, Squares, solve_in_step

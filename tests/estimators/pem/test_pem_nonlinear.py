@@ -14,7 +14,7 @@ from adaptive_flot.contracts import Setup, Status, full_parameters
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from estimators.pem import Pem
 from estimators.pem.free_runs import InitialState

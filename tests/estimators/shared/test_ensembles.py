@@ -14,9 +14,9 @@ from adaptive_flot.contracts import Estimate, Prior, Sample, Setup, Status
 from adaptive_flot.contracts.ensemble_record import EnsembleRecord, tracks_ensembles
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping import compiled
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from estimators.adaptive_imm import AdaptiveImm
 from estimators.ekf import Ekf

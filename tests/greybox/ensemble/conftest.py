@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from adaptive_flot.greybox.stepping import compiled
+from adaptive_flot.greybox.stepping.compiling import compiled
 
 
 @pytest.fixture(autouse=True)

@@ -13,9 +13,9 @@ from adaptive_flot.greybox.ensemble.ensemble import Ensemble
 from adaptive_flot.greybox.ensemble.lane_library import LaneLibrary
 from adaptive_flot.greybox.ensemble.one_member import OneMember
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping import compiled as compiled_functions
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling import compiled as compiled_functions
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import AVX2, AVX512, InstructionSet, supported
 

@@ -15,7 +15,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.ensemble import lane_library
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError, CompileWarning, compiler_problem
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, CompileWarning, compiler_problem
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import BY_LEVEL, SCALAR, InstructionSet, supported
 
 PROBLEM = compiler_problem()

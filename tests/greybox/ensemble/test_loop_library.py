@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from adaptive_flot.greybox.ensemble import lane_library
 from adaptive_flot.greybox.ensemble.lanes import Lanes
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping import compiled
-from adaptive_flot.greybox.stepping.compiled import CompileWarning, compiler_problem
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileWarning, compiler_problem
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 
 PROBLEM = compiler_problem()
 needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be compiled here: {PROBLEM}")

@@ -9,7 +9,7 @@ import pytest
 
 from adaptive_flot.greybox.ensemble.steady_states import SteadyStates
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state, steady_state_gradient
+from adaptive_flot.greybox.steady.steady_state import steady_state, steady_state_gradient
 from tests.estimators import toys
 from tests.greybox.ensemble.test_ensemble import COMPILED, NAMES
 

@@ -8,7 +8,7 @@ import pytest
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Dataset, Effect, FloatArray, Model, Parameter, Quantity, Scope, Stepper
 from adaptive_flot.greybox.filtering import NoiseModel, RecordFilter, maximise, prediction_errors, smooth
-from adaptive_flot.greybox.stepping.compiled import CompileError
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
 from adaptive_flot.greybox.stepping.whole_record import tape_recursion
 
 DT, DECAY = 2.0, 0.05

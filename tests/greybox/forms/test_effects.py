@@ -11,7 +11,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.catalogue import FORMS
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
 

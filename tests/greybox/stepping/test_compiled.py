@@ -15,10 +15,15 @@ import pytest
 
 from adaptive_flot.contracts import Estimate, Prior, Sample, Setup
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping import compiled as module
-from adaptive_flot.greybox.stepping.compiled import CompileWarning, compile_function, compiled, compiler_problem
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling import compiled as module
+from adaptive_flot.greybox.stepping.compiling.compiled import (
+    CompileWarning,
+    compile_function,
+    compiled,
+    compiler_problem,
+)
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.plugins import ESTIMATORS, load
 from adaptive_flot.testing.cases import estimator_case, run_estimator
@@ -162,7 +167,7 @@ RACER = """
 import sys, time
 from pathlib import Path
 import casadi as ca
-from adaptive_flot.greybox.stepping import compiled as module
+from adaptive_flot.greybox.stepping.compiling import compiled as module
 folder = Path(sys.argv[1])
 module.cache_folder = lambda: folder / "cache"
 x = ca.SX.sym("x", 3)

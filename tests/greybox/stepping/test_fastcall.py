@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 
 
 def _function() -> ca.Function:

@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.fast_step import closed_phi
 from adaptive_flot.greybox.stepping.graded_nodes import graded_nodes
 from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps

@@ -5,7 +5,7 @@ import pytest
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.greybox.stepping.stepper import Stepper
 

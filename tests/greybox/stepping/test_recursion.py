@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.stepping import recursion
-from adaptive_flot.greybox.stepping.compiled import CompileError, compiler_problem
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, compiler_problem
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.recursion import Recursion, row_by_row
 from adaptive_flot.greybox.stepping.whole_record import tape_recursion
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion

@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from adaptive_flot.greybox.stepping import compiled
 from adaptive_flot.greybox.stepping import rows as module
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
+from adaptive_flot.greybox.stepping.compiling import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
 from adaptive_flot.greybox.stepping.rows import over_rows
 
 

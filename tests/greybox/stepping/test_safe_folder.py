@@ -9,9 +9,14 @@ import casadi as ca
 import pytest
 
 from adaptive_flot.greybox.ensemble.lanes import Lanes
-from adaptive_flot.greybox.stepping import compiled as module
-from adaptive_flot.greybox.stepping.compiled import CompileError, CompileWarning, compile_function, compiler_problem
-from adaptive_flot.greybox.stepping.safe_folder import make_private, problem_of
+from adaptive_flot.greybox.stepping.compiling import compiled as module
+from adaptive_flot.greybox.stepping.compiling.compiled import (
+    CompileError,
+    CompileWarning,
+    compile_function,
+    compiler_problem,
+)
+from adaptive_flot.greybox.stepping.compiling.safe_folder import make_private, problem_of
 
 PROBLEM = compiler_problem()
 needs_compiler = pytest.mark.skipif(PROBLEM is not None, reason=f"nothing can be compiled here: {PROBLEM}")

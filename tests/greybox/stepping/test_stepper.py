@@ -9,8 +9,8 @@ import pytest
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray, Model, Scope
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.rows import CHUNK
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 

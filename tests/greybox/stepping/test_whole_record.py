@@ -13,9 +13,10 @@ from adaptive_flot.greybox import Effect, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.forms.catalogue import FORMS
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.greybox.stepping import compiled, stepper
-from adaptive_flot.greybox.stepping.compiled import CompileError, compiler_problem
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.greybox.stepping import stepper
+from adaptive_flot.greybox.stepping.compiling import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, compiler_problem
 from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.nodes import NodeStepper
 from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians

@@ -16,7 +16,7 @@ from sqlalchemy import select
 from adaptive_flot.contracts import Prior, Sample
 from adaptive_flot.errors import LinkError
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.outcome import Outcome

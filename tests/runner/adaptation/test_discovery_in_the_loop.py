@@ -20,15 +20,15 @@ from adaptive_flot.errors import AdaptiveFlotError, ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.adaptation import search, supervisor
 from adaptive_flot.runner.adaptation.extension import Extension
 from adaptive_flot.runner.adaptation.search import Finding, search_record
 from adaptive_flot.runner.adaptation.whiteness_watch import Alarm
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from tests.runner.conftest import WriteScenario

@@ -23,7 +23,7 @@ from adaptive_flot.resources import cell_file
 from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record
 from adaptive_flot.runner.commands.estimate_files import estimate_summary, save_fitted_cell, write_replays
 from adaptive_flot.runner.commands.record_blocks import Blocks, read_blocks
-from adaptive_flot.runner.commands.run_files import plain
+from adaptive_flot.runner.commands.runs.run_files import plain
 from adaptive_flot.runner.results.replay_table import ReplayErrors
 from tests.runner.records import NOISE, TRUTH, PlantRecord, plant_record
 

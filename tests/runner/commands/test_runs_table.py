@@ -14,9 +14,9 @@ import pytest
 
 from adaptive_flot.errors import ResultError
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run_files import plain, run_summary, write_json
-from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.runs_table import KEYS, read_runs, run_rows
+from adaptive_flot.runner.commands.runs.run_files import plain, run_summary, write_json
+from adaptive_flot.runner.commands.runs.run_result import Run
+from adaptive_flot.runner.commands.runs.runs_table import KEYS, read_runs, run_rows
 from adaptive_flot.runner.results.accounts import control_account
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario

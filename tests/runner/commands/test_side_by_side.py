@@ -14,12 +14,12 @@ from pandas.testing import assert_frame_equal
 
 from adaptive_flot.contracts import Decision, Estimate, Sample
 from adaptive_flot.errors import RangeError
-from adaptive_flot.greybox.stepping import compiled
-from adaptive_flot.greybox.stepping.compiled import compiler_problem
-from adaptive_flot.runner.commands import run as run_module
-from adaptive_flot.runner.commands.run import run_one, run_scenario
-from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.side_by_side import can_go_side_by_side, run_side_by_side
+from adaptive_flot.greybox.stepping.compiling import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
+from adaptive_flot.runner.commands.runs import run as run_module
+from adaptive_flot.runner.commands.runs.run import run_one, run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
+from adaptive_flot.runner.commands.runs.side_by_side import can_go_side_by_side, run_side_by_side
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation

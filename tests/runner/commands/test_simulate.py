@@ -12,7 +12,7 @@ from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.greybox.model import Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.commands.simulate import simulate_file, simulate_record
 

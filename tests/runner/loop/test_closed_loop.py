@@ -13,8 +13,8 @@ from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox import Model
 from adaptive_flot.processes.flotation.account import account
 from adaptive_flot.processes.flotation.economics import Prices
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.scenario import Scenario
 

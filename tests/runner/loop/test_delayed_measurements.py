@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.contracts import Status
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.plants.scenario_plant import simulate_plant
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.measurement_noise import measured_at

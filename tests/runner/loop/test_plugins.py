@@ -15,7 +15,7 @@ from adaptive_flot.plugins import ESTIMATORS, load
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.runner.commands.estimate import estimate_record
 from adaptive_flot.runner.commands.record_blocks import read_blocks
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.estimators import toys

@@ -11,10 +11,10 @@ import yaml
 
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.processes.flotation.account import account
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.scenario.inputs.profiles import Factors, Steps
 from adaptive_flot.runner.scenario.keys import DisturbancePart
 from adaptive_flot.runner.scenario.loading import load_scenario
-from adaptive_flot.runner.scenario.profiles import Factors, Steps
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.runner.conftest import WriteScenario

@@ -13,9 +13,9 @@ import yaml
 from adaptive_flot.contracts import Decision, Estimate, Sample, Status
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.report.run.unsolved import unsolved_table
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.report.run.control.unsolved import unsolved_table
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.plants.fault_injection import with_controller_faults, with_plant_faults
 from adaptive_flot.runner.plants.scenario_plant import make_plant
 from adaptive_flot.runner.scenario.loading import load_scenario

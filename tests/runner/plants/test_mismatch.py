@@ -12,9 +12,9 @@ from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.processes.flotation.cell_file import save_cell
 from adaptive_flot.resources import cell_file
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.scenario.inputs.profiles import FeedWalk
 from adaptive_flot.runner.scenario.loading import load_scenario
-from adaptive_flot.runner.scenario.profiles import FeedWalk
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.targets import scenario_inputs
 from tests.runner.conftest import WriteScenario

@@ -9,8 +9,8 @@ import pytest
 
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox import Model, Stepper
-from adaptive_flot.greybox.steady_state import steady_state
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.greybox.steady.steady_state import steady_state
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.runner.conftest import WriteScenario
 

@@ -14,8 +14,8 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run import run_scenario
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run import run_scenario
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation
 from tests.runner.conftest import WriteScenario

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.results.cramer_rao_limit import MORE_SENSORS, TrueRun, has_limit, limits
 from adaptive_flot.runner.scenario.loading import load_scenario
 from adaptive_flot.runner.scenario.realisation import Realisation

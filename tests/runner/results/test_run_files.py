@@ -15,8 +15,8 @@ from adaptive_flot.contracts import Status
 from adaptive_flot.errors import DataError, OutputError
 from adaptive_flot.files import replace_file, replace_path, write_text
 from adaptive_flot.greybox.data.tables import read_table, write_table
-from adaptive_flot.runner.commands.run_files import plain, run_summary, write_json, write_runs
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_files import plain, run_summary, write_json, write_runs
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 

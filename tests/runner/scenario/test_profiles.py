@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from adaptive_flot.runner.scenario.profiles import Change, InputProfile, RandomWalk
+from adaptive_flot.runner.scenario.inputs.profiles import Change, InputProfile, RandomWalk
 
 _ADAPTER: TypeAdapter[InputProfile] = TypeAdapter(InputProfile)
 

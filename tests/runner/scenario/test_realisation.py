@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.loading import load_scenario
-from adaptive_flot.runner.scenario.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.realisation import Realisation
 from adaptive_flot.runner.scenario.scenario import Scenario
 from tests.runner.conftest import WriteScenario

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import AdaptiveFlotError, ScenarioError
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.plugins import DEFAULT_ESTIMATOR
-from adaptive_flot.runner.commands.run import run_scenario
+from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario, shipped_scenarios
 from adaptive_flot.runner.scenario.measurement_noise import noise_std

@@ -12,7 +12,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 
 LOOSE = 50.0
 """Standard deviation of the prior of a constant that no reference tells, in its scale: next to nothing."""

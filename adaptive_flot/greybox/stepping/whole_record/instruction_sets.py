@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from adaptive_flot.greybox.stepping.compiled import FLAGS, find_compiler, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import FLAGS, find_compiler, load_library
 
 _VECTOR = (
     *("-O2", "-ftree-vectorize", "-fopenmp-simd", "-fPIC", "-shared"),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.compiled import FLAGS, CompileError, is_kept, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import FLAGS, CompileError, is_kept, load_library
 from adaptive_flot.greybox.stepping.step_functions import Interval
 from adaptive_flot.greybox.stepping.whole_record.kernels import kernels, weight_kernels
 from adaptive_flot.greybox.stepping.whole_record.source import RECORD_SOURCE, kernel_source

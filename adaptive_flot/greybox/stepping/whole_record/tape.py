@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
 from adaptive_flot.greybox.stepping.whole_record.statements import BINARY, CODES, UNARY
 
 END = "END"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import CompileError, is_kept, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, is_kept, load_library
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import AVX2, AVX512, SCALAR, supported
 from adaptive_flot.greybox.stepping.whole_record.library import KERNEL_FLAGS, LIBRARY_FLAGS, TapeStruct
 from adaptive_flot.greybox.stepping.whole_record.source import (

@@ -12,7 +12,7 @@ from adaptive_flot import provenance
 from adaptive_flot.errors import ScenarioError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.yaml_part import Part
+from adaptive_flot.yaml_files.part import Part
 
 
 class Recorded(Part):

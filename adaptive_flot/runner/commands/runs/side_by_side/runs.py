@@ -16,8 +16,8 @@ from adaptive_flot.contracts.batch import BatchFit, fits_many
 from adaptive_flot.contracts.ensemble_record import EnsembleRecord, tracks_ensembles
 from adaptive_flot.contracts.track import Track
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.side_by_side.plants import Member, Seen, simulate_plants, starts
+from adaptive_flot.runner.commands.runs.run_result import Run
+from adaptive_flot.runner.commands.runs.side_by_side.plants import Member, Seen, simulate_plants, starts
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.starts import prior_of, record_of_rows
 from adaptive_flot.runner.scenario.realisation import Realisation

@@ -13,7 +13,7 @@ from adaptive_flot.contracts import Limits
 from adaptive_flot.greybox.model import Quantity
 from adaptive_flot.report.run.series import CaseRuns, changes
 from adaptive_flot.runner.commands.comparison import ORACLE
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 
 OWN = "its own controller"
 """Word for who decides as it should."""

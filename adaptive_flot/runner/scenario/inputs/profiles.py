@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.runner.scenario.random_streams import Stream, generator
-from adaptive_flot.runner.scenario.recorded import Recorded
+from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generator
+from adaptive_flot.runner.scenario.inputs.recorded import Recorded
 
 
 class _Profile(BaseModel):

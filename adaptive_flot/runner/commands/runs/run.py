@@ -11,8 +11,8 @@ from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.errors import located
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.runner.adaptation.supervision import supervision
-from adaptive_flot.runner.commands.run_result import Run
-from adaptive_flot.runner.commands.side_by_side import can_go_side_by_side, run_side_by_side
+from adaptive_flot.runner.commands.runs.run_result import Run
+from adaptive_flot.runner.commands.runs.side_by_side import can_go_side_by_side, run_side_by_side
 from adaptive_flot.runner.loop.loop import MakePrior, Step, Supervise, run_loop, unwatched
 from adaptive_flot.runner.loop.prepared import Prepared
 from adaptive_flot.runner.loop.starts import prior_of, record_of

@@ -11,7 +11,7 @@ from adaptive_flot.charts.units import amount
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Picture
 from adaptive_flot.report.kit.wording import spaced
-from adaptive_flot.report.run import closed_loop
+from adaptive_flot.report.run.control import closed_loop
 from adaptive_flot.report.run.series import CaseRuns
 
 SELDOM = 0.001

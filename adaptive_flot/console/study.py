@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
-from adaptive_flot.console import standard_output
-from adaptive_flot.console_tables import print_table
+from adaptive_flot.console.lines import standard_output
+from adaptive_flot.console.tables import print_table
 from adaptive_flot.report.kit.parts import Table
 
 TITLE = "Fit in percent: median [5 %, 95 %] over the seeds"

@@ -15,7 +15,7 @@ from adaptive_flot import provenance
 from adaptive_flot.files import write_text
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.runner.commands.fingerprint import conditions
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 

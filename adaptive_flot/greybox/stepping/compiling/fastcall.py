@@ -12,7 +12,7 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiled import compiled
+from adaptive_flot.greybox.stepping.compiling.compiled import compiled
 
 ONE_NUMBER = ((), (1,), (1, 1))
 """Shapes that fit an argument of one number."""

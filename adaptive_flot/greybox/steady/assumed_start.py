@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.steady_state import steady_state
+from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 MATTERS = 5.0

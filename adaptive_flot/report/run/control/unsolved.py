@@ -9,7 +9,7 @@ import pandas as pd
 from adaptive_flot.contracts import Status
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.kit.wording import number
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 
 MOST_ROWS = 10
 

@@ -28,7 +28,7 @@ from typing import TypeVar
 import casadi as ca
 from platformdirs import user_cache_path
 
-from adaptive_flot.greybox.stepping.safe_folder import make_private, problem_of
+from adaptive_flot.greybox.stepping.compiling.safe_folder import make_private, problem_of
 
 FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 CACHE_LEVELS = 3

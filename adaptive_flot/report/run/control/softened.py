@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.report.kit.parts import Table
 from adaptive_flot.report.kit.wording import number
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.results.timeseries import SOFTENED
 
 

@@ -11,18 +11,18 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.text import Text
 
-from adaptive_flot.console_tables import print_table
+from adaptive_flot.console.tables import print_table
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.kit.parts import Table as Content
 from adaptive_flot.report.kit.wording import number
 from adaptive_flot.report.run.absorbed import absorbed
+from adaptive_flot.report.run.control.softened import softened_table
+from adaptive_flot.report.run.control.unsolved import unsolved_table
 from adaptive_flot.report.run.inquiries import told_at_the_top
 from adaptive_flot.report.run.series import cases
-from adaptive_flot.report.run.softened import softened_table
-from adaptive_flot.report.run.unsolved import unsolved_table
 from adaptive_flot.runner.commands.comparison import compare_runs
-from adaptive_flot.runner.commands.run_result import Run
+from adaptive_flot.runner.commands.runs.run_result import Run
 from adaptive_flot.runner.scenario.scenario import Scenario
 
 if TYPE_CHECKING:  # tables of runs need no discovery, whose libraries take a while to load

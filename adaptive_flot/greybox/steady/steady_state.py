@@ -12,7 +12,7 @@ from scipy.optimize import root
 
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.fastcall import FastCall
+from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CONVERGED = 1e-9
