@@ -5,7 +5,7 @@ has no place for what has changed.
 
 Map
 ---
-places.py        The model with further sites: at the balances of its states, at their rates and at its inputs.
+places.py        The model with further sites: at balances, rates, inputs, and beside factors.
 wording.py       What acts at such a place, in words.
 same_meaning.py  What says the same at a site of the model.
 """

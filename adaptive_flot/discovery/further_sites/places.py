@@ -1,11 +1,12 @@
-"""A model with sites where it has none: at the balances of its states, and at its inputs.
+"""A model with sites where it has none: at the balances of its states, at its inputs, and beside what is a factor.
 
-Four things may act there. With the balance ``dx/dt = f(x, u)``, an input u, and A the change::
+Five things may act there. With the balance ``dx/dt = f(x, u)``, an input u, a site of value v, and A the change::
 
     balance of x    dx/dt = f + A               a leak, a load, a heat that nobody counts
     loss of x       dx/dt = f - A x / |x|_max   a leak in proportion to what is there
     rate of x       dx/dt = f exp(A)            another capacity, volume or mass: exp(-A) times as large
     reading of u    dx/dt = f(x, u + A)         an input that is another than the record says
+    amount at v     v + A                       a seat that no longer closes, where a change is a factor
 """
 
 from __future__ import annotations
@@ -17,16 +18,19 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Mode
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import Quantity
-from adaptive_flot.greybox.scope import Scope, Site
+from adaptive_flot.greybox.scope import Role, Scope, Site
 
-BALANCE, LOSS, RATE, READING = "balance of ", "loss of ", "rate of ", "reading of "
+BALANCE, LOSS, RATE, READING, AMOUNT = "balance of ", "loss of ", "rate of ", "reading of ", "amount at "
 """How the names of the further sites begin."""
+INNER = ("process", "flow")
+"""Roles of what lies between inputs and outputs: there alone an amount says what no other site does."""
 
 
-class _Read(Scope):
-    """A scope whose inputs pass a site each, where they are asked for first; all else is that of the scope given."""
+class _Beside(Scope):
+    """The scope given, with a site at each input where it is asked for first, and beside each factor of the process."""
 
     def __init__(self, scope: Scope) -> None:
         self.__dict__ = scope.__dict__
@@ -37,10 +41,19 @@ class _Read(Scope):
             self._read[name] = self.site(READING + name, super().input(name), "actuator", "offset")
         return self._read[name]
 
+    def site(
+        self, name: str, value: ca.SX, role: Role = "process", mode: Mode = "factor", *, unit: str | None = None
+    ) -> ca.SX:
+        value = super().site(name, value, role, mode, unit=unit)
+        constants = {s.name() for s in self._symbols["parameters"].values()}
+        if role not in INNER or mode != "factor" or {s.name() for s in ca.symvar(value)} <= constants:
+            return value
+        return super().site(AMOUNT + name, value, "process", "offset", unit=unit)
+
 
 @dataclass(frozen=True)
 class _WithFurtherSites:
-    """The equations of a model, with a site at each input and some at the derivative of each of some states."""
+    """The equations of a model, with sites at inputs and factors, and some at the derivative of each of some states."""
 
     equations: Callable[[Scope], None]
     states: tuple[str, ...]
@@ -48,7 +61,7 @@ class _WithFurtherSites:
     sizes: tuple[tuple[str, float], ...]
 
     def __call__(self, m: Scope) -> None:
-        self.equations(_Read(m))
+        self.equations(_Beside(m))
         sizes = dict(self.sizes)
         for name in self.states:
             rate = m.derivatives[name]
@@ -81,7 +94,12 @@ def loss_size(state: Quantity) -> float:
 
 def further_sites(model: Model) -> tuple[Site, ...]:
     """The further sites of such a model."""
-    return tuple(s for s in model.sites if s.name.startswith((BALANCE, LOSS, RATE, READING)))
+    return tuple(s for s in model.sites if s.name.startswith((BALANCE, LOSS, RATE, READING, AMOUNT)))
+
+
+def is_part(place: str, site: str) -> bool:
+    """Whether a further site is beside a site of the model: the part is the same, and it changes in another way."""
+    return place == AMOUNT + site
 
 
 def stays_in_range(model: Model, record: Dataset, place: str, amount: float) -> bool:

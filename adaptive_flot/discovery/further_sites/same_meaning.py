@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import passed_on
-from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, READING
+from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, READING, is_part
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -19,12 +19,14 @@ from which two differ."""
 def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = False) -> bool:
     """Whether an effect says the same as a change at a further site; or does the same, whatever it says.
 
-    An amount at a site that stands for one; an input that is asked of the actuator whose site it passes; and whatever
-    else in the process does the same to every state and output, as a capacity does. A drive that alone moves a mass
-    does what another mass would do, but it does not mean that.
+    An amount at a site that stands for one, or beside the factor of the site; an input that is asked of the actuator
+    whose site it passes; and whatever else in the process does the same to every state and output, as a capacity does.
+    A drive that alone moves a mass does what another mass would do, but it does not mean that.
     """
     site = _site(model, effect.site)
     mode = effect.mode or site.mode
+    if is_part(place, site.name):
+        return True
     if place.startswith(READING) and passed_on(model).get(site.name) == place.removeprefix(READING):
         return True
     if site.role == "sensor":

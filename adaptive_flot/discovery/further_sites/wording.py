@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, RATE, READING, loss_size
+from adaptive_flot.discovery.further_sites.places import AMOUNT, BALANCE, LOSS, RATE, READING, loss_size
 from adaptive_flot.greybox.model import Model
 
 NO_SITE = "the model has no site for that"
@@ -36,6 +36,11 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
         unit = model.inputs[model.index("inputs", name)].unit
         off = f"{abs(amount):.3g} {'' if unit == '-' else unit}".strip()
         return f"{_plain(name)} were {off} {'more' if amount > 0 else 'less'} than the record says{at}"
+    if site.startswith(AMOUNT):
+        name = site.removeprefix(AMOUNT)
+        size = f"{abs(amount):.3g} {next(s.unit for s in model.sites if s.name == name) or '-'}".removesuffix(" -")
+        much = f"{size} " if measured else "by an amount "
+        return f"{_plain(name)} were {much}{'larger' if amount > 0 else 'smaller'} at any value{at}"
     if site.startswith(RATE):
         name = _plain(site.removeprefix(RATE))
         return f"what stores {name} (a capacity, a volume or a mass) were {np.exp(-amount):.2g} times as large{at}"

@@ -16,9 +16,11 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import (
+    AMOUNT,
     BALANCE,
     LOSS,
     further_sites,
+    is_part,
     stays_in_range,
     with_further_sites,
 )
@@ -33,12 +35,12 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
     refined,
     test_on_stretches,
 )
-from adaptive_flot.discovery.hypotheses.families import Hypothesis, constant_change
+from adaptive_flot.discovery.hypotheses.families import MATTERS, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import LARGEST_CLASS, Judged, UsualLoss, WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import seen_values
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 
 LEAVES_MORE = ", and even so the errors stay above those of the reference"
 
@@ -95,7 +97,13 @@ def unless_without_a_site(
         return t.hypothesis.site, t.fit.value(t.hypothesis.effect.parameter("amplitude"))
 
     stand = (t for t in found if t is not None and stands(rows, blocks, null, t, usual.errors))
-    possible = (t for t in stand if all(stays_in_range(model, record, *change(t)) for record in rows.records))
+    sites = {t.hypothesis.site for t in (judged.best, *judged.alike) if t.hypothesis is not None}
+    possible = (
+        t
+        for t in stand
+        if all(stays_in_range(model, record, *change(t)) for record in rows.records)
+        and not any(is_part(change(t)[0], site) for site in sites)
+    )
     rivals = sorted(possible, key=lambda t: t.total)
     if not rivals:
         return judged
@@ -128,8 +136,17 @@ def unless_without_a_site(
 
 
 def _changes(model: Model, base: JointFit, rows: Rows) -> Sequence[Hypothesis]:
-    """A constant change at each further site, its scale what the site has seen; a loss that of its balance."""
+    """A constant change at each further site, its scale what the site has seen; a loss that of its balance.
+
+    Beside a factor that hardly moves an amount says nothing of its own.
+    """
     seen, _ = seen_values(model, base, rows.records)
-    own = {s.name: float(np.ptp(np.quantile(seen[s.name], (0.05, 0.95)))) for s in further_sites(model)}
-    sizes = ((s, own[s.name.replace(LOSS, BALANCE, 1)]) for s in further_sites(model))
+    places = [s for s in further_sites(model) if not s.name.startswith(AMOUNT) or _moves(seen[s.name])]
+    own = {s.name: float(np.ptp(np.quantile(seen[s.name], (0.05, 0.95)))) for s in places}
+    sizes = ((s, own[s.name.replace(LOSS, BALANCE, 1)]) for s in places)
     return [constant_change(site, size) for site, size in sizes if size > 0]
+
+
+def _moves(value: FloatArray) -> bool:
+    low, high = np.quantile(value, (0.05, 0.95))
+    return bool(high - low > MATTERS * abs(float(np.median(value))))
