@@ -19,12 +19,16 @@ import numpy as np
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Mode
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.greybox.scope import Role, Scope, Site
 
 BALANCE, LOSS, RATE, READING, AMOUNT = "balance of ", "loss of ", "rate of ", "reading of ", "amount at "
 """How the names of the further sites begin."""
+ENDS, ROUNDING = (0.05, 0.95), 0.01
+"""Quantiles that stand for the ends of what was seen, and a share of their distance that is none."""
+LARGEST_STORE = 10.0
+"""Largest factor between what a state stores and what the model says."""
 INNER = ("process", "flow")
 """Roles of what lies between inputs and outputs: there alone an amount says what no other site does."""
 
@@ -102,10 +106,29 @@ def is_part(place: str, site: str) -> bool:
     return place == AMOUNT + site
 
 
-def stays_in_range(model: Model, record: Dataset, place: str, amount: float) -> bool:
-    """Whether an input that is off by an amount stays within the range of its quantity; of another place, always."""
-    if not place.startswith(READING):
-        return True
-    i = model.index("inputs", place.removeprefix(READING))
-    low, high = np.nanquantile(record.inputs[:, i], (0.05, 0.95)) + amount
-    return bool(model.inputs[i].lower <= low and high <= model.inputs[i].upper)
+def is_possible(model: Model, record: Dataset, place: str, amount: float, value: FloatArray) -> bool:
+    """Whether a change at a further site is one that can be; at a balance, any.
+
+    An input stays within the range of its quantity. No store becomes ten times as large, which would be one that
+    hardly moves. What has only had one sign keeps it: a heater that gives less than nothing is none.
+
+    Parameters
+    ----------
+    model, record
+        The model and a record.
+    place, amount
+        Name of the further site, and the amount there; the logarithm of a factor at a rate.
+    value
+        Values of the place in the record (N,).
+    """
+    if place.startswith(READING):
+        i = model.index("inputs", place.removeprefix(READING))
+        low, high = np.nanquantile(record.inputs[:, i], ENDS) + amount
+        return bool(model.inputs[i].lower <= low and high <= model.inputs[i].upper)
+    if place.startswith(RATE):
+        return bool(abs(amount) <= np.log(LARGEST_STORE))
+    if place.startswith(AMOUNT):
+        low, high = np.quantile(value, ENDS)
+        slack = ROUNDING * float(high - low)
+        return bool((low < 0 or low + amount >= -slack) and (high > 0 or high + amount <= slack))
+    return True

@@ -11,30 +11,27 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
+Seen = dict[str, FloatArray]
 
-def seen_values(
-    model: Model, fit: JointFit, records: Sequence[Dataset]
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+
+def seen_values(model: Model, fit: JointFit, records: Sequence[Dataset]) -> tuple[Seen, Seen]:
     """Values at every site, and of every driver, along the free runs of a fit, the records behind one another."""
-    stepper = Stepper(model, records[0].dt)
-    sites: list[FloatArray] = []
-    drivers: list[FloatArray] = []
-    names = model.drivers or (*model.names("inputs"), *model.names("states"))
-    p = model.with_parameters(fit.values).parameter_values
-    for record, x0 in zip(records, fit.initial, strict=True):
-        run = stepper.simulate(x0, record.inputs[1:], p, float(record.time[0]))
-        states, n = np.vstack([x0, run.states]), len(record)
-        columns = {**dict(zip(model.names("inputs"), record.inputs.T, strict=True)),
-                   **dict(zip(model.names("states"), states.T, strict=True))}  # fmt: skip
-        if model.signals:
-            columns |= {s.name: np.concatenate([[c[0]], c]) for s, c in zip(model.signals, run.signals.T, strict=True)}
-        drivers.append(np.column_stack([columns[d] for d in names if d in columns]))
-        z = model.ode.map(n)(record.time, states.T, record.inputs.T, np.tile(p[:, None], n))[3]
-        at = model.site_values.map(n)(record.time, states.T, record.inputs.T, np.tile(p[:, None], n), z)
-        sites.append(np.array(at).T)
-    together, moved = np.vstack(sites), np.vstack(drivers)
-    known = [d for d in names if d in {*model.names("inputs"), *model.names("states"), *model.names("signals")}]
-    return (
-        {s.name: together[:, i] for i, s in enumerate(model.sites)},
-        {d: moved[:, i] for i, d in enumerate(known)},
-    )
+    fitted = model.with_parameters(fit.values)
+    each = [seen_along(fitted, record, x0) for record, x0 in zip(records, fit.initial, strict=True)]
+    sites, drivers = ({k: np.concatenate([one[i][k] for one in each]) for k in each[0][i]} for i in (0, 1))
+    return sites, drivers
+
+
+def seen_along(model: Model, record: Dataset, x0: FloatArray) -> tuple[Seen, Seen]:
+    """Values at every site, and of every driver, along a free run from a state (nx,); each (N,)."""
+    p, n = model.parameter_values, len(record)
+    run = Stepper(model, record.dt).simulate(x0, record.inputs[1:], p, float(record.time[0]))
+    states, table = np.vstack([x0, run.states]), np.tile(p[:, None], n)
+    drivers = dict(zip(model.names("inputs"), record.inputs.T, strict=True))
+    drivers |= dict(zip(model.names("states"), states.T, strict=True))
+    if model.signals:
+        drivers |= {s.name: np.concatenate([[c[0]], c]) for s, c in zip(model.signals, run.signals.T, strict=True)}
+    wanted = model.drivers or (*model.names("inputs"), *model.names("states"))
+    z = model.ode.map(n)(record.time, states.T, record.inputs.T, table)[3]
+    at = np.array(model.site_values.map(n)(record.time, states.T, record.inputs.T, table, z))
+    return {s.name: at[i] for i, s in enumerate(model.sites)}, {d: drivers[d] for d in wanted if d in drivers}

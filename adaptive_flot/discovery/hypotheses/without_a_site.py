@@ -9,7 +9,7 @@ than all that would be told, the model has no place for what has changed.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +18,11 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import (
     AMOUNT,
     BALANCE,
+    ENDS,
     LOSS,
     further_sites,
     is_part,
-    stays_in_range,
+    is_possible,
     with_further_sites,
 )
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
@@ -90,7 +91,8 @@ def unless_without_a_site(
                 return None
             return test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
 
-    found = parallel_map(tested, _changes(model, base, rows), processes, lambda: None)
+    seen, _ = seen_values(model, base, rows.records)
+    found = parallel_map(tested, _changes(model, seen), processes, lambda: None)
 
     def change(t: Tested) -> tuple[str, float]:
         assert t.hypothesis is not None  # each changes something at a place
@@ -101,7 +103,7 @@ def unless_without_a_site(
     possible = (
         t
         for t in stand
-        if all(stays_in_range(model, record, *change(t)) for record in rows.records)
+        if all(is_possible(model, record, *change(t), seen[change(t)[0]]) for record in rows.records)
         and not any(is_part(change(t)[0], site) for site in sites)
     )
     rivals = sorted(possible, key=lambda t: t.total)
@@ -135,18 +137,17 @@ def unless_without_a_site(
     return replace(judged, beside=words(near[0])) if near else judged
 
 
-def _changes(model: Model, base: JointFit, rows: Rows) -> Sequence[Hypothesis]:
+def _changes(model: Model, seen: Mapping[str, FloatArray]) -> Sequence[Hypothesis]:
     """A constant change at each further site, its scale what the site has seen; a loss that of its balance.
 
     Beside a factor that hardly moves an amount says nothing of its own.
     """
-    seen, _ = seen_values(model, base, rows.records)
     places = [s for s in further_sites(model) if not s.name.startswith(AMOUNT) or _moves(seen[s.name])]
-    own = {s.name: float(np.ptp(np.quantile(seen[s.name], (0.05, 0.95)))) for s in places}
+    own = {s.name: float(np.ptp(np.quantile(seen[s.name], ENDS))) for s in places}
     sizes = ((s, own[s.name.replace(LOSS, BALANCE, 1)]) for s in places)
     return [constant_change(site, size) for site, size in sizes if size > 0]
 
 
 def _moves(value: FloatArray) -> bool:
-    low, high = np.quantile(value, (0.05, 0.95))
+    low, high = np.quantile(value, ENDS)
     return bool(high - low > MATTERS * abs(float(np.median(value))))

@@ -65,6 +65,10 @@ class Screening:
         self._count = int(np.count_nonzero(response.innovations))
         self._values, self._drivers = response.seen()
 
+    def seen(self, site: str) -> FloatArray:
+        """Values at a site (N - 1,)."""
+        return self._values[site]
+
     def all(self, *, events: bool, ramps: bool = False) -> list[Screened]:
         """Every suspect, the best first; with changes in time or without, and with gradual ones or without.
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.further_sites.places import AMOUNT, further_sites, is_part, with_further_sites
+from adaptive_flot.discovery.further_sites.places import AMOUNT, further_sites, is_part, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
 from adaptive_flot.discovery.further_sites.wording import change_in_words
 from adaptive_flot.discovery.hypotheses.procedure import compare
@@ -60,7 +60,7 @@ def record(seed: int, seat: float = 0.0, meter: float = 1.0) -> Dataset:
             x += DT / STEPS * (command[k] - x) / TAU
         seen[k] = x, meter * (KV * x + seat) * np.sqrt(pressure[k])
     noise = rng.normal(size=(ROWS, 2)) * (0.003, 0.25)
-    return Dataset("valve", DT * np.arange(ROWS), DT, np.column_stack([command, pressure]), seen + noise)
+    return Dataset("valve", DT * np.arange(ROWS, dtype=float), DT, np.column_stack([command, pressure]), seen + noise)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -92,3 +92,25 @@ def test_an_amount_is_part_of_its_site_and_of_no_other() -> None:
     assert change_in_words(model, "amount at opening", -2.0, "", measured=False) == (
         "opening were by an amount smaller at any value"
     )
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "amount", "can_be"),
+    [
+        (0.0, 9.0, 3.0, True),  # a seat that leaks
+        (0.0, 9.0, -3.0, False),  # a heater that gives less than nothing
+        (-9.0, 0.0, 3.0, False),
+        (4.0, 9.0, -3.0, True),
+        (-5.0, 9.0, -30.0, True),  # it has had both signs
+    ],
+)
+def test_what_has_had_one_sign_keeps_it(low: float, high: float, amount: float, can_be: bool) -> None:
+    value = np.linspace(low, high, 101)
+    assert is_possible(valve(), record(0), "amount at opening", amount, value) == can_be
+
+
+def test_no_store_is_a_million_times_as_large() -> None:
+    """That would be one whose state does not move."""
+    value = np.zeros(9)
+    assert is_possible(valve(), record(0), "rate of stem", -np.log(3.0), value)
+    assert not is_possible(valve(), record(0), "rate of stem", -np.log(1e7), value)

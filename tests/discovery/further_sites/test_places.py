@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
+from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import NO_SITE, change_in_words
 from adaptive_flot.discovery.hypotheses import without_a_site
@@ -193,8 +193,8 @@ def test_forces_that_add_up_are_twins_and_a_sensor_is_none() -> None:
 def test_an_input_stays_within_its_range() -> None:
     """A room of 20 degrees in a range of 0 to 40 may be read 15 too high, and not 25."""
     model, data = with_further_sites(block()), heated(0)
-    assert stays_in_range(model, data, "reading of room", -15.0)
-    assert not stays_in_range(model, data, "reading of room", -25.0)
+    assert is_possible(model, data, "reading of room", -15.0, data.inputs[:, 1])
+    assert not is_possible(model, data, "reading of room", -25.0, data.inputs[:, 1])
 
 
 @pytest.mark.parametrize(("seed", "processes"), [(0, 1), (1, 2)])

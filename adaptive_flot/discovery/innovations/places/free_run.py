@@ -18,9 +18,10 @@ from adaptive_flot.discovery.candidates.catalogue import nameable
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.further_sites.places import further_sites, stays_in_range, with_further_sites
+from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
+from adaptive_flot.discovery.hypotheses.seen import seen_along
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.results import Alternative, Judgement, State
 from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN
@@ -114,9 +115,10 @@ def _rivals(state: State) -> list[Alternative]:
         with np.errstate(all="ignore"):
             return Fitter(problem).fit(model.with_effects([effect]), (effect.parameter("amplitude"),), like=base)
 
+    seen, _ = seen_along(model, problem.record, base.initial_state)
     found = []
     for effect, own in zip(effects, parallel_map(fitted, effects, state.processes), strict=True):
-        if own is None or not stays_in_range(model, problem.record, effect.site, own.values[-1]):
+        if own is None or not is_possible(model, problem.record, effect.site, own.values[-1], seen[effect.site]):
             continue
         fit = own.with_model(partial(model.with_effects, [effect]))
         place = ((effect.site, "constant"),)

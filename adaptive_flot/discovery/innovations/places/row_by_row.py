@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.further_sites.places import further_sites, is_part, stays_in_range, with_further_sites
+from adaptive_flot.discovery.further_sites.places import further_sites, is_part, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words, too_many
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
@@ -45,8 +45,10 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, left_out)
     sites = {h.site for h in told.best.hypotheses}
     places = [s for s in further_sites(further.model) if not any(is_part(s.name, site) for site in sites)]
-    found = further.all_with(rest, _without_a_site(further, rest, event, places))
-    possible = (e for e in found if stays_in_range(search.model, search.record, *_change(further, e)))
+    screening = further.screening(rest, [s.name for s in places])
+    found = further.all_with(rest, [s for site in places for s in _at(screening, site, event)])
+    changes = ((e, *_change(further, e)) for e in found)
+    possible = (e for e, at, by in changes if is_possible(search.model, search.record, at, by, screening.seen(at)))
     rivals = sorted(possible, key=lambda e: -e.criterion)
     if not rivals:
         return told
@@ -76,14 +78,6 @@ def _best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
     for e in found:
         kept.setdefault(e.hypotheses[-1].site, e)
     return list(kept.values())
-
-
-def _without_a_site(
-    further: Search, rest: Explanation, event: Hypothesis | None, places: Sequence[Site]
-) -> list[Screened]:
-    """A change at each further place: at the times of the event, and at its own; without one, all the time."""
-    screening = further.screening(rest, [s.name for s in places])
-    return [s for site in places for s in _at(screening, site, event)]
 
 
 def _at(screening: Screening, site: Site, event: Hypothesis | None) -> Sequence[Screened]:
