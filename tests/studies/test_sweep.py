@@ -12,7 +12,7 @@ from pandas.testing import assert_frame_equal
 
 from adaptive_flot.errors import AdaptiveFlotError, ModelError, PluginError, StudyError
 from adaptive_flot.greybox.stepping.compiling import compiled as machine_code
-from adaptive_flot.runner.commands import side_by_side
+from adaptive_flot.runner.commands.runs import side_by_side
 from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.commands.runs.run_files import plain, run_summary
 from adaptive_flot.runner.commands.runs.runs_table import read_runs, run_rows
