@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import factorial
 
 import casadi as ca
@@ -134,15 +135,28 @@ class _Weights:
 def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
     """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
     n, q = decay.along.shape
-    z, step = ca.SX.sym("z", n), ca.SX.sym("h")
-    factors = weights(z, step, series_phi(z) if isinstance(h, float) else closed_phi(z))
-    values = ca.Function("weights", [z, step], factors)(h * decay.value, h)
+    of_number = isinstance(h, float)
+    values = _weights_of(n, of_number)(h * decay.value, h)
     if not q:
         return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
     # each weight depends on its own decay rate only: one derivative serves all directions
-    slopes = ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in factors])
-    moved = [_scaled(d * h, decay.along) for d in slopes(h * decay.value, h)]
+    moved = [_scaled(d * h, decay.along) for d in _slopes_of(n, of_number)(h * decay.value, h)]
     return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
+
+
+@lru_cache(maxsize=128)
+def _weights_of(n: int, of_number: bool) -> ca.Function:
+    """The weights of n states for a step that is a number, or a symbol; made once, as it is asked for in every step."""
+    z, step = ca.SX.sym("z", n), ca.SX.sym("h")
+    return ca.Function("weights", [z, step], weights(z, step, series_phi(z) if of_number else closed_phi(z)))
+
+
+@lru_cache(maxsize=128)
+def _slopes_of(n: int, of_number: bool) -> ca.Function:
+    """Their derivatives by z."""
+    z, step = ca.SX.sym("z", n), ca.SX.sym("h")
+    factors = weights(z, step, series_phi(z) if of_number else closed_phi(z))
+    return ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in factors])
 
 
 Phis = tuple[ca.SX, ca.SX, ca.SX, ca.SX]
