@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from adaptive_flot.discovery.candidates.turns import has_sign, turning, turns, turns_with
+from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -151,7 +152,7 @@ def _at_site(
     model: Model, site: Site, v: FloatArray, drivers: Mapping[str, FloatArray], dt: float, duration: float
 ) -> Iterator[Hypothesis]:
     low, high = float(v.min()), float(v.max())
-    spread, size = high - low, float(np.median(np.abs(v)))
+    spread, size = high - low, ordinary_size(v)
     moves = spread > LEAST_MOVE * max(size, 1e-300)
     if site.role == "actuator" and moves:
         yield from _stuck_or_leaking(site, low, spread)
@@ -278,7 +279,7 @@ def _amount(model: Model, site: Site, seen: Mapping[str, FloatArray]) -> Hypothe
     if site.role not in ("process", "flow", "feed") or site.mode != "offset" or np.any(seen[site.name] != 0):
         return None
     others = [s for s in model.sites if s.unit == site.unit and s.role != "sensor"]
-    sizes = [float(np.median(np.abs(seen[s.name]))) for s in others if np.isfinite(seen[s.name]).all()]
+    sizes = [ordinary_size(seen[s.name]) for s in others if np.isfinite(seen[s.name]).all()]
     size = max(sizes, default=0.0)
     return constant_amount(site, size) if size > 0 else None
 

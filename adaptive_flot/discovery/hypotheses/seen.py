@@ -12,6 +12,20 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 Seen = dict[str, FloatArray]
+AT_REST = 1e-3
+"""A part is at rest where it gives less than this share of the most that it gives."""
+
+
+def ordinary_size(value: FloatArray) -> float:
+    """Median size of a value (N,); where it is at rest for half of the time or more, that of the other rows.
+
+    A pump that runs for a third of the time has a size all the same: it may give 25 % less.
+    """
+    size = np.abs(value)
+    median, least = float(np.median(size)), AT_REST * float(size.max(initial=0.0))
+    if median > least or not least > 0:  # a value that is not known has no size either
+        return median
+    return float(np.median(size[size > least]))
 
 
 def seen_values(model: Model, fit: JointFit, records: Sequence[Dataset]) -> tuple[Seen, Seen]:

@@ -22,6 +22,7 @@ from adaptive_flot.discovery.hypotheses.families import (
     span_limits,
     turned,
 )
+from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -123,7 +124,7 @@ def _at_site(
     model: Model, site: Site, v: FloatArray, drivers: Mapping[str, FloatArray], dt: float
 ) -> Iterator[Suspect]:
     low, high = float(v.min()), float(v.max())
-    spread, size = high - low, float(np.median(np.abs(v)))
+    spread, size = high - low, ordinary_size(v)
     if spread > LEAST_MOVE * max(size, 1e-300):
         if site.role in ("actuator", "sensor"):
             yield from _stuck_or_late(site.name, v, size, dt)
@@ -216,7 +217,7 @@ def _constant(site: Site, v: FloatArray, spread: float) -> Iterator[Suspect]:
     An element's error is limited by what has been seen of it. What enters a balance is not: it may be nothing in the
     model.
     """
-    free, size = ("amplitude",), float(np.median(np.abs(v)))
+    free, size = ("amplitude",), ordinary_size(v)
     element = site.role in ("sensor", "actuator")
     if element or site.mode == "offset":
         effect = Effect(site.name, "constant", "shift", mode="offset")

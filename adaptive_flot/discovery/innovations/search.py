@@ -16,6 +16,7 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
+from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -266,7 +267,7 @@ class Search:
         tau = float(fitted.parameters[fitted.index("parameters", late.effect.parameter(coefficient))].value)
         found = []
         for site in sites:
-            size = float(np.median(np.abs(values[site])))
+            size = ordinary_size(values[site])
             told = {"amplitude": 1.0, coefficient: tau}
             effect = Effect(site, "lag", late.effect.form, told, {"scale": size or 1.0})
             if effect.label in taken or not np.isfinite(size):

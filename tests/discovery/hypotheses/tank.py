@@ -40,10 +40,13 @@ def tank(zero: float = 0.0) -> Model:
     )
 
 
-def record(name: str, seed: int, *effects: Effect, zero: float = 0.0, start: float = 300.0) -> Dataset:
-    """A noisy record of the tank with effects that the model does not have."""
+def record(
+    name: str, seed: int, *effects: Effect, zero: float = 0.0, start: float = 300.0, rests: float = 0.0
+) -> Dataset:
+    """A noisy record of the tank with effects that the model does not have; the heater rests for a share of it."""
     rng = np.random.default_rng(seed)
     levels = rng.choice([0.0, 800.0, 1600.0, 2400.0], ROWS // 25)
+    levels = np.where(rng.random(len(levels)) < rests, 0.0, levels) if rests else levels
     power: FloatArray = np.repeat(levels, 25).astype(np.float64)
     plant = tank().with_parameters({"efficiency": 0.9, "loss": 80.0}).with_effects(effects)
     data = Dataset(name, DT * np.arange(ROWS, dtype=np.float64), DT, power[:, None], np.zeros((ROWS, 1)))

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.hypotheses.seen import ordinary_size
+from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.tank import COLDER, DRAUGHT, LEAKS, NOISE, ROWS, STUCK, record, tank
 
 EFFECTS = {"stuck": (STUCK,), "leaks": (LEAKS,), "colder": (COLDER,), "draught": (DRAUGHT,), "none": ()}
@@ -118,3 +120,23 @@ def test_a_noisier_thermometer_is_no_change() -> None:
     noisier = replace(new, outputs=new.outputs + np.sqrt(1.8**2 - 1) * NOISE * rng.normal(size=new.outputs.shape))
     verdict = compare(tank(), [noisier], [record("old", 2)]).verdict
     assert verdict.word == "none" and "noise from row to row" in verdict.reason, verdict.reason
+
+
+def test_a_part_at_rest_for_most_of_the_time_may_give_less() -> None:
+    """A pump that ran for a third of the time had no such hypothesis: its limit was told instead."""
+    weak = Effect("heater", "constant", "shift", {"amplitude": np.log(0.75)}, mode="factor")
+    found = compare(tank(), [record("new", 3, weak, rests=0.6)], [record("old", 2, rests=0.6)])
+    assert "heater gain" in {t.hypothesis.label for t in found.tested if t.hypothesis is not None}
+    assert found.verdict.word in ("named", "class")
+    assert "heater is 25 % smaller" in found.verdict.reason.lower()
+
+
+@pytest.mark.parametrize(
+    ("value", "size"),
+    [([0.0] * 6 + [2.0, 3.0, 4.0], 3.0), ([1.0, 2.0, 3.0], 2.0), ([0.0] * 4, 0.0), ([-5.0, 0.0, 0.0, 0.0], 5.0)],
+)
+def test_the_ordinary_size_of_a_value_is_that_of_the_rows_in_which_it_does_something(
+    value: list[float], size: float
+) -> None:
+    assert ordinary_size(np.array(value)) == size
+    assert np.isnan(ordinary_size(np.array([np.nan, 1.0])))
