@@ -21,6 +21,7 @@ from benchmarks.other_processes.plants import PROCESSES
 from benchmarks.other_processes.process import Process
 from benchmarks.other_processes.record import make_record
 from benchmarks.other_processes.score import by_process, told
+from benchmarks.other_processes.without_a_site import WITHOUT_A_SITE
 from benchmarks.plant_like.__main__ import make_missing
 from benchmarks.plant_like.score import figures, results
 
@@ -33,7 +34,7 @@ def _main() -> None:
     """Records of processes that are not flotation, and the score of whoever tries to find what is missing."""
 
 
-def _make(job: tuple[Path, int, int], processes: Sequence[Process] = PROCESSES) -> None:
+def _make(job: tuple[Path, int, int], processes: Sequence[Process]) -> None:
     folder, seed, k = job
     made, name = make_record(seed, k, processes), f"record_{k:04d}"
     for table, file in ((made.table, name), (made.reference, f"reference_{k:04d}")):
@@ -51,9 +52,13 @@ def generate(
     seed: Annotated[int, typer.Option(min=0, help="Seed; record k is the same whatever the count.")] = 2029,
     jobs: Jobs = 2,
     further: Annotated[bool, typer.Option("--further", help="Of the four further processes.")] = False,
+    without_a_site: Annotated[
+        bool, typer.Option("--without-a-site", help="Of four processes with what their models have no site for.")
+    ] = False,
 ) -> None:
     """Write records and answers."""
-    make_missing(partial(_make, processes=FURTHER) if further else _make, out, seed, count, jobs)
+    processes = WITHOUT_A_SITE if without_a_site else FURTHER if further else PROCESSES
+    make_missing(partial(_make, processes=processes), out, seed, count, jobs)
 
 
 @app.command()
