@@ -15,7 +15,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
-from adaptive_flot.discovery.since_reference.taken_back import sites_told, taken_back
+from adaptive_flot.discovery.since_reference.taken_back import leaves_more, sites_told, taken_back
 
 LATE = "lag"
 SMALL_SHARE = 0.5
@@ -28,6 +28,8 @@ drift, and wandering alone, have given wrong ones up to 23."""
 
 def unless_unsupported(compared: Comparison, search: Search, base: Explanation, told: Told) -> Comparison:
     """The comparison, its name or class taken back where with process noise none of it gains SUPPORT, or a fair share.
+
+    Also where it leaves more than the reference, and with process noise one part elsewhere alone explains surely more.
 
     Parameters
     ----------
@@ -48,12 +50,21 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     gain = max(_gain(search, base, each) for each in (best, *compared.judged.alike))
     most = told.best.criterion - base.criterion
     if gain > max(SUPPORT, SMALL_SHARE * most):
-        return compared
+        better = [e for e in told.alike if _is_elsewhere(e, sites) and e.criterion - base.criterion > gain + LEAST_GAIN]
+        if not better or not leaves_more(verdict):  # what leaves nothing else to explain needs no other part
+            return compared
+        return taken_back(compared, f"with process noise {better[0].hypotheses[0].label} explains more")
     why = "with process noise too little speaks for it, so that whatever drifts or wanders may be behind it"
     if gain > SUPPORT:
         said = " and ".join(h.label for h in told.best.hypotheses)
         why = f"with process noise {said} explains far more"
     return taken_back(compared, why)
+
+
+def _is_elsewhere(e: Explanation, sites: set[str]) -> bool:
+    """Whether an explanation is one part alone, at another site, that is off all the time."""
+    h = e.hypotheses[0]
+    return len(e.hypotheses) == 1 and h.site not in sites and h.kind not in (*EVENTS, *STRUCTURE, LATE)
 
 
 def _wanders(compared: Comparison) -> bool:

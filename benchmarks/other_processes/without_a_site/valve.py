@@ -88,7 +88,7 @@ PROCESS = Process(
     {"position": 0.003, "chamber_bar": 0.008, "flow_m3_h": 0.25},
     {
         NOTHING: Case(()),
-        "worn seat": Case((("amount at opening", EVENT),)),
+        "worn seat": Case((("amount at opening", EVENT), ("opening", EVENT))),
         "leaking chamber": Case(CHAMBER),
         "positioner weak": Case((("positioner", SHIFT), *(("positioner", d) for d in ENDS)), "reference"),
         "position sensor off": Case((("position_sensor", SHIFT), ("position_sensor", "own_value")), "reference"),

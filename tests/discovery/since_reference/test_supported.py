@@ -105,15 +105,28 @@ def test_only_what_is_there_all_the_time_speaks_for_a_name(
     assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("gain", "most", "stays"), [(360.0, 980.0, False), (360.0, 500.0, True), (20.0, 25.0, False)])
+@pytest.mark.parametrize(
+    ("gain", "most", "left", "stays"),
+    [
+        (360.0, 980.0, 1.0, False),
+        (360.0, 500.0, 3.0, False),
+        (360.0, 500.0, 1.0, True),
+        (360.0, 365.0, 3.0, True),
+        (20.0, 25.0, 1.0, False),
+    ],
+)
 def test_another_part_must_not_explain_far_more(
-    monkeypatch: pytest.MonkeyPatch, gain: float, most: float, stays: bool
+    monkeypatch: pytest.MonkeyPatch, gain: float, most: float, left: float, stays: bool
 ) -> None:
-    """A healthy pipeline at another load was a class of two parts at their limits: a meter explains much more."""
+    """A healthy pipeline at another load was a class of two parts at their limits: a meter explains much more.
+
+    A healthy pumping station in a storm was a pump that gives 6 % less: a meter alone explains surely more.
+    """
     said: list[str] = []
     monkeypatch.setattr(supported, "_gain", lambda *given: gain)
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: said.append(why))
     verdict = SimpleNamespace(word="named", effects=(SimpleNamespace(effect=SimpleNamespace(site="pump")),), members=())
+    verdict.error = (SimpleNamespace(after=left, noise=1.0),)
     compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
     base: Any = SimpleNamespace(criterion=10.0)
     best = SimpleNamespace(
@@ -121,7 +134,8 @@ def test_another_part_must_not_explain_far_more(
     )
     found: Any = SimpleNamespace(alike=(best,), best=best)
     assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
-    assert stays or ("meter span explains far more" in said[0]) == (gain > supported.SUPPORT)
+    assert stays or ("meter span explains" in said[0]) == (gain > supported.SUPPORT)
+    assert stays or ("meter span explains far more" in said[0]) == (most > 2 * gain > supported.SUPPORT)
 
 
 @pytest.mark.parametrize(

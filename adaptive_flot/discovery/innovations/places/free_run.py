@@ -2,7 +2,8 @@
 
 A shaft carries more than the model's fixed inertia, and a friction that follows its twist explains that as well. So
 before one effect is told, a constant change is fitted at each further place, with the constants free. Where one
-explains the record surely better, nothing is told; where it explains as much, it is a member of the class.
+explains the record surely better, nothing is told; where it explains as much, it is a member of the class. Where an
+event is told, one of its shape is fitted there, too: a chamber that leaks from some time on is no positioner that fell.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from adaptive_flot.discovery.hypotheses.seen import seen_along
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.results import Alternative, Judgement, State
 from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model
 
 
@@ -102,36 +104,67 @@ def with_twins(model: Model, judged: Judgement) -> Judgement:
 
 
 def _rivals(state: State) -> list[Alternative]:
-    """A constant change at each place, fitted; the best first, without what says the same as what is told."""
+    """A change at each place, fitted; the best first, without what says the same as what is told."""
     (problem, result), judged = state.searched, state.judged
     assert judged.best is not None  # something is told
     base, model = result.base, with_further_sites(result.base.model)
     told = judged.best.effects[0]
+    free = tuple(c for c in told.coefficients if told.parameter(c) in judged.best.fit.names)
+    changes = [
+        change
+        for s in further_sites(model)
+        if not is_meant(model, told, s.name)
+        for change in _changes(s.name, s.mode, told, free)
+    ]
 
-    sites = [s for s in further_sites(model) if not is_meant(model, told, s.name)]
-    effects = [Effect(s.name, "constant", "shift", mode=s.mode) for s in sites]
-
-    def fitted(effect: Effect) -> Fit | None:
+    def fitted(change: tuple[Effect, tuple[str, ...]]) -> Fit | None:
+        effect, coefficients = change
+        own = tuple(effect.parameter(c) for c in coefficients)
         with np.errstate(all="ignore"):
-            return Fitter(problem).fit(model.with_effects([effect]), (effect.parameter("amplitude"),), like=base)
+            return Fitter(problem).fit(model.with_effects([effect]), own, like=base)
 
     seen, _ = seen_along(model, problem.record, base.initial_state)
     found = []
-    for effect, own in zip(effects, parallel_map(fitted, effects, state.processes), strict=True):
-        if own is None or not is_possible(model, problem.record, effect.site, own.values[-1], seen[effect.site]):
+    for (effect, _), own in zip(changes, parallel_map(fitted, changes, state.processes), strict=True):
+        if own is None:
             continue
         fit = own.with_model(partial(model.with_effects, [effect]))
-        place = ((effect.site, "constant"),)
-        found.append(Alternative(place, (False,), fit, base.loss - fit.loss, fit.bic - base.bic))
+        a = Alternative(((effect.site, effect.driver),), (False,), fit, base.loss - fit.loss, fit.bic - base.bic)
+        if is_possible(model, problem.record, effect.site, _amount(a), seen[effect.site]):
+            found.append(a)
     found = [a for a in found if a.delta_bic < -LEAST_MARGIN]
     if not found:
         return []
     sds = loglik_difference_sds(problem, judged.best.fit, [a.fit for a in found])
-    return sorted(
-        (replace(a, loglik_difference_sd=sd) for a, sd in zip(found, sds, strict=True)), key=lambda a: a.fit.bic
-    )
+    apart = (replace(a, loglik_difference_sd=sd) for a, sd in zip(found, sds, strict=True))
+    best: dict[str, Alternative] = {}
+    for a in sorted(apart, key=lambda a: a.fit.bic):
+        best.setdefault(a.effects[0].site, a)
+    return list(best.values())
+
+
+def _changes(place: str, mode: Mode, told: Effect, free: tuple[str, ...]) -> list[tuple[Effect, tuple[str, ...]]]:
+    """What may act at a place, each with what is fitted: a constant, and where an event is told, one of its shape.
+
+    It starts at the times of the event, and from nothing.
+    """
+    constant = Effect(place, "constant", "shift", mode=mode)
+    changes: list[tuple[Effect, tuple[str, ...]]] = [(constant, ("amplitude",))]
+    if told.driver == "time":
+        levels = told.names(CoefficientRole.LEVEL, CoefficientRole.KNOT_VALUE)
+        start = {c: 0.0 if c in levels else value for c, value in told.coefficients.items()}
+        changes.append((replace(told, site=place, mode=mode, coefficients=start), free))
+    return changes
+
+
+def _amount(a: Alternative) -> float:
+    """The change at a place that is farthest from none."""
+    return max(a.effects[0].levels, key=abs, default=0.0)
 
 
 def _words(a: Alternative) -> str:
     effect, model = a.effects[0], a.fit.model
-    return change_in_words(model, effect.site, effect.coefficients["amplitude"], "", measured=False)
+    onsets = effect.values(CoefficientRole.ONSET)
+    sometimes = "for some of the time" if effect.driver == "time" else ""
+    when = f"from {onsets[0]:.0f} s on" if len(onsets) == 1 else sometimes
+    return change_in_words(model, effect.site, _amount(a), when, measured=False)
