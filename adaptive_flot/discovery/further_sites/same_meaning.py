@@ -21,7 +21,8 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
 
     An amount at a site that stands for one, or beside the factor of the site; an input that is asked of the actuator
     whose site it passes; and whatever else in the process does the same to every state and output, as a capacity does.
-    A drive that alone moves a mass does what another mass would do, but it does not mean that.
+    A drive that alone moves a mass does what another mass would do, but it does not mean that. Nor does an amount at an
+    outlet that changes by a factor: what something adds to the balance may be anything.
     """
     site = _site(model, effect.site)
     mode = effect.mode or site.mode
@@ -37,6 +38,8 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
     if is_amount and place.startswith(LOSS):
         moved = _moves(model, site.name, mode)[:, model.index("states", place.removeprefix(LOSS))]
         return bool(np.any(np.isfinite(moved) & (moved != 0)))
+    if not does_the_same and place.startswith(BALANCE) and mode == "offset" != site.mode:
+        return False
     if not does_the_same and (site.role in ("actuator", "feed") or (place.startswith(READING) and not is_amount)):
         return False
     return _are_the_same(_moves(model, site.name, mode), _moves(model, place, _site(model, place).mode))

@@ -21,9 +21,9 @@ LATE = "lag"
 SMALL_SHARE = 0.5
 """Share of the gain of the best explanation with process noise, which has another part, below which a name is none. A
 healthy pipeline at another load was a class of two valves at their limits, which gained 357 of 978."""
-SUPPORT = 30.0
+SUPPORT = 40.0
 """Gain of the criterion that speaks for a name. Of 17 right ones of other processes the least gained 49. Gauges that
-drift, and wandering alone, have given wrong ones up to 23."""
+drift, and wandering alone, have given wrong ones up to 30."""
 
 
 def unless_unsupported(compared: Comparison, search: Search, base: Explanation, told: Told) -> Comparison:

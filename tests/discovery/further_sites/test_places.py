@@ -19,10 +19,11 @@ from adaptive_flot.discovery.further_sites.wording import NO_SITE, change_in_wor
 from adaptive_flot.discovery.hypotheses import without_a_site
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from tests.discovery.whole_records.test_hardening_spring import oscillator
 
+MODES: tuple[Mode, ...] = ("offset", "factor")
 DT, ROWS, NOISE = 10.0, 800, 0.05
 POWER, CONDUCTANCE, CAPACITY = 100.0, 2.2, 2000.0
 
@@ -163,6 +164,15 @@ def test_an_amount_at_a_site_that_stands_for_one_means_a_loss_of_its_own_state_a
     leak, valve = (Effect(site, "constant", "shift", mode="offset") for site in ("leak", "valve"))
     assert is_meant(model, leak, "loss of pressure") and is_meant(model, leak, "balance of pressure")
     assert not is_meant(model, valve, "loss of pressure")
+
+
+def test_an_amount_at_an_outlet_that_changes_by_a_factor_may_come_from_anywhere() -> None:
+    """What does the same adds nothing to a class that is open anyway."""
+    model = with_further_sites(vessel())
+    amount, factor = (Effect("outlet", "constant", "shift", mode=mode) for mode in MODES)
+    assert not is_meant(model, amount, "balance of pressure")
+    assert is_meant(model, amount, "balance of pressure", does_the_same=True)
+    assert not is_meant(model, factor, "balance of pressure", does_the_same=True)
 
 
 def test_an_amount_of_heat_at_its_own_site_is_no_power_that_is_read_wrongly() -> None:

@@ -11,11 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from adaptive_flot.discovery.further_sites.places import further_sites, is_part, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words, too_many
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
+from adaptive_flot.discovery.hypotheses.seen import AT_REST
 from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search import Explanation, Search
@@ -55,11 +58,15 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     if told_apart(further, base, rivals[0], told.best):
         near = _best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
         return replace(told, word="abstain", certain=(), open=(), why=as_if([_words(further, e) for e in near]))
+    # where a part rests, what it gives has no factor: an amount there is the part's own
+    resting = [h for h in told.effects if _rests(further, rest, h)]
     is_open = len({h.site for h in told.effects}) > 1  # what does the same as a member of a class adds nothing to it
 
     def adds(e: Explanation) -> bool:
         place = e.hypotheses[-1].site
-        return not any(is_meant(further.model, h.effect, place, does_the_same=is_open) for h in told.effects)
+        return not any(
+            is_meant(further.model, h.effect, place, does_the_same=is_open or h in resting) for h in told.effects
+        )
 
     others = [e for e in rivals if adds(e)]
     one_of_them = told.word == "named" or not told.certain
@@ -70,6 +77,13 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
         return replace(told, word="abstain", certain=(), open=(), why=why)
     beside = others[0].hypotheses[-1]
     return replace(told, beside=WithoutSite(beside.site, beside.driver, _words(further, others[0])))
+
+
+def _rests(further: Search, rest: Explanation, h: Hypothesis) -> bool:
+    """Whether a part is at rest in most of the rows in which an event is there: people who are counted as none."""
+    value, time = np.abs(further.screening(rest, [h.site]).seen(h.site)), further.record.time[1:]
+    inside = np.any([(time > a) & (time <= a + long) for a, long in h.pulses], axis=0) if h.pulses else np.array(False)
+    return bool(inside.any() and np.median(value[inside]) <= AT_REST * value.max())
 
 
 def _best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
