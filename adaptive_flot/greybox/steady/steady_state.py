@@ -30,7 +30,7 @@ class SteadyState:
     state
         The state x (nx,).
     residual
-        Largest scaled rate that is left, max |dx/dt / scale| [1/s].
+        Largest size of a scaled rate that is left, dx/dt over the scale of the state [1/s].
     """
 
     state: FloatArray
