@@ -140,10 +140,16 @@ def _not_asked(state: State) -> State:
 
 
 def _kept(state: State, told: Told) -> State:
-    """The verdict where the innovations form tells nothing: less sure of a name, of a curve without one, of `none`."""
+    """The verdict where the innovations form tells nothing: less sure of a name, of a curve without one, of `none`.
+
+    Several effects may stand in for one that acts where the model has no site: rain was told as four of them.
+    """
     judgement = state.judged
     if not _knows(told, judgement):
         return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other effects explain more'}")
+    several = judgement.best is not None and len(judgement.best.names) > 1
+    if judgement.word in ("named", "class") and several and NO_SITE in told.why:
+        return _taken_back(state, f"with process noise it is {told.why}")
     if judgement.word in ("named", "class") and follows_time(state):
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"

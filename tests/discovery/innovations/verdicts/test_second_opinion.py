@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.innovations.judge import Told
@@ -155,6 +156,23 @@ def test_a_drift_explains_the_record_only_where_held_out_rows_get_better(low: fl
     nothing: dict[str, Any] = {f.name: None for f in fields(State)}
     given = State(**nothing | {"judgement": judged, "error": error})
     told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
+    assert asking._kept(given, told).judged.word == word
+
+
+@pytest.mark.parametrize(
+    ("names", "why", "word"),
+    [
+        ((("pump", "speed"), ("inflow", "inflow")), f"as if it rained: {NO_SITE}", "abstain"),
+        ((("pump", "speed"), ("inflow", "inflow")), "no rows confirm it", "class"),
+        ((("pump", "speed"),), f"as if it rained: {NO_SITE}", "class"),
+    ],
+)
+def test_several_effects_do_not_stand_in_for_what_has_no_site(names: Any, why: str, word: str) -> None:
+    """Rain was told as four effects, two of them certain. One effect alone is compared with each place later."""
+    best: Any = SimpleNamespace(effects=(LAW,) * len(names), names=names)
+    nothing: dict[str, Any] = {f.name: None for f in fields(State)}
+    told: Any = SimpleNamespace(word="abstain", why=why, sites=frozenset())
+    given = State(**nothing | {"judgement": Judgement("class", best, names, (), 0.0)})
     assert asking._kept(given, told).judged.word == word
 
 
