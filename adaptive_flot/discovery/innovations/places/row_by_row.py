@@ -59,7 +59,7 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
         near = _best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
         return replace(told, word="abstain", certain=(), open=(), why=as_if([_words(further, e) for e in near]))
     # where a part rests, what it gives has no factor: an amount there is the part's own
-    resting = [h for h in told.effects if _rests(further, rest, h)]
+    resting = [h for h in told.effects if _is_amount_beside_a_factor(further, h) and _rests(further, rest, h)]
     is_open = len({h.site for h in told.effects}) > 1  # what does the same as a member of a class adds nothing to it
 
     def adds(e: Explanation) -> bool:
@@ -77,6 +77,10 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
         return replace(told, word="abstain", certain=(), open=(), why=why)
     beside = others[0].hypotheses[-1]
     return replace(told, beside=WithoutSite(beside.site, beside.driver, _words(further, others[0])))
+
+
+def _is_amount_beside_a_factor(further: Search, h: Hypothesis) -> bool:
+    return h.effect.mode == "offset" and next(s for s in further.model.sites if s.name == h.site).mode == "factor"
 
 
 def _rests(further: Search, rest: Explanation, h: Hypothesis) -> bool:
