@@ -96,7 +96,7 @@ PROCESS = Process(
     {"level_m": 0.006, "salt_g_m3": 0.25},
     {
         NOTHING: Case(()),
-        "leak": Case((*WATER, ("pump", EVENT))),
+        "leak": Case(WATER),
         "rain": Case((*WATER, ("loss of salt", EVENT))),
         "feed read wrongly": Case((("reading of feed", EVENT), ("balance of salt", EVENT), ("amount at decay", EVENT))),
         "pump weak": Case((("pump", SHIFT), *(("pump", d) for d in ENDS)), "reference"),

@@ -92,7 +92,7 @@ PROCESS = Process(
         "leaking chamber": Case(CHAMBER),
         "positioner weak": Case((("positioner", SHIFT), *(("positioner", d) for d in ENDS)), "reference"),
         "position sensor off": Case((("position_sensor", SHIFT), ("position_sensor", "own_value")), "reference"),
-        "clogged": Case((("opening", EVENT), ("flow_meter", EVENT))),
+        "clogged": Case((("opening", EVENT),)),
     },
     {("opening", "stem"): "the trim is not quite linear"},
 )

@@ -83,7 +83,7 @@ PROCESS = Process(
     {"pressure_bar": 0.015, "inflow_bar_s": 0.002},
     {
         NOTHING: Case(()),
-        "gas is lost": Case((*LOST, ("amount at outlet", EVENT), ("outlet", EVENT))),
+        "gas is lost": Case((*LOST, ("amount at outlet", EVENT))),
         "another volume": Case((("rate of pressure", SHIFT),), "reference"),
         "bypass": Case((("balance of pressure", EVENT), ("loss of pressure", EVENT), ("amount at outlet", EVENT))),
         "valve weak": Case((("valve", SHIFT), *(("valve", d) for d in ENDS)), "reference"),
