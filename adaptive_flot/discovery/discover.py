@@ -38,6 +38,7 @@ from adaptive_flot.discovery.stages import (
 from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, conclude
 from adaptive_flot.discovery.verdict.heed_report import heed_report
+from adaptive_flot.discovery.verdict.one_course import heed_one_course
 from adaptive_flot.discovery.verdict.sizes import spaced
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -193,6 +194,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     heed_report,
     try_as_course,
     tell_part_alone,
+    heed_one_course,
     tell_background,
     second_opinion,
     compare_with_what_has_no_site,

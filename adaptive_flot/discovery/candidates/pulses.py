@@ -28,8 +28,6 @@ from adaptive_flot.greybox.model import FloatArray
 
 PULSE = "switch"
 """The form of a pulse."""
-LEAST_SPAN_S = 7200.0
-"""In a shorter record a curve in time draws whatever lasts for some minutes."""
 EDGES, PEAKS, BEFORE = 97, 20, 4
 """Even times of an edge that are tried, places where the residual stands out, and rows before each."""
 AROUND = 10
@@ -50,9 +48,6 @@ def with_pulses(scorer: Scorer, scores: Sequence[Score]) -> list[Score]:
     scores
         Scores of its candidates.
     """
-    time = scorer.problem.record.time
-    if time[-1] - time[0] < LEAST_SPAN_S:
-        return list(scores)
     found, at = [], _times(scorer)
     for score in scores:
         if score.candidate.driver == "time":

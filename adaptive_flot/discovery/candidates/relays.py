@@ -18,6 +18,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+from scipy.signal import lfilter
 
 from adaptive_flot.discovery.candidates.dynamics import FOLLOWS
 from adaptive_flot.discovery.candidates.responses import TimeProfile
@@ -40,7 +41,9 @@ COVERED = (0.02, 0.98)
 LEAST_MOVES = 3
 """Least times that a switch goes on or off: fewer are a step or a pulse."""
 PARAMETERS = 3
-"""Amplitude and two thresholds."""
+"""Amplitude and two thresholds; one more where it moves slowly."""
+LAGS = (4.0, 12.0, 36.0)
+"""Rows in which a switch moves that are tried beside FOLLOWS: what opens may take its time."""
 
 Thresholds = tuple[float, float]
 """Where a switch goes on, and where off."""
@@ -98,20 +101,30 @@ def _relay(scorer: Scorer, score: Score) -> Score | None:
     on, off = best[0]
     close = [(on + a, off + b) for a in step.tolist() for b in step.tolist() if on + a > off + b]
     (on, off), gain, amplitude = _best(scorer, score, [(on, off), *close]) or best
+    follows = FOLLOWS
+    for rows in LAGS:
+        slower = _best(scorer, score, [(on, off)], rows)
+        if slower is not None and slower[1] > gain:
+            follows, (_, gain, amplitude) = rows, slower
     start = {"amplitude": amplitude, "on_above": on, "off_below": off}
-    penalised = gain - PARAMETERS * float(np.log(scorer.measurements))
-    return replace(score, variant=_variant(scorer, score, start), gain=gain, penalised=penalised, start=start)
+    penalised = gain - (PARAMETERS + (follows > FOLLOWS)) * float(np.log(scorer.measurements))
+    return replace(score, variant=_variant(scorer, score, start, follows), gain=gain, penalised=penalised, start=start)
 
 
-def _best(scorer: Scorer, score: Score, pairs: Sequence[Thresholds]) -> tuple[Thresholds, float, float] | None:
-    """The best pair of thresholds with its gain and amplitude; None where no switch moves often enough."""
+def _best(
+    scorer: Scorer, score: Score, pairs: Sequence[Thresholds], rows: float = FOLLOWS
+) -> tuple[Thresholds, float, float] | None:
+    """The best pair of thresholds with its gain and amplitude; None where no switch moves often enough.
+
+    `rows` is the time constant with which it moves, in rows.
+    """
     driver, site = scorer.drivers[score.candidate.driver], score.candidate.site
     courses = {pair: course(driver, *pair) for pair in pairs}
     often = {c.tobytes(): pair for pair, c in courses.items() if np.count_nonzero(c[1:] != c[:-1]) >= LEAST_MOVES}
     if not often:
         return None
     kept = list(often.values())
-    profiles = [TimeProfile(site.name, courses[pair].astype(float), site.mode == "offset") for pair in kept]
+    profiles = [TimeProfile(site.name, late(courses[pair], rows), site.mode == "offset") for pair in kept]
     X = scorer.projected_profiles(profiles)
     along, strength = X.T @ scorer.residual, np.einsum("ij,ij->j", X, X)
     sure = strength > 1e-9 * np.max(strength, initial=1e-300)
@@ -120,10 +133,20 @@ def _best(scorer: Scorer, score: Score, pairs: Sequence[Thresholds]) -> tuple[Th
     return kept[k], float(gains[k]), float(along[k] / max(strength[k], 1e-300))
 
 
-def _variant(scorer: Scorer, score: Score, start: dict[str, float]) -> Variant:
+def late(is_on: BoolArray, rows: float) -> FloatArray:
+    """The course (N,) of a switch that moves with a time constant of some rows, from rest."""
+    if rows <= FOLLOWS:
+        return is_on.astype(float)
+    stays = float(np.exp(-1 / rows))
+    begun = [stays * float(is_on[0])]
+    moved: FloatArray = lfilter([1 - stays], [1, -stays], is_on.astype(float), zi=begun)[0]
+    return moved
+
+
+def _variant(scorer: Scorer, score: Score, start: dict[str, float], rows: float) -> Variant:
     site, driver = score.candidate.site, score.candidate.driver
     is_on = course(scorer.drivers[driver], start["on_above"], start["off_below"])
-    effect = Effect(site.name, driver, RELAY, settings={"follow_s": FOLLOWS * scorer.problem.record.dt})
-    profile = TimeProfile(site.name, is_on.astype(float), site.mode == "offset")
+    effect = Effect(site.name, driver, RELAY, settings={"follow_s": rows * scorer.problem.record.dt})
+    profile = TimeProfile(site.name, late(is_on, rows), site.mode == "offset")
     shape = ("on_above", start["on_above"]), ("off_below", start["off_below"])
     return Variant(effect, (profile,), ("amplitude",), shape)

@@ -37,6 +37,8 @@ LARGE = 0.4
 """Change of a logarithm (a factor of 1.5) beyond any drift that adaptation is known to follow: a quarter."""
 SUDDEN = 0.03
 """Share of the record up to which a ramp or a washout may as well be a step."""
+TAKES, SETTLES = 0.06, 3.0
+"""Share of the record that an event around a step takes at first, and time constants after which it is over."""
 AROUND = (-0.5, 0.0, 0.2, 0.45, 0.75, 1.1, 1.6, 2.5, 4.0)
 """Knots around an event, in lengths of it since its onset."""
 KNOT_GAP = 0.01
@@ -106,6 +108,20 @@ def step_score(score: Score, fitted: Effect, span: float) -> Score | None:
         return None
     (amplitude,), (onset,) = fitted.levels, fitted.values(CoefficientRole.ONSET)
     return _event(score, "step", amplitude, (("onset", onset + length / 2),), fitted, {"width": EDGE * span})
+
+
+def slower_scores(score: Score, fitted: Effect, span: float) -> list[Score]:
+    """Scores with a ramp and a washout that start around a fitted step of the same name; none for other forms.
+
+    `span` is the length of the record [s].
+    """
+    if fitted.form != "step":
+        return []
+    (amplitude,), (onset,) = fitted.levels, fitted.values(CoefficientRole.ONSET)
+    length = TAKES * span
+    ramp = ("onset", onset - length / 2), ("duration", length)
+    washout = ("onset", onset - length / SETTLES), ("time_constant", length / SETTLES)
+    return [_event(score, form, amplitude, shape, fitted, {}) for form, shape in (("ramp", ramp), ("washout", washout))]
 
 
 def _event(

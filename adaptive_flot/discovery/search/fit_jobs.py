@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import FINE_TIME_KNOTS, finer
 from adaptive_flot.discovery.candidates.knots import trimmed
+from adaptive_flot.discovery.candidates.limited_lines import limited_lines
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
-from adaptive_flot.discovery.candidates.step_events import event_scores, freer, step_score
+from adaptive_flot.discovery.candidates.step_events import event_scores, freer, slower_scores, step_score
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
@@ -18,8 +20,10 @@ from adaptive_flot.greybox.forms.form import CoefficientRole
 FORMS_EACH = 3
 MOST_CONSTANTS = 4
 """Alternatives whose sites are tried with a constant."""
-MOST_PROFILES = 3
+MOST_PROFILES = 6
 """Curves in time that are tried as events."""
+MOST_LINES = 3
+"""Curves over a signal that are tried as a line with kinks."""
 BENT = 0.3
 """A dependence is surely not flat when to flatten it costs this share of all it gained."""
 NEARLY = 0.9
@@ -173,10 +177,27 @@ def events(scores: list[Score], ended: list[Alternative]) -> list[Score]:
     return [s for group in by_candidate.values() for s in group]
 
 
+def lines(runs: list[FittedJob], scorers: Sequence[Scorer]) -> list[Job]:
+    """Lines with kinks in place of the best curves over a signal; `scorers` tell what each signal has seen."""
+    curves = [f for f in runs if is_curve(f) and f.alternative.effects[-1].driver not in STATELESS_DRIVERS]
+    jobs = []
+    for f in curves[:MOST_LINES]:
+        effect = f.alternative.effects[-1]
+        seen = scorers[f.linearisation].drivers[effect.driver]
+        jobs += [Job(f.linearisation, s, f.alternative.fit, drawn=True) for s in limited_lines(f.score, effect, seen)]
+    return jobs
+
+
 def step(fitted: FittedJob, span: float) -> list[Job]:
     """A step where a fitted event is over at once; `span` is the length of the record [s]."""
     score = step_score(fitted.score, fitted.alternative.effects[-1], span)
     return [Job(fitted.linearisation, score)] if score else []
+
+
+def slower(fitted: FittedJob, span: float) -> list[Job]:
+    """A ramp and a washout around a fitted step, where that is what was fitted; `span` is that of the record [s]."""
+    around = slower_scores(fitted.score, fitted.alternative.effects[-1], span)
+    return [Job(fitted.linearisation, s, fitted.alternative.fit, drawn=True) for s in around]
 
 
 def more_freedom(fitted: FittedJob, low: float, high: float) -> list[Job]:
@@ -215,6 +236,14 @@ def from_scratch(jobs: list[Job]) -> list[Job]:
     """The same curves from nothing: a rough one may have led the initial state astray, and each finer one with it."""
     short = [job for job in jobs if len(job.score.start) <= FINE_TIME_KNOTS]
     return [replace(j, score=replace(j.score, start=dict.fromkeys(j.score.start, 0.0)), warm=None) for j in short]
+
+
+def flattened(fitted: FittedJob, warm: Fit) -> Job:
+    """A curve with as many knots as that of a finalist, from zero, at the constants of another fit."""
+    none = dict.fromkeys(fitted.score.start, 0.0)
+    fine = finer(fitted.score.variant, none)
+    variant, start = fine if fine else (fitted.score.variant, none)
+    return Job(fitted.linearisation, replace(fitted.score, variant=variant, start=start), warm, drawn=True)
 
 
 def is_curve(fitted: FittedJob) -> bool:

@@ -36,10 +36,13 @@ from adaptive_flot.discovery.search.fit_jobs import (
     events,
     fewer_knots,
     first_forms,
+    flattened,
     forms,
     from_scratch,
     is_curve,
+    lines,
     more_freedom,
+    slower,
     step,
     unbent,
 )
@@ -87,12 +90,16 @@ def refit(
         return [fitted.alternative for fitted in best_of_each(first)], not fitter.problem.time_is_up
     last = halving.last(went_on)
     last += halving.from_constants_of_the_best(last, first)
+    last += halving.astray(last, first)
     compared = not fitter.problem.time_is_up
     followers = halving.followers(last)
+    followers += halving.lines(last)
     bent = halving.bent(followers, last)
     best = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
+    best = best_of_each([*halving.slower(best), *best])
     best = best_of_each([*halving.trimmed(best[:MOST_FREED]), *best])
-    ranked = [fitted.alternative for fitted in best_of_each([*halving.freed(best, last), *best])]
+    best = best_of_each([*halving.freed(best, last), *best])
+    ranked = [fitted.alternative for fitted in best_of_each([*halving.flat(best), *best])]
     done("the leaders at every row")
     leaders = [a for a in ranked[:LEADERS] if halving.keeps_up(a, rival or ranked[0], CLOSE_GAIN)]
     exact = _all_exact(fitter, base, leaders, processes)
@@ -169,13 +176,7 @@ class _SuccessiveHalving:
         furthest: dict[tuple[str, str], FittedJob] = {}
         for fitted in first:
             furthest.setdefault(fitted.score.candidate.name, fitted)
-        tied = {
-            s.candidate.name
-            for linearisation in self.linearisations
-            for s in linearisation.scores
-            if s.gain > TIED * linearisation.scores[0].gain
-        }
-        finalists = _finalists(self._start(0).loss, list(furthest.values()), tied)
+        finalists = _finalists(self._start(0).loss, list(furthest.values()), self._tied())
         drawn = {(f.linearisation, f.score.candidate.name): f for f in reversed(first) if is_curve(f)}
         coarse = [drawn.get((f.linearisation, f.score.candidate.name), f) for f in finalists]
         jobs = [job for f in coarse for job in forms(self.linearisations[f.linearisation], f)]
@@ -203,6 +204,32 @@ class _SuccessiveHalving:
             [Job(f.linearisation, f.score, best) for f in best_of_each([*last, *first]) if far(f.alternative.fit)]
         )
 
+    def astray(self, last: list[FittedJob], first: list[FittedJob]) -> list[FittedJob]:
+        """Curves that promised as much as the best and came to far less: from nothing, at its constants."""
+        ended = best_of_each([*last, *first])
+        return self._run(self._gone_astray(ended, first, ended[0].alternative.fit)) if ended else []
+
+    def _gone_astray(self, ended: list[FittedJob], first: list[FittedJob], best: Fit) -> list[Job]:
+        """Jobs for these: along the plain fit constants were far off, and a first-order curve has the wrong size."""
+        most = max(fitted.alternative.gain for fitted in ended)
+        tied = self._tied()
+        astray = {
+            f.score.candidate.name
+            for f in ended
+            if f.score.candidate.name in tied and f.alternative.gain < NEAR_FINALIST * most
+        }
+        drawn = {f.score.candidate.name: f for f in reversed(first) if is_curve(f)}
+        return [flattened(drawn[name], best) for name in sorted(astray & set(drawn))]
+
+    def _tied(self) -> set[tuple[str, str]]:
+        """Names that explain about as much as the best one to first order."""
+        return {
+            s.candidate.name
+            for linearisation in self.linearisations
+            for s in linearisation.scores
+            if s.gain > TIED * linearisation.scores[0].gain
+        }
+
     def _switches(self, names: set[tuple[str, str]]) -> list[Job]:
         """Switches by a signal of these names, from each linearisation that proposes one.
 
@@ -222,6 +249,31 @@ class _SuccessiveHalving:
             own = [fitted.alternative for fitted in last if fitted.linearisation == i]
             jobs += (Job(i, s, warm) for s, warm in constants(linearisation.scorer, own))
             jobs += (Job(i, s) for s in events(linearisation.scores, _close(own)))
+        return self._run(jobs)
+
+    def lines(self, last: list[FittedJob]) -> list[FittedJob]:
+        """Lines with kinks, which start from a fitted curve over a signal."""
+        most = max((fitted.alternative.gain for fitted in last), default=0.0)
+        near = [fitted for fitted in last if fitted.alternative.gain > CLOSE_GAIN * most]
+        return self._run(lines(best_of_each(near), [each.scorer for each in self.linearisations]))
+
+    def slower(self, best: list[FittedJob]) -> list[FittedJob]:
+        """Events that take their time, where a step is the best of a name: its curve may have been far too coarse."""
+        most = max((fitted.alternative.gain for fitted in best), default=0.0)
+        near = [fitted for fitted in best if fitted.alternative.gain > CLOSE_GAIN * most]
+        return self._run([job for fitted in near for job in slower(fitted, self.high - self.low)])
+
+    def flat(self, best: list[FittedJob]) -> list[FittedJob]:
+        """Constants at the sites of the leaders once more, from where these have ended in the meantime.
+
+        A constant may have rested where the others were then; a curve that is flat by now is better only for its start.
+        """
+        reached = {f.alternative.effects[-1].site: f.alternative for f in best if _is_constant(f)}
+        jobs: list[Job] = []
+        for i, linearisation in enumerate(self.linearisations):
+            own = [f.alternative for f in best[:LEADERS] if f.linearisation == i]
+            ahead = [a for a in own if a.names[-1][0] in reached and a.gain > reached[a.names[-1][0]].gain]
+            jobs += (Job(i, s, warm) for s, warm in constants(linearisation.scorer, ahead))
         return self._run(jobs)
 
     def bent(self, followers: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
@@ -266,6 +318,10 @@ class _SuccessiveHalving:
         bound = {fitted.alternative.names: fitted.alternative.fit for fitted in best}
         problem = self.fitter.problem
         return [r for r in free if worth_its_freedom(problem, bound[r.alternative.names], r.alternative.fit)]
+
+
+def _is_constant(fitted: FittedJob) -> bool:
+    return fitted.alternative.names[-1][1] == "constant"
 
 
 def _words(jobs: Sequence[Job], most: int = 2) -> str:

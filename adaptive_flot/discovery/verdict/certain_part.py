@@ -15,7 +15,7 @@ from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import changes, verify
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, SearchResult, Verification
-from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN, MOST_RIVALS, Name, same_site
+from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN, MOST_RIVALS, Name, same_signal, same_site
 
 VISIBLE = 1.4
 """An output is wrong without the part: its error is so many times its noise, so half of its square is no noise."""
@@ -76,8 +76,8 @@ def near_by_least_margin(result: SearchResult, best: Alternative) -> list[Altern
 
 
 def _in_all(near: Sequence[Alternative]) -> list[Name]:
-    """Names of the first set that all have, but for two dependences of one quantity: these are no two causes."""
-    best, twice = near[0], same_site(near[0].names)
+    """Names of the first set that all have, but for two dependences of or on one quantity: these are no two causes."""
+    best, twice = near[0], (*same_site(near[0].names), *same_signal(near[0].names))
     return [n for n in best.names if all(n in a.names for a in near) and n not in twice]
 
 

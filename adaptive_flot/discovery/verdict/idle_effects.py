@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import verify
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
+from adaptive_flot.discovery.search.simplify import refitted
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN, judge
+from adaptive_flot.greybox.effects import Effect
 
 
 def without_idle_effects(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[SearchResult, Judgement]:
@@ -28,7 +35,55 @@ def without_idle_effects(problem: Problem, result: SearchResult, judged: Judgeme
             checked = verify(problem, result.base, first.fit, first.problem)
             fewer = replace(result, alternatives=earlier.alternatives, verification=checked)
             return fewer, judge(fewer)
+    return without_what_vanished(problem, result, judged)
+
+
+def without_what_vanished(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[SearchResult, Judgement]:
+    """The judgement without an effect whose size has shrunk to nothing beside the others, where it fits as well so.
+
+    An effect is chosen while others are missing. Once they are there its size may be anything about zero. It is left
+    out where its coefficients a, with their covariance C, are no evidence, and the fit without it is as good::
+
+        a' C^-1 a < q ln N + LEAST_MARGIN,   BIC(without it) < BIC(with it) + LEAST_MARGIN
+
+    with q coefficients and N measurements. Wald, *Trans. Am. Math. Soc.* 54 (1943) 426.
+    """
+    best = judged.best
+    if judged.word not in ("named", "class") or best is None or len(best.names) < 2 or best.adjusted_bic is not None:
+        return result, judged
+    fitter = Fitter(problem)
+    price = float(np.log(max(problem.count(fitter.rows), 2)))
+    for k, effect in enumerate(best.effects):
+        if _evidence(best.fit, effect, price) > LEAST_MARGIN:
+            continue
+        others = [e for i, e in enumerate(best.effects) if i != k]
+        fit = refitted(fitter, result.base, best, [replace(e, coefficients={}) for e in others])
+        if fit is None or fit.bic > best.fit.bic + LEAST_MARGIN:
+            continue
+        names, known = (*best.names[:k], *best.names[k + 1 :]), (*best.known[:k], *best.known[k + 1 :])
+        fewer = Alternative(names, known, fit, result.base.loss - fit.loss, fit.bic - result.base.bic)
+        earlier = [a for r in result.rounds for a in r.alternatives if len(a.names) == len(names)]
+        rivals = [a for a in earlier if set(a.names) != set(names)]
+        sds = loglik_difference_sds(problem, fit, [a.fit for a in rivals])
+        compared = (replace(a, loglik_difference_sd=sd) for a, sd in zip(rivals, sds, strict=True))
+        ranked = (fewer, *sorted(compared, key=lambda a: a.fit.bic))
+        checked = verify(problem, result.base, fit, fewer.problem)
+        without = replace(result, alternatives=ranked, verification=checked)
+        return without_what_vanished(problem, without, judge(without))
     return result, judged
+
+
+def _evidence(fit: Fit, effect: Effect, price: float) -> float:
+    """Wald's statistic of an effect's size being none, less the price of its coefficients; infinite where unknown."""
+    names = [effect.parameter(c.name) for c in effect.terms if not c.is_shape]
+    where = [fit.names.index(n) for n in names if n in fit.names]
+    if not where or len(fit.covariance) <= max(where):
+        return np.inf
+    values, covariance = fit.values[where], fit.covariance[np.ix_(where, where)]
+    if not np.isfinite(covariance).all():
+        return np.inf
+    free = sum(effect.parameter(c.name) in fit.names for c in effect.terms)
+    return float(values @ np.linalg.pinv(covariance, hermitian=True) @ values) - price * free
 
 
 def _does_as_well(a: Alternative, best: Alternative) -> bool:

@@ -61,7 +61,7 @@ def judge(result: SearchResult) -> Judgement:
         return Judgement("abstain", best, (), rivals, margin)
     best, rivals = named[0], _others(result, named[0])
     names = tuple(dict.fromkeys(tuple(sorted(a.names)) for a in named))
-    if len(names) == 1 and not same_site(best.names):
+    if len(names) == 1 and not same_site(best.names) and not same_signal(best.names):
         return Judgement("named", best, (), rivals, margin)
     members = tuple(dict.fromkeys(n for group in names for n in group))
     if any(a.delta_bic > -LEAST_MARGIN for a in named):  # one that explains nothing comes close: so does the best
@@ -98,6 +98,15 @@ def same_site(names: Sequence[Name]) -> tuple[Name, ...]:
     """
     sites = [site for site, _ in names]
     return tuple(n for n in names if sites.count(n[0]) > 1)
+
+
+def same_signal(names: Sequence[Name]) -> tuple[Name, ...]:
+    """The names (site, driver) that share a signal they depend on with another of these, at another site.
+
+    One dependence on that signal, of a shape that the form at hand does not draw, leaves an error for the other one.
+    """
+    signals = [driver for _, driver in names if driver not in STATELESS_DRIVERS]
+    return tuple(n for n in names if signals.count(n[1]) > 1)
 
 
 def but_for_what_has_no_reason(result: SearchResult, judged: Judgement) -> Judgement:

@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
-from adaptive_flot.discovery.verdict.judge import same_site
+from adaptive_flot.discovery.verdict.judge import same_signal, same_site
 from adaptive_flot.discovery.verdict.sizes import spaced, words_alone
 
 LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
@@ -140,13 +140,17 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         return f"{said} {beside_a_part(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
     either = [n for n in same_site(judgement.best.names) if n in shared]
+    both = [n for n in same_signal(judgement.best.names) if n in shared and n not in either]
     words = [LACKS_SEVERAL]
-    if sure := ", ".join(f"{s} by {d}" for s, d in shared if (s, d) not in either):
+    if sure := ", ".join(f"{s} by {d}" for s, d in shared if (s, d) not in (*either, *both)):
         begun, ended = ("All that come near have", f"; still wrong: {', '.join(wrong)}") if wrong else ("Certain:", "")
         words.append(f"{begun} {sure}{ended}.")
     for site in dict.fromkeys(s for s, _ in either):
         drivers = " or ".join(d for s, d in either if s == site)
         words.append(f"{site} depends on {drivers}, or on both: one dependence of another shape would look the same.")
+    for driver in dict.fromkeys(d for _, d in both):
+        sites = " or ".join(s for s, d in both if d == driver)
+        words.append(f"{sites} depends on {driver}, or both: one of them, of another shape, would look the same.")
     rest = [" with ".join(f"{s} by {d}" for s, d in a.names if (s, d) not in shared) for a in sets]
     if any(rest):
         listed = "; ".join(r or "nothing more" for r in rest)

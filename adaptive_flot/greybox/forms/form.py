@@ -239,6 +239,8 @@ def wrong_setting(name: str, value: float | tuple[float, ...]) -> str | None:
         return None if several.size >= 2 and (np.diff(several) > 0).all() else "give two or more numbers that rise"
     if several.size != 1 or not several[0] > 0:
         return "give one positive number"
+    if name == "sides":
+        return None if several[0] in (1, 2, 3) else "give 1 (level below), 2 (level above) or 3 (both)"
     return "give a whole number" if name in ("stages", "count") and several[0] % 1 else None
 
 

@@ -17,6 +17,7 @@ from adaptive_flot.greybox.forms.form import (
     Form,
     FormKind,
     Settings,
+    StaticLaw,
     fixed,
     number,
     numbers,
@@ -28,6 +29,10 @@ SHARPEST = 0.3
 """Least width over which a change turns with the sign of its driver, in scales of it: a jump has no derivative."""
 WIDEST = 10.0
 """Largest such width, likewise: what changes over more of the driver's range does not turn with its sign."""
+LEAST_SPAN = 1e-3
+"""Least distance from the begin of a limited line to its end, as a share of that between its knots."""
+ONE_BELOW, ONE_ABOVE, BOTH_SIDES = 1, 2, 3
+"""Where a limited line is level: below its begin, above its end, or on both sides."""
 LEAST_BLEND = 1e-6
 """A driver of a power law is taken as at least this share of its reference: keeps the logarithm finite."""
 
@@ -136,6 +141,43 @@ def _hinge(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     return c["slope"] * softplus((driver - c["threshold"]) / reference, number(s, "width"))
 
 
+def _limited_line(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    g: ca.SX = c["amplitude"] + c["slope"] * (_limited_share(driver, c, s) - 0.5)
+    return g
+
+
+def _limited_factor(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    # straight is the factor, and not its logarithm
+    z = _limited_share(driver, c, s)
+    low, high = c["amplitude"] - c["slope"] / 2, c["amplitude"] + c["slope"] / 2
+    g: ca.SX = low + ca.log1p(z * ca.expm1(high - low))
+    return g
+
+
+def _limited_share(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    """How far the driver is from the begin to the end, from 0 to 1; a side without one ends at its knot."""
+    low, high = _ends(s)
+    begins, ends = c.get("begins", ca.SX(low)), c.get("ends", ca.SX(high))
+    span = ca.fmax(ends - begins, LEAST_SPAN * (high - low))
+    share: ca.SX = ca.fmin(ca.fmax((driver - begins) / span, 0), 1)
+    return share
+
+
+def _ends(settings: Settings) -> tuple[float, float]:
+    knots = numbers(settings, "knots")
+    return float(knots[0]), float(knots[-1])
+
+
+def _limited_line_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
+    low, high = _ends(settings)
+    span = high - low
+    begins = Coefficient("begins", CoefficientRole.THRESHOLD, low, low, high, 0.1 * span, unit="driver")
+    ends = Coefficient("ends", CoefficientRole.THRESHOLD, high, low, high, 0.1 * span, unit="driver")
+    sides = {ONE_BELOW: (begins,), ONE_ABOVE: (ends,), BOTH_SIDES: (begins, ends)}
+    chosen = sides[round(number(settings, "sides"))]
+    return _AMPLITUDE, Coefficient("slope", CoefficientRole.SLOPE, unit="g"), *chosen
+
+
 def _curve_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
     return tuple(
         Coefficient(f"value_{k + 1}", CoefficientRole.KNOT_VALUE, unit="g")
@@ -147,6 +189,19 @@ def _direction_coefficients(settings: Settings) -> tuple[Coefficient, ...]:
     scale = number(settings, "scale")
     width = Coefficient("width", CoefficientRole.BAND, scale, SHARPEST * scale, WIDEST * scale, scale, unit="driver")
     return _AMPLITUDE, Coefficient("turn", CoefficientRole.SLOPE, unit="g"), width
+
+
+def _limited(name: str, description: str, law: StaticLaw) -> Form:
+    return Form(
+        name,
+        description,
+        FormKind.THRESHOLD,
+        _limited_line_coefficients,
+        ("signal",),
+        {"knots": None, "sides": float(BOTH_SIDES)},
+        {"knots": "driver"},
+        static=law,
+    )
 
 
 _AMPLITUDE = Coefficient("amplitude", CoefficientRole.LEVEL, unit="g")
@@ -215,6 +270,8 @@ STATIC_FORMS: tuple[Form, ...] = (
         {"knots": "driver"},
         static=_polyline,
     ),
+    _limited("limited_line", "a straight line over the driver between two values of it, level beyond", _limited_line),
+    _limited("limited_factor", "a factor that is such a line, instead of its logarithm", _limited_factor),
     Form(
         "hinge",
         "nothing below a threshold of the driver, a straight line above",

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.candidates.relays import LEAST_MOVES, RELAY, course, moves_often, with_relays
+from adaptive_flot.discovery.candidates.relays import LEAST_MOVES, RELAY, course, late, moves_often, with_relays
 from adaptive_flot.discovery.candidates.score_test import Scorer
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -176,3 +176,15 @@ def test_a_switch_that_a_fit_made_a_step_of_is_none() -> None:
         assert fit is not None
         assert moves_often(problem, fit, relay) == often
         assert moves_often(problem, fit, Effect("heat_loss", "constant", "shift"))
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10_000), st.floats(2.0, 60.0))
+def test_a_switch_that_moves_slowly_is_a_first_order_lag_of_its_course(seed: int, rows: float) -> None:
+    """Against the difference equation row by row; it starts at rest."""
+    is_on = np.repeat(np.random.default_rng(seed).random(20) > 0.5, 7)
+    share, moved = 1 - np.exp(-1 / rows), float(is_on[0])
+    for wanted, found in zip(is_on, late(is_on, rows), strict=True):
+        moved += share * (float(wanted) - moved)
+        assert found == pytest.approx(moved, abs=1e-12)
+    assert late(is_on, 1.0).tolist() == is_on.astype(float).tolist()

@@ -9,7 +9,7 @@ import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate
 from adaptive_flot.discovery.candidates.score_test import Score
-from adaptive_flot.discovery.candidates.step_events import event_scores, freer, slow, step_score
+from adaptive_flot.discovery.candidates.step_events import event_scores, freer, slow, slower_scores, step_score
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.processes import flotation
 
@@ -100,3 +100,14 @@ def test_a_large_change_at_once_is_an_event_though_its_knots_are_even() -> None:
     assert not slow(curve(plateau))
     assert slow(curve(0.1 * plateau))
     assert slow(curve(0.7 * knots / 3000.0))
+
+
+def test_around_a_step_slower_events_are_tried() -> None:
+    """Both have its size, and are half way there when it jumps; what is no step has its own."""
+    score, curve = score_of(np.zeros(14))
+    step = Effect("froth_recovery", "time", "step", {"amplitude": 0.4, "onset": 1000.0}, {"width": 3.0})
+    ramp, washout = slower_scores(score, step, 3000.0)
+    assert ramp.start["onset"] + ramp.start["duration"] / 2 == pytest.approx(1000.0)
+    assert washout.start["onset"] < 1000.0 < washout.start["onset"] + 3 * washout.start["time_constant"]
+    assert ramp.start["amplitude"] == washout.start["amplitude"] == 0.4
+    assert slower_scores(score, curve, 3000.0) == slower_scores(score, _fitted(ramp), 3000.0) == []

@@ -21,6 +21,8 @@ SETTINGS: dict[str, dict[str, float | tuple[float, ...]]] = {
     "curve": {"knots": (1.0e-3, 1.3e-3, 1.6e-3, 1.9e-3)},
     "polyline": {"knots": (1.0e-3, 1.2e-3, 1.6e-3, 1.9e-3)},
     "hinge": {"reference": 1.5e-3},
+    "limited_line": {"knots": (1.0e-3, 1.9e-3)},
+    "limited_factor": {"knots": (1.0e-3, 1.9e-3)},
     "direction": {"scale": 1.5e-3},
     "cubic": {"knots": (1.0e-3, 1.9e-3)},
     "span": {"middle": 1.5e-3},
