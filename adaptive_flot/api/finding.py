@@ -18,7 +18,7 @@ from adaptive_flot.api.shown import check_kind, error_table, html_of, text_of
 from adaptive_flot.discovery.discover import discover as search_record
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery, Verdict
-from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve, effect_curves
 from adaptive_flot.errors import DataError, ModelError, ResultError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model

@@ -39,7 +39,7 @@ from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, conclude
 from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.discovery.verdict.one_course import heed_one_course
-from adaptive_flot.discovery.verdict.sizes import spaced
+from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model

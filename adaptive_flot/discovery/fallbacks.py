@@ -13,7 +13,7 @@ from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.stages import fit_without_report, judge_alternatives
 from adaptive_flot.discovery.verdict.certain_part import part_alone
 from adaptive_flot.discovery.verdict.heed_report import heed_report
-from adaptive_flot.discovery.verdict.wording import beside_a_part
+from adaptive_flot.discovery.verdict.words.wording import beside_a_part
 
 TELLS = ("named", "class")
 

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from adaptive_flot.charts.palette import colour
 from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery
-from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.files import replace_path
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.processes.registry import make_model

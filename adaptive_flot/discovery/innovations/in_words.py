@@ -8,7 +8,7 @@ from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.results import NamedEffect
-from adaptive_flot.discovery.verdict.sizes import words_of_effect
+from adaptive_flot.discovery.verdict.words.sizes import words_of_effect
 
 
 def told_in_words(search: Search, told: Told) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
-from adaptive_flot.discovery.candidates.step_events import SLOW_S
+from adaptive_flot.discovery.candidates.shapes.step_events import SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results.evidence import Verification

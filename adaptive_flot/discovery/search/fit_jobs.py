@@ -9,9 +9,9 @@ import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import FINE_TIME_KNOTS, finer
 from adaptive_flot.discovery.candidates.knots import trimmed
-from adaptive_flot.discovery.candidates.limited_lines import limited_lines
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
-from adaptive_flot.discovery.candidates.step_events import event_scores, freer, slower_scores, step_score
+from adaptive_flot.discovery.candidates.shapes.limited_lines import limited_lines
+from adaptive_flot.discovery.candidates.shapes.step_events import event_scores, freer, slower_scores, step_score
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect

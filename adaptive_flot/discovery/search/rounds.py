@@ -8,10 +8,10 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import LEAST_EVIDENCE
 from adaptive_flot.discovery.candidates.catalogue import catalogue
-from adaptive_flot.discovery.candidates.pulses import with_pulses
-from adaptive_flot.discovery.candidates.relays import with_relays
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Scorer
+from adaptive_flot.discovery.candidates.shapes.pulses import with_pulses
+from adaptive_flot.discovery.candidates.shapes.relays import with_relays
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.noise import Noise

@@ -12,7 +12,7 @@ from adaptive_flot.discovery.assessment.likelihood import (
 )
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.score_test import Scorer
-from adaptive_flot.discovery.candidates.step_events import SLOW_ROWS, SLOW_S
+from adaptive_flot.discovery.candidates.shapes.step_events import SLOW_ROWS, SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem

@@ -18,9 +18,9 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import worth_its_freedom
 from adaptive_flot.discovery.candidates.direction import nameable
-from adaptive_flot.discovery.candidates.relays import moves_often
 from adaptive_flot.discovery.candidates.score_test import Score
-from adaptive_flot.discovery.candidates.step_events import refined
+from adaptive_flot.discovery.candidates.shapes.relays import moves_often
+from adaptive_flot.discovery.candidates.shapes.step_events import refined
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row

@@ -46,7 +46,7 @@ from adaptive_flot.discovery.since_reference.taken_back import (
     unless_more_than_noise,
     unless_much_is_left,
 )
-from adaptive_flot.discovery.verdict.suspects import suspect_notes
+from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 

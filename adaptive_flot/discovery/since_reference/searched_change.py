@@ -25,7 +25,7 @@ from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import Discovery, OutputChange, Verdict
 from adaptive_flot.discovery.stages import NONE_FITTED, NOT_ALL_TRIED
-from adaptive_flot.discovery.verdict.wording import since_reference
+from adaptive_flot.discovery.verdict.words.wording import since_reference
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 

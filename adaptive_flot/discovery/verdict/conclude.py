@@ -15,13 +15,13 @@ from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
-from adaptive_flot.discovery.verdict.curve import EffectCurve, effect_curves
 from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.report_veto import much_better
-from adaptive_flot.discovery.verdict.sizes import words_of_effects
-from adaptive_flot.discovery.verdict.suspects import suspect_notes
-from adaptive_flot.discovery.verdict.thresholds import with_ranges
-from adaptive_flot.discovery.verdict.wording import beside_words, drift_words, reason_words
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve, effect_curves
+from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
+from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
+from adaptive_flot.discovery.verdict.words.thresholds import with_ranges
+from adaptive_flot.discovery.verdict.words.wording import beside_words, drift_words, reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.stretches import LONGEST_IS_USED
 from adaptive_flot.greybox.effects import Effect

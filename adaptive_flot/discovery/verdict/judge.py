@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.direction import listed
-from adaptive_flot.discovery.candidates.step_events import slow
+from adaptive_flot.discovery.candidates.shapes.step_events import slow
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS

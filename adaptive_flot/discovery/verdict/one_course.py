@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.results import State
-from adaptive_flot.discovery.verdict.sizes import spaced
+from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 

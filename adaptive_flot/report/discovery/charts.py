@@ -10,7 +10,7 @@ from adaptive_flot.charts.palette import GREY
 from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.candidates.score_test import Score
-from adaptive_flot.discovery.verdict.curve import EffectCurve
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.report.discovery.figures import LEAST_SHOWN, driver_order
 from adaptive_flot.report.kit.heat import Cell, HeatMap, shares
 from adaptive_flot.report.kit.wording import spaced

@@ -14,7 +14,7 @@ from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.verdict.curve import EffectCurve
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.report.kit import style
 from adaptive_flot.report.kit.figures import legend_above
 from adaptive_flot.report.kit.wording import spaced

@@ -13,7 +13,7 @@ from adaptive_flot.discovery.background.wording import estimated
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Discovery
-from adaptive_flot.discovery.verdict.curve import effect_curves
+from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
 from adaptive_flot.report.discovery.answer import error_facts, made_from, word_in_words

@@ -18,7 +18,7 @@ from adaptive_flot.discovery.assessment.telling_rows import (
     touched_rows,
 )
 from adaptive_flot.discovery.assessment.verification import verify
-from adaptive_flot.discovery.candidates.pulses import PULSE
+from adaptive_flot.discovery.candidates.shapes.pulses import PULSE
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.noise import Noise

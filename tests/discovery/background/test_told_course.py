@@ -28,7 +28,7 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Judgement, OutputChange, SearchResult
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.verdict.report_veto import contradiction
-from adaptive_flot.discovery.verdict.wording import beside_words
+from adaptive_flot.discovery.verdict.words.wording import beside_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.record import RecordSimulator

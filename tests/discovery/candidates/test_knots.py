@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 
 from adaptive_flot.discovery.candidates.catalogue import FINE_TIME_KNOTS, TIME_KNOTS
 from adaptive_flot.discovery.candidates.knots import MOST_KNOTS, is_even, trimmed
+from adaptive_flot.discovery.candidates.shapes.step_events import freer
 from adaptive_flot.discovery.candidates.spline import knots_of, spline_values
-from adaptive_flot.discovery.candidates.step_events import freer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate
-from adaptive_flot.discovery.candidates.limited_lines import LIMITED, limited_lines
 from adaptive_flot.discovery.candidates.score_test import Score
+from adaptive_flot.discovery.candidates.shapes.limited_lines import LIMITED, limited_lines
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.candidates.pulses import PULSE, with_pulses
 from adaptive_flot.discovery.candidates.responses import TimeProfile
 from adaptive_flot.discovery.candidates.score_test import Scorer
-from adaptive_flot.discovery.candidates.step_events import freer, slow, step_score
+from adaptive_flot.discovery.candidates.shapes.pulses import PULSE, with_pulses
+from adaptive_flot.discovery.candidates.shapes.step_events import freer, slow, step_score
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.record.screening import Suspect
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of
-from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.sizes import words_of_effects
-from adaptive_flot.discovery.verdict.suspects import event_times, suspect_notes
+from adaptive_flot.discovery.verdict.words.curve import effect_curves
+from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
+from adaptive_flot.discovery.verdict.words.suspects import event_times, suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import DT, Truth, changed, heated_tank, tank_record

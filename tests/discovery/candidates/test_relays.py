@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.candidates.relays import LEAST_MOVES, RELAY, course, late, moves_often, with_relays
 from adaptive_flot.discovery.candidates.score_test import Scorer
+from adaptive_flot.discovery.candidates.shapes.relays import LEAST_MOVES, RELAY, course, late, moves_often, with_relays
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of
-from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.sizes import words_of_effects
-from adaptive_flot.discovery.verdict.thresholds import same_course
+from adaptive_flot.discovery.verdict.words.curve import effect_curves
+from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
+from adaptive_flot.discovery.verdict.words.thresholds import same_course
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray

@@ -9,7 +9,7 @@ import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate
 from adaptive_flot.discovery.candidates.score_test import Score
-from adaptive_flot.discovery.candidates.step_events import event_scores, freer, slow, slower_scores, step_score
+from adaptive_flot.discovery.candidates.shapes.step_events import event_scores, freer, slow, slower_scores, step_score
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.processes import flotation
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.record.screening import Suspect, clean_outputs
-from adaptive_flot.discovery.verdict.suspects import suspect_notes
+from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import Truth, heated_tank, tank_record
 

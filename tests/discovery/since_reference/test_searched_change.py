@@ -14,7 +14,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.discovery.since_reference.searched_change import with_constants_held, with_searched_effect
-from adaptive_flot.discovery.verdict.wording import since_reference
+from adaptive_flot.discovery.verdict.words.wording import since_reference
 from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.tank import record, tank
 

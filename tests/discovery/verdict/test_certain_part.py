@@ -12,7 +12,7 @@ from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, R
 from adaptive_flot.discovery.search.substance import excess_by_output, still_wrong
 from adaptive_flot.discovery.verdict.certain_part import with_certain_part
 from adaptive_flot.discovery.verdict.judge import judge
-from adaptive_flot.discovery.verdict.wording import reason_words
+from adaptive_flot.discovery.verdict.words.wording import reason_words
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from tests.discovery.heated import CAPACITY, DT, ROOM, equations, heated_tank, moves

@@ -16,7 +16,7 @@ from adaptive_flot.discovery.search.simplify import refitted
 from adaptive_flot.discovery.verdict.idle_effects import without_what_vanished
 from adaptive_flot.discovery.verdict.judge import judge, same_signal
 from adaptive_flot.discovery.verdict.one_course import heed_one_course
-from adaptive_flot.discovery.verdict.wording import reason_words
+from adaptive_flot.discovery.verdict.words.wording import reason_words
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import heated_tank
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.results import Discovery, NamedEffect
-from adaptive_flot.discovery.verdict.curve import EffectCurve
-from adaptive_flot.discovery.verdict.sizes import words_of_effect, words_of_effects
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve
+from adaptive_flot.discovery.verdict.words.sizes import words_of_effect, words_of_effects
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.report.discovery.tables import coefficient_table

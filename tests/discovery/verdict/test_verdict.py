@@ -15,7 +15,6 @@ from adaptive_flot.discovery.fitting.fit import row_losses
 from adaptive_flot.discovery.hypotheses.families import hypotheses
 from adaptive_flot.discovery.results import Alternative, Discovery, SearchResult, Verification
 from adaptive_flot.discovery.test_design.experiment import leading
-from adaptive_flot.discovery.verdict.curve import effect_curves
 from adaptive_flot.discovery.verdict.idle_effects import without_idle_effects
 from adaptive_flot.discovery.verdict.judge import (
     _one_way_each,
@@ -24,7 +23,8 @@ from adaptive_flot.discovery.verdict.judge import (
     held_up,
     judge,
 )
-from adaptive_flot.discovery.verdict.wording import drift_words
+from adaptive_flot.discovery.verdict.words.curve import effect_curves
+from adaptive_flot.discovery.verdict.words.wording import drift_words
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.quantities import KnownEffect
 from tests.discovery.heated import heated_tank

@@ -13,8 +13,8 @@ import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.record.moved_inputs import MOVED
-from adaptive_flot.discovery.verdict.curve import effect_curves
-from adaptive_flot.discovery.verdict.sizes import words_of_effects
+from adaptive_flot.discovery.verdict.words.curve import effect_curves
+from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, ROWS, STEPS, NOISE = 1.0 / 600, 900, 8, 2e-4

@@ -52,7 +52,7 @@ from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_f
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
-from adaptive_flot.discovery.verdict.wording import beside_a_part
+from adaptive_flot.discovery.verdict.words.wording import beside_a_part
 from adaptive_flot.greybox.model import Model
 
 

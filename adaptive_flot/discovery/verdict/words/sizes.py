@@ -8,7 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.wording import clock
 from adaptive_flot.discovery.results import Alternative, NamedEffect
-from adaptive_flot.discovery.verdict.curve import EffectCurve
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model

@@ -10,7 +10,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_signal, same_site
-from adaptive_flot.discovery.verdict.sizes import spaced, words_alone
+from adaptive_flot.discovery.verdict.words.sizes import spaced, words_alone
 
 LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
 LACKS_ONE, LACKS_SEVERAL = "The model lacks one", "The model lacks several effects."

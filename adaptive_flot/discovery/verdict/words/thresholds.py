@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.candidates.relays import Thresholds
+from adaptive_flot.discovery.candidates.shapes.relays import Thresholds
 from adaptive_flot.discovery.record.problem import BoolArray
 from adaptive_flot.discovery.results import NamedEffect
-from adaptive_flot.discovery.verdict.curve import EffectCurve
+from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
 
