@@ -97,7 +97,7 @@ def refit(
     bent = halving.bent(followers, last)
     best = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
     best = best_of_each([*halving.slower(best), *best])
-    best = best_of_each([*halving.trimmed(best[:MOST_FREED]), *best])
+    best = best_of_each([*halving.trimmed(best[:MOST_FREED], last), *best])
     best = best_of_each([*halving.freed(best, last), *best])
     ranked = [fitted.alternative for fitted in best_of_each([*halving.flat(best), *best])]
     done("the leaders at every row")
@@ -298,9 +298,14 @@ class _SuccessiveHalving:
             freed += self._freer(others, best, last)
         return freed
 
-    def trimmed(self, jobs: list[FittedJob]) -> list[FittedJob]:
-        """Curves without the knots that they do not need, so that no profile loses for a freedom it did not use."""
-        return self._run(self._fewer(jobs))
+    def trimmed(self, jobs: list[FittedJob], last: list[FittedJob]) -> list[FittedJob]:
+        """Curves without the knots that they do not need, so that no profile loses for a freedom it did not use.
+
+        Where another form is the best of a name so far, its curve is trimmed all the same.
+        """
+        names = {fitted.alternative.names for fitted in jobs}
+        curves = best_of_each([fitted for fitted in last if fitted.alternative.names in names and is_curve(fitted)])
+        return self._run(self._fewer([*(fitted for fitted in jobs if not is_curve(fitted)), *curves]))
 
     def _fewer(self, jobs: list[FittedJob]) -> list[Job]:
         most = max((fitted.alternative.gain for fitted in jobs), default=0.0)
