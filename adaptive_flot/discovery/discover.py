@@ -16,6 +16,7 @@ from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_o
 from adaptive_flot.discovery.later_inputs import with_later_inputs
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Discovery, State, Verdict
+from adaptive_flot.discovery.results.words import TELLING
 from adaptive_flot.discovery.stages import (
     NOT_ALL_TRIED,
     allow_for_background,
@@ -145,7 +146,7 @@ def _finer(state: State, verdict: Verdict) -> Model | None:
 
     The edges of an event in time fall between steps, whose length moves them a little: no stiffness.
     """
-    if verdict.word not in ("named", "class", "unnamed") or state.problem is None or state.after is None:
+    if verdict.word not in TELLING or state.problem is None or state.after is None:
         return None
     if any(e.driver == "time" for e in state.after.model.effects):
         return None

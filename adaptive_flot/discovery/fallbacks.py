@@ -10,12 +10,11 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.background.told_course import with_courses
 from adaptive_flot.discovery.results import State
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.stages import fit_without_report, judge_alternatives
 from adaptive_flot.discovery.verdict.certain_part import part_alone
 from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.discovery.verdict.words.wording import beside_a_part
-
-TELLS = ("named", "class")
 
 
 def try_as_course(state: State) -> State:
@@ -58,7 +57,7 @@ def tell_part_alone(state: State) -> State:
 
 def _heard(anew: State, state: State) -> State:
     """The state with the last fits and the word of the report rows; the one before where nothing is told then."""
-    if anew.judged.word not in TELLS:
+    if anew.judged.word not in WITH_A_NAME:
         return state
     heard = heed_report(fit_without_report(anew))
-    return heard if heard.judged.word in TELLS else state
+    return heard if heard.judged.word in WITH_A_NAME else state

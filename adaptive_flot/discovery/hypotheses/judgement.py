@@ -19,6 +19,7 @@ from adaptive_flot.discovery.hypotheses.comparison import (
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.plausible import at_edge
+from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray
 
 Word = Literal["none", "named", "class", "abstain", "insufficient"]
@@ -27,8 +28,6 @@ CHANCE = 0.95
 DRAWS = 999
 FEWEST_ROWS = 60
 """Rows that the new records, and the reference, must have."""
-LARGEST_CLASS = 3
-"""Parts that a class may hold at most."""
 
 
 @dataclass(frozen=True)

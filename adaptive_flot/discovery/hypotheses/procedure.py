@@ -31,6 +31,7 @@ from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.discovery.hypotheses.telling import unless_at_noise, verdict_of
 from adaptive_flot.discovery.hypotheses.without_a_site import unless_without_a_site
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
@@ -173,7 +174,7 @@ def compare(
         judged = unless_without_a_site(calibration, rows, blocks, null, judged, usual, base.fit, processes, ends)
         complete = time.monotonic() <= ends
     verdict = verdict_of(calibration, rows, blocks, null, judged, bool(references), time.perf_counter() - began)
-    told = judged.word in ("named", "class") and judged.best is not None
+    told = judged.word in WITH_A_NAME and judged.best is not None
     if excluded and not told:
         verdict = replace(verdict, notes=(*verdict.notes, OTHER_CONSTANTS))
     if references and told and judged.best is not None and excluded_by(calibration, judged.best.fit):

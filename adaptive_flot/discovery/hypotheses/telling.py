@@ -16,6 +16,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
@@ -59,7 +60,7 @@ def verdict_of(
 ) -> Verdict:
     """Return what to tell: `reference` says whether there was one, `seconds` how long it took."""
     model = calibration.model
-    told = judged.word in ("named", "class")
+    told = judged.word in WITH_A_NAME
     after = judged.best if judged.best is not None else null
     old, new = rms(rows, null.fresh), rms(rows, after.fresh)
     error = tuple(

@@ -39,8 +39,9 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
 from adaptive_flot.discovery.hypotheses.families import MATTERS, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
-from adaptive_flot.discovery.hypotheses.judgement import LARGEST_CLASS, Judged, UsualLoss, WithoutSite
+from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import seen_values
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.model import FloatArray, Model
 
 LEAVES_MORE = ", and even so the errors stay above those of the reference"
@@ -78,7 +79,7 @@ def unless_without_a_site(
     ends
         Time of `time.monotonic` after which nothing more is fitted.
     """
-    if judged.word not in ("named", "class") or judged.best is None:
+    if judged.word not in WITH_A_NAME or judged.best is None:
         return judged
     model, constants = with_further_sites(calibration.model), calibration.constants
 

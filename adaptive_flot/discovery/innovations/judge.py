@@ -17,6 +17,7 @@ from adaptive_flot.discovery.innovations.refit import Refitter
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
 from adaptive_flot.discovery.innovations.switching import chance_of_edges
 from adaptive_flot.discovery.innovations.telling_apart import low_end, told_apart
+from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray
 
 SMALL = 0.15
@@ -29,8 +30,6 @@ TOO_LARGE = "what fits best would have to be larger than such a fault can be"
 FOLDS = 5
 BY_CHANCE = 1e-3
 """Probability below which the times of an event are those of an input: then it is no event."""
-LARGEST_CLASS = 3
-"""Sites that a class may hold at most."""
 
 Word = Literal["none", "named", "class", "abstain"]
 

@@ -2,6 +2,7 @@
 
 Map
 ---
+words.py         The words of a verdict.
 evidence.py      Of residual tests, of the comparison of two fits, and of first-order scores.
 alternatives.py  Of a search: fitted alternatives, rounds, and the judgement on them.
 experiment.py    Of the design of a test.
@@ -16,16 +17,19 @@ from adaptive_flot.discovery.results.alternatives import (
     Judgement,
     Round,
     SearchResult,
-    Word,
 )
 from adaptive_flot.discovery.results.evidence import Detection, Location, OutputChange, Place, Symptom, Verification
 from adaptive_flot.discovery.results.experiment import WATCHING, Experiment, Pair, Tried
 from adaptive_flot.discovery.results.state import State
 from adaptive_flot.discovery.results.verdict import Discovery, NamedEffect, Verdict
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, TELLING, WITH_A_NAME, Word
 
 __all__ = [
+    "LARGEST_CLASS",
     "SURE",
+    "TELLING",
     "WATCHING",
+    "WITH_A_NAME",
     "Alternative",
     "Detection",
     "Discovery",

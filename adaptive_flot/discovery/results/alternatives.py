@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.shapes.step_events import SLOW_S
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results.evidence import Verification
+from adaptive_flot.discovery.results.words import Word
 from adaptive_flot.greybox.effects import Effect
-
-Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
 
 SURE = 2.0
 """Standard deviations by which an alternative must be worse to be told apart."""

@@ -14,6 +14,7 @@ from adaptive_flot.discovery.results.alternatives import FirstRound, Judgement, 
 from adaptive_flot.discovery.results.evidence import Detection, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
 from adaptive_flot.discovery.results.verdict import Discovery, Verdict
+from adaptive_flot.discovery.results.words import TELLING
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
@@ -156,7 +157,7 @@ class State:
         if verdict.word == "insufficient":
             screening = replace(screening, reasons=verdict.shortcomings)
         before, after = self.before or self.base, self.after or self.base
-        told = after if verdict.word in ("named", "class", "unnamed") else before
+        told = after if verdict.word in TELLING else before
         model = told.model if told is not None else self.model
         return Discovery(
             verdict, model, screening, self.problem, self.search, self.judgement, before, after, self.sizes or after

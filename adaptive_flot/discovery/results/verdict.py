@@ -9,9 +9,10 @@ from typing import Any
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
-from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult, Word
+from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult
 from adaptive_flot.discovery.results.evidence import Detection, Location, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
+from adaptive_flot.discovery.results.words import Word
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 

@@ -35,6 +35,7 @@ from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend, unless_hardly_off
 from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
@@ -52,7 +53,6 @@ from adaptive_flot.greybox.model import Model
 
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
 NOT_ASKED = "the budget ended before it could be compared with process noise, which may explain as much"
-TOLD = ("named", "class")
 LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
 
@@ -115,7 +115,7 @@ def _found(
         judged = _of_another_shape(judged, records[0], processes, progress, ends - time.monotonic())
     if judged is None:
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, SPENT)))
-        if short and judged.verdict.word in TOLD:
+        if short and judged.verdict.word in WITH_A_NAME:
             return taken_back(judged, NOT_ASKED)
     why = why_not_new(judged, confirmed)
     return taken_back(judged, why, said="No change is told") if why else unless_much_is_left(judged)
@@ -176,7 +176,7 @@ def _with_words_without_a_site(compared: Comparison, vetoed: Told, why: str) -> 
     """
     verdict = compared.verdict
     elsewhere = sites_told(verdict) - {h.site for h in vetoed.effects}
-    if elsewhere or verdict.word not in ("abstain", *TOLD):
+    if elsewhere or verdict.word not in ("abstain", *WITH_A_NAME):
         return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, f"With process noise it is {why}.")))
     alone = f"By single faults of the whole record: {verdict.reason}"
     compared = taken_back(compared, why)
@@ -197,7 +197,7 @@ def unless_an_event(
 
     What begins at a time is no hypothesis for several records. A slow part or a dependence then stands in for it.
     """
-    if compared.verdict.word not in ("named", "class"):
+    if compared.verdict.word not in WITH_A_NAME:
         return compared
     longest = max(records, key=len)
     budget = None if ends == float("inf") else max(ends - time.monotonic(), 0.0)
@@ -300,4 +300,4 @@ def _changed(told: Told, search: Search, before: Search, start: Explanation) -> 
 
 def _has_event(told: Told) -> bool:
     """Whether what is told is an event, and not a thing of the whole record."""
-    return told.word in ("named", "class") and bool(told.effects) and all(h.kind in EVENTS for h in told.effects)
+    return told.word in WITH_A_NAME and bool(told.effects) and all(h.kind in EVENTS for h in told.effects)

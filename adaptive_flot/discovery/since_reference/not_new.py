@@ -6,6 +6,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.searched_change import AT_NOISE, SEARCHED
 
 EXPLAINS = 0.7
@@ -31,7 +32,7 @@ def why_not_new(compared: Comparison, confirmed: bool) -> str:
         Whether the innovations form has been asked whether it knows the name.
     """
     verdict = compared.verdict
-    if verdict.word not in ("named", "class"):
+    if verdict.word not in WITH_A_NAME:
         return ""
     if _is_there_before(compared):
         return "it explains the reference as well, so that the model lacks it there too"

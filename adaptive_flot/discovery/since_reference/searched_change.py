@@ -24,6 +24,7 @@ from adaptive_flot.discovery.innovations.search import LEAST_GAIN
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import Discovery, OutputChange, Verdict
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.stages import NONE_FITTED, NOT_ALL_TRIED
 from adaptive_flot.discovery.verdict.words.wording import since_reference
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -65,7 +66,7 @@ def with_searched_effect(
     limit = min(budget, MOST_SECONDS)
     found = discover(held, record, processes=processes, progress=progress, budget=limit, referred=True)
     verdict = found.verdict
-    if verdict.word not in ("named", "class") or not verdict.effects or NOT_ALL_TRIED in verdict.notes:
+    if verdict.word not in WITH_A_NAME or not verdict.effects or NOT_ALL_TRIED in verdict.notes:
         return compared  # a search that was cut short tells another effect on another machine
     usual = {
         calibration.model.outputs[c].name: float(s)
@@ -75,7 +76,7 @@ def with_searched_effect(
     error = tuple(replace(c, noise=max(usual[c.output], c.noise)) for c in verdict.error if c.output in usual)
     if all(c.before <= ABOVE_USUAL * c.noise for c in error) or hardly_explained(error, ABOVE_USUAL, MOST):
         return compared
-    if compared.verdict.word in ("named", "class") and not _tells_more(compared.verdict, verdict):
+    if compared.verdict.word in WITH_A_NAME and not _tells_more(compared.verdict, verdict):
         return compared
     after = fit_all_rows(found.model, compared.rows, None, calibration.constants, None)
     worse = _worse_on_reference(compared, found)

@@ -15,6 +15,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.taken_back import leaves_more, sites_told, taken_back
 
 LATE = "lag"
@@ -39,7 +40,7 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
         The search in innovations form, the model as it is there, and what was judged.
     """
     verdict, best = compared.verdict, compared.judged.best
-    if verdict.word not in ("named", "class") or best is None:
+    if verdict.word not in WITH_A_NAME or best is None:
         return compared
     sites = sites_told(verdict)
     # an event there, or a part that is late, is another cause: it does not speak for one that is there all the time
@@ -102,7 +103,7 @@ def unless_alike(compared: Comparison, told: Told) -> Comparison:
         What the innovations form has judged.
     """
     verdict = compared.verdict
-    if verdict.word not in ("named", "class") or not _wanders(compared):
+    if verdict.word not in WITH_A_NAME or not _wanders(compared):
         return compared
     sites = sites_told(verdict)
     single = [(e.hypotheses[0], e.criterion) for e in told.alike if len(e.hypotheses) == 1]

@@ -13,6 +13,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.searched_change import AT_NOISE
 
 MUCH_LEFT = 4.0
@@ -22,7 +23,7 @@ MUCH_LEFT = 4.0
 def leaves_more(verdict: Verdict) -> bool:
     """Whether something has changed that is not told, or what is told leaves an error above that of the reference."""
     left = any(c.after > ABOVE_USUAL * c.noise for c in verdict.error)
-    return verdict.word == "abstain" or (verdict.word in ("named", "class") and left)
+    return verdict.word == "abstain" or (verdict.word in WITH_A_NAME and left)
 
 
 def sites_told(verdict: Verdict) -> set[str]:
@@ -39,7 +40,7 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     """
     verdict, found = compared.verdict, told.effects
     sites = sites_told(verdict)
-    if verdict.word not in ("named", "class") or sites & {h.site for h in found}:
+    if verdict.word not in WITH_A_NAME or sites & {h.site for h in found}:
         return compared
     if told.word == "named" and found and leaves_more(verdict):
         said = " and ".join(h.label for h in found)
@@ -73,7 +74,7 @@ def unless_much_is_left(compared: Comparison) -> Comparison:
     """
     verdict = compared.verdict
     left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
-    if verdict.word not in ("named", "class") or not left:
+    if verdict.word not in WITH_A_NAME or not left:
         return compared
     logs = np.log(list(left.values()))
     most_of_all = float(np.max(logs)) - (np.log(2.0) if verdict.word == "class" else 0.0)
@@ -93,7 +94,7 @@ def unless_more_than_noise(compared: Comparison) -> Comparison:
     level = _noise_where_right(compared)
     left = {c.output: c.after / level[c.output] for c in verdict.error if c.output in level}
     most = max(left, key=lambda name: left[name], default="")
-    if verdict.word not in ("named", "class") or not most or left[most] <= FAR_ABOVE:
+    if verdict.word not in WITH_A_NAME or not most or left[most] <= FAR_ABOVE:
         return compared
     why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times its noise"
     return taken_back(compared, f"{why}, which is all that the model errs by on the reference")

@@ -15,7 +15,8 @@ from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import changes, verify
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, SearchResult, Verification
-from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN, MOST_RIVALS, Name, same_signal, same_site
+from adaptive_flot.discovery.results.words import LARGEST_CLASS
+from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN, MOST_RIVALS, Name, same_signal, same_site
 
 VISIBLE = 1.4
 """An output is wrong without the part: its error is so many times its noise, so half of its square is no noise."""

@@ -15,6 +15,7 @@ from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
+from adaptive_flot.discovery.results.words import TELLING
 from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.report_veto import much_better
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve, effect_curves
@@ -54,7 +55,7 @@ def insufficient(screening: Screening) -> Verdict:
 def conclude(state: State) -> Verdict:
     """The verdict on a record that was searched."""
     (problem, result), judgement, (before, after) = state.searched, state.judged, state.refitted
-    tells = judgement.word in ("named", "class", "unnamed")
+    tells = judgement.word in TELLING
     final = before if judgement.best is None else after
     labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
     values = final.values[: len(labels)]

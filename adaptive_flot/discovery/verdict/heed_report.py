@@ -15,6 +15,7 @@ from adaptive_flot.discovery.background.fitting import taken_up
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.judge import constants_told
 from adaptive_flot.discovery.verdict.outputs import certain_words
@@ -37,7 +38,7 @@ FITTED = ("estimate", "confirm")
 def heed_report(state: State) -> State:
     """Take a name back where the held-out rows contradict it."""
     whole, (before, after), judgement = state.known_problem, state.refitted, state.judged
-    told = judgement.word in ("named", "class")
+    told = judgement.word in WITH_A_NAME
     problem = whole
     if told and state.report_record is None:
         problem = on_telling_rows(whole, before, after, "report", FITTED)

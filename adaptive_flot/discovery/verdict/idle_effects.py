@@ -12,6 +12,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.search.simplify import refitted
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN, judge
 from adaptive_flot.greybox.effects import Effect
@@ -26,7 +27,7 @@ def without_idle_effects(problem: Problem, result: SearchResult, judged: Judgeme
         BIC(A, B) < BIC(A) - LEAST_MARGIN
     """
     best = judged.best
-    if judged.word not in ("named", "class") or best is None or len(best.names) < 2 or best.adjusted_bic is not None:
+    if judged.word not in WITH_A_NAME or best is None or len(best.names) < 2 or best.adjusted_bic is not None:
         return result, judged
     for earlier in result.rounds:
         alone = next((a for a in earlier.alternatives if _does_as_well(a, best)), None)
@@ -49,7 +50,7 @@ def without_what_vanished(problem: Problem, result: SearchResult, judged: Judgem
     with q coefficients and N measurements. Wald, *Trans. Am. Math. Soc.* 54 (1943) 426.
     """
     best = judged.best
-    if judged.word not in ("named", "class") or best is None or len(best.names) < 2 or best.adjusted_bic is not None:
+    if judged.word not in WITH_A_NAME or best is None or len(best.names) < 2 or best.adjusted_bic is not None:
         return result, judged
     fitter = Fitter(problem)
     price = float(np.log(max(problem.count(fitter.rows), 2)))

@@ -10,13 +10,13 @@ from adaptive_flot.discovery.candidates.direction import listed
 from adaptive_flot.discovery.candidates.shapes.step_events import slow
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS
 
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 MUCH = 0.1
 """Share of the error removed on fresh rows from which something is missing, though it may not be what was found."""
-LARGEST_CLASS = 3
 LATE = ("lag", "delay")
 MOST_RIVALS = 5
 
@@ -129,7 +129,7 @@ def but_for_what_has_no_reason(result: SearchResult, judged: Judgement) -> Judge
 
 def constants_told(judged: Judgement) -> tuple[str, ...]:
     """Sites whose constant is named, or is in the class that is told."""
-    if judged.word not in ("named", "class") or judged.best is None:
+    if judged.word not in WITH_A_NAME or judged.best is None:
         return ()
     told = (*(judged.part or judged.best.names), *judged.members)
     return tuple(dict.fromkeys(site for site, driver in told if driver == "constant"))
@@ -138,7 +138,7 @@ def constants_told(judged: Judgement) -> tuple[str, ...]:
 def held_up(problem: Problem, result: SearchResult, judged: Judgement) -> tuple[SearchResult, Judgement]:
     """The judgement, confirmed for what it names: a search confirms the best alternative, which may have no name."""
     best = judged.best
-    if best is None or best is result.alternatives[0] or judged.word not in ("named", "class") or not problem.whiten:
+    if best is None or best is result.alternatives[0] or judged.word not in WITH_A_NAME or not problem.whiten:
         return result, judged
     checked = verify(problem, result.base, best.fit, best.problem)
     if checked.confirmed:

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.results import State
+from adaptive_flot.discovery.results.words import TELLING
 from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -34,7 +35,7 @@ def heed_one_course(state: State) -> State:
     at different times.
     """
     judged = state.judged
-    if judged.best is None or judged.word not in ("named", "class", "unnamed") or judged.part:
+    if judged.best is None or judged.word not in TELLING or judged.part:
         return state
     time = state.searched[0].record.time
     changes = [(e, _change(e, time)) for e in judged.best.effects if e.driver == "time" and e.family.static]

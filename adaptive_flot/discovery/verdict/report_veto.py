@@ -19,6 +19,7 @@ from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 
@@ -68,7 +69,7 @@ def contradiction(
     few
         Whether these are the few rows of an event that passes. Then an error is larger that surely is, or by half.
     """
-    if judgement.word not in ("named", "class"):
+    if judgement.word not in WITH_A_NAME:
         return ""
     if said := made_worse(changes, noise, unknown, likelier, few):
         return said
@@ -165,7 +166,7 @@ def contradiction_at_the_end(
     background as well. So `unknown` is what it leaves open there, where the report rows are surely likelier.
     """
     best = judgement.best
-    if judgement.word not in ("named", "class") or best is None:
+    if judgement.word not in WITH_A_NAME or best is None:
         return ""
     sensors = {site.name for site in best.fit.model.sites if site.role == "sensor"}
     if not any(e.driver == "time" and e.family.is_curve and e.site in sensors for e in best.effects):

@@ -25,7 +25,8 @@ from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.seen import seen_along
 from adaptive_flot.discovery.innovations.thinning import searchable
 from adaptive_flot.discovery.results import Alternative, Judgement, State
-from adaptive_flot.discovery.verdict.judge import LARGEST_CLASS, LEAST_MARGIN
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
+from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model
@@ -41,7 +42,7 @@ def compare_with_what_has_no_site(state: State) -> State:
     judged = state.judged if state.sentence else with_twins(result.base.model, state.judged)
     state = state if judged is state.judged else replace(state, judgement=judged)
     best = judged.best
-    told = judged.word in ("named", "class") and not state.contradiction and not state.sentence
+    told = judged.word in WITH_A_NAME and not state.contradiction and not state.sentence
     if not told or best is None or len(best.names) != 1 or judged.part or problem.background is not None:
         return state
     if searchable(problem.record, result.base.model) is None or time.monotonic() > state.ends:

@@ -19,10 +19,11 @@ from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import AT_REST
-from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.scope import Site
 
 
@@ -42,7 +43,7 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     event = next((h for h in told.best.hypotheses if h.kind in EVENTS), None)
     cause = told.effects[0] if told.effects else None
     left_out = event if event is not None else cause
-    if told.word not in ("named", "class") or left_out not in told.best.hypotheses:
+    if told.word not in WITH_A_NAME or left_out not in told.best.hypotheses:
         return told
     further = replace(search, model=with_further_sites(search.model))
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, left_out)

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told, judge
+from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.results import State
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 
 COMPARED = 6
 """Alternatives of the free run that are fitted, the best ones."""
@@ -92,7 +93,7 @@ def among_alternatives(
     alike = [h.effect for e in told.alike for h in e.hypotheses]
     if None in fitted or told.best not in fitted or any(e.driver == "time" and e.family.is_curve for e in alike):
         return None
-    return told if told.word in ("named", "class") else None
+    return told if told.word in WITH_A_NAME else None
 
 
 def _name(explanation: Explanation) -> tuple[tuple[str, str], ...]:

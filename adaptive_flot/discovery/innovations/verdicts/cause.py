@@ -18,11 +18,12 @@ from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import SIZES_OPEN, Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
 from adaptive_flot.discovery.innovations.in_words import told_in_words
-from adaptive_flot.discovery.innovations.judge import LARGEST_CLASS, Told
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, usual_over_folds
 from adaptive_flot.discovery.results import Judgement
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.discovery.verdict.report_veto import contradiction
 
 JUDGED_ON = "held-out stretches, each from the state of the filter before it"
@@ -100,7 +101,7 @@ def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
     """The effects that are told, one by one in free runs; none where there is more than one beside another."""
     effects = [(told.best, h) for h in told.certain] if told.word == "named" else list(told.open)
     alone = not (told.certain and told.open) and max((len(e.hypotheses) for e, _ in effects), default=0) == 1
-    if told.word not in ("named", "class") or not alone:
+    if told.word not in WITH_A_NAME or not alone:
         return []
     constants = search.known or compared.calibration.constants
     first = fit_all_rows(search.model, compared.rows, None, constants, None)

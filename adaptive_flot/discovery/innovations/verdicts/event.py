@@ -19,6 +19,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 
 
 def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
@@ -58,7 +59,7 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
         return compared
     if worse_outputs(rows, blocks, null, found[0], compared.calibration.usual.overall):
         return compared
-    said = compared.verdict.word in ("named", "class")  # what is not told over the whole record says nothing beside it
+    said = compared.verdict.word in WITH_A_NAME  # what is not told over the whole record says nothing beside it
     over_all = (f"Over the whole record: {compared.verdict.reason}",) if said else ()
     return replace(
         compared,

@@ -12,6 +12,7 @@ from dataclasses import replace
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 
 DEPENDENCES = ("depends", "turns")
 
@@ -27,7 +28,7 @@ def or_in_time(search: Search, base: Explanation, told: Told) -> Told:
         What was judged. A class whose members are dependences says already that it is open.
     """
     found = [h for h in told.certain if h.kind in DEPENDENCES]
-    if told.word not in ("named", "class") or len(found) != 1:
+    if told.word not in WITH_A_NAME or len(found) != 1:
         return told
     (told_one,) = found
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, told_one)

@@ -16,6 +16,7 @@ from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, 
 from adaptive_flot.discovery.innovations.telling_apart import NEAR
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
+from adaptive_flot.discovery.results.words import TELLING, WITH_A_NAME
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
@@ -30,8 +31,6 @@ ERRS = 1.5
 """Times the noise from row to row from which the model as it is surely errs."""
 TREND = 100.0
 """Gain of log-likelihood below which a change that lasts to the end of a record may be slow wandering."""
-TELLS = ("named", "class", "unnamed")
-"""Words of the free run that tell something."""
 
 
 def leaves_too_much(state: State, far: float = FAR) -> bool:
@@ -48,7 +47,7 @@ def leaves_too_much(state: State, far: float = FAR) -> bool:
 
 def follows_time(state: State) -> bool:
     """Whether what is told holds a free curve in time: it follows anything between rows that it has seen."""
-    best = state.judged.best if state.judged.word in ("named", "class") else None
+    best = state.judged.best if state.judged.word in WITH_A_NAME else None
     return best is not None and any(_free_course(e) for e in best.effects)
 
 
@@ -84,7 +83,7 @@ def competes(state: State) -> bool:
     A free curve in time that is not told is no rival, and neither is what the report rows have taken back.
     """
     judged = state.judged
-    if judged.word in TELLS:
+    if judged.word in TELLING:
         return True
     untold = judged.best is not None and judged.word == "abstain" and not state.contradiction
     return untold and judged.best is not None and not any(_free_course(e) for e in judged.best.effects)
@@ -170,7 +169,7 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     LEAST_GAIN, so an event that gains less than LEAST_GAIN / WANDERS can not be told from what wanders.
     """
     event = next((h for h in told.best.hypotheses if _begins(h) and h in told.effects), None)
-    if told.word not in ("named", "class") or event is None:
+    if told.word not in WITH_A_NAME or event is None:
         return told
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)
     gain = told.best.criterion - rest.criterion
@@ -190,7 +189,7 @@ def unless_a_trend(base: Explanation, told: Told) -> Told:
     course, and not how large the next one is; without a reference none is known.
     """
     lasting = any(_lasts(h) for h in told.effects)
-    if told.word not in ("named", "class") or not lasting or told.best.criterion - base.criterion >= TREND:
+    if told.word not in WITH_A_NAME or not lasting or told.best.criterion - base.criterion >= TREND:
         return told
     why = "a change that lasts to the end, and is so small, may be what wanders in the process"
     return replace(told, word="abstain", certain=(), open=(), why=why)
@@ -204,7 +203,7 @@ def unless_hardly_off(told: Told) -> Told:
     it, that is said already.
     """
     event = next((h for h in told.best.hypotheses if has_short_pause(h) and h in told.effects), None)
-    if told.word not in ("named", "class") or event is None or told.beside:
+    if told.word not in WITH_A_NAME or event is None or told.beside:
         return told
     why = f"{event.site} would be as usual only for short pauses, so that it stands in for something that lasts"
     return replace(told, word="abstain", certain=(), open=(), why=why)

@@ -30,7 +30,6 @@ from adaptive_flot.discovery.innovations.verdicts.in_time import or_in_time
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import (
-    TELLS,
     allowed_ratio,
     but_for_what_wanders,
     competes,
@@ -50,6 +49,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
+from adaptive_flot.discovery.results.words import TELLING, WITH_A_NAME
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.discovery.verdict.words.wording import beside_a_part
@@ -100,14 +100,14 @@ def second_opinion(state: State) -> State:
     if on_sites.word != told.word and NO_SITE in on_sites.why:
         state = _noted(state, on_sites.why)
     told = unless_hardly_off(on_sites)
-    asked = _told(state, search, base, told) if told.word in TELLS else _kept(state, told)
-    if asked.judged.word in TELLS or time.monotonic() > state.ends:
+    asked = _told(state, search, base, told) if told.word in TELLING else _kept(state, told)
+    if asked.judged.word in TELLING or time.monotonic() > state.ends:
         return asked
     with np.errstate(all="ignore"):
         among = among_alternatives(state, search, base, found)
         if among is not None:  # what a balance explains better is not told by this way either
             among = unless_hardly_off(unless_without_a_site(search, base, _by_the_rules(state, search, base, among)))
-    if among is None or among.word not in TELLS:
+    if among is None or among.word not in TELLING:
         return asked
     return _told(state, search, base, among, among=True)
 
@@ -132,7 +132,7 @@ def is_asked(state: State) -> bool:
 
 def _not_asked(state: State) -> State:
     """The verdict where a budget was spent before the innovations form could be asked: no name that it may deny."""
-    if state.judged.word not in TELLS:
+    if state.judged.word not in TELLING:
         return state
     return _taken_back(
         state, "the time ended before it could be compared with process noise, which may explain as much"
@@ -148,9 +148,9 @@ def _kept(state: State, told: Told) -> State:
     if not _knows(told, judgement):
         return _taken_back(state, f"with process noise it is not confirmed: {told.why or 'other effects explain more'}")
     several = judgement.best is not None and len(judgement.best.names) > 1
-    if judgement.word in ("named", "class") and several and NO_SITE in told.why:
+    if judgement.word in WITH_A_NAME and several and NO_SITE in told.why:
         return _taken_back(state, f"with process noise it is {told.why}")
-    if judgement.word in ("named", "class") and follows_time(state):
+    if judgement.word in WITH_A_NAME and follows_time(state):
         return _taken_back(
             state, "a free curve in time follows anything: it predicts nothing that it was not fitted to"
         )
@@ -177,7 +177,7 @@ def _knows(told: Told, judgement: Judgement) -> bool:
 
 def names_one_of(judgement: Judgement, told: Told) -> bool:
     """Whether what the innovations form names is at a site of what the free run tells, or that tells nothing."""
-    if judgement.word not in TELLS or judgement.best is None:
+    if judgement.word not in TELLING or judgement.best is None:
         return True
     said = judgement.members if judgement.word == "class" else judgement.best.names
     return bool({site for site, _ in said} & {h.site for h in told.effects})

@@ -14,6 +14,7 @@ from adaptive_flot.discovery.hypotheses.families import STRUCTURE
 from adaptive_flot.discovery.innovations.judge import Told, late_anywhere
 from adaptive_flot.discovery.innovations.search import Explanation, Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.results.words import WITH_A_NAME
 
 
 def sole_cause(search: Search, base: Explanation, found: Sequence[Explanation], told: Told) -> Told | None:
@@ -29,7 +30,7 @@ def sole_cause(search: Search, base: Explanation, found: Sequence[Explanation], 
         What was judged.
     """
     beside = told.open or len(told.best.hypotheses) > 1
-    if told.word not in ("named", "class") or not beside or len(told.certain) != 1:
+    if told.word not in WITH_A_NAME or not beside or len(told.certain) != 1:
         return None
     (effect,) = told.certain
     alone = [e for e in found if len(e.hypotheses) == 1]
