@@ -11,16 +11,16 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.results import Alternative
-from adaptive_flot.discovery.search.fit_jobs import FittedJob, Job, ScoredLinearisation, flattened
+from adaptive_flot.discovery.search.halving.fit_jobs import FittedJob, Job, ScoredLinearisation, flattened
+from adaptive_flot.discovery.search.halving.rungs import Rungs
 from adaptive_flot.discovery.search.rounds import scorer_of
-from adaptive_flot.discovery.search.successive_halving import _SuccessiveHalving
 from adaptive_flot.greybox.data.dataset import Dataset
 from tests.discovery.heated import Truth, changed, heated_tank, tank_record
 
 SENSOR, LOSS = ("thermometer", "time"), ("heat_loss", "time")
 
 
-def _halving(record: Dataset) -> _SuccessiveHalving:
+def _halving(record: Dataset) -> Rungs:
     """The rungs over a record of the tank, with changes in time at its loss and its thermometer."""
     problem = make_problem(record, heated_tank(), ("efficiency", "loss"), burn_in=30, guard=5, cycles=20)
     fitter = Fitter(problem)
@@ -28,16 +28,16 @@ def _halving(record: Dataset) -> _SuccessiveHalving:
     assert base is not None
     scorer = scorer_of(problem, base)[0]
     linearisation = ScoredLinearisation(scorer, [s for s in scorer.scores() if s.candidate.name in (SENSOR, LOSS)])
-    return _SuccessiveHalving(fitter, base, [linearisation], None, 1, lambda what: None)
+    return Rungs(fitter, base, [linearisation], None, 1, lambda what: None)
 
 
 @pytest.fixture(scope="module")
-def halving() -> _SuccessiveHalving:
+def halving() -> Rungs:
     """The thermometer shows 0.5 K more from the middle of the record on."""
     return _halving(tank_record(Truth(exponent=0.0, offset=0.5)))
 
 
-def _curve(halving: _SuccessiveHalving, name: tuple[str, str], gain: float) -> FittedJob:
+def _curve(halving: Rungs, name: tuple[str, str], gain: float) -> FittedJob:
     """A curve in time of a name, as if its fit had gained so much."""
     linearisation = halving.linearisations[0]
     candidate = next(s.candidate for s in linearisation.scores if s.candidate.name == name)
@@ -47,13 +47,13 @@ def _curve(halving: _SuccessiveHalving, name: tuple[str, str], gain: float) -> F
     return FittedJob(0, score, Alternative((name,), (True,), fit, gain, -gain))
 
 
-def _astray(halving: _SuccessiveHalving, sensor: float, loss: float, best: Fit) -> list[Job]:
+def _astray(halving: Rungs, sensor: float, loss: float, best: Fit) -> list[Job]:
     first = [_curve(halving, SENSOR, sensor), _curve(halving, LOSS, loss)]
     return halving._gone_astray(first, first, best)
 
 
 def test_a_curve_that_promised_as_much_and_came_to_little_is_fitted_from_the_best_constants(
-    halving: _SuccessiveHalving, monkeypatch: pytest.MonkeyPatch
+    halving: Rungs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     best = halving.base
     monkeypatch.setattr(halving, "_tied", lambda: {SENSOR, LOSS})
@@ -62,12 +62,12 @@ def test_a_curve_that_promised_as_much_and_came_to_little_is_fitted_from_the_bes
     assert _astray(halving, 1000.0, 800.0, best) == []
 
 
-def test_what_promised_less_stays_where_it_is(halving: _SuccessiveHalving, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_promised_less_stays_where_it_is(halving: Rungs, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(halving, "_tied", lambda: {SENSOR})
     assert _astray(halving, 1000.0, 300.0, halving.base) == []
 
 
-def test_it_starts_from_nothing_with_the_knots_of_a_finalist(halving: _SuccessiveHalving) -> None:
+def test_it_starts_from_nothing_with_the_knots_of_a_finalist(halving: Rungs) -> None:
     curve = _curve(halving, LOSS, 100.0)
     job = flattened(curve, halving.base)
     assert set(job.score.start.values()) == {0.0}

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.search.fit_jobs import FittedJob
-from adaptive_flot.discovery.search.successive_halving import _SuccessiveHalving
+from adaptive_flot.discovery.search.halving.fit_jobs import FittedJob
+from adaptive_flot.discovery.search.halving.rungs import Rungs
 
 
 def fitted(driver: str, bic: float, ua: float, holdup: float) -> FittedJob:
@@ -18,7 +18,7 @@ def fitted(driver: str, bic: float, ua: float, holdup: float) -> FittedJob:
 
 
 def test_who_stayed_with_absurd_constants_starts_again_from_those_of_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
-    halving = _SuccessiveHalving.__new__(_SuccessiveHalving)
+    halving = Rungs.__new__(Rungs)
     halving.fitter = SimpleNamespace(problem=SimpleNamespace(adapted=("ua", "holdup")))  # type: ignore[assignment]
     ran: list[Any] = []
 

@@ -1,16 +1,8 @@
-"""Successive halving: refit the best-scored candidates in two rungs, each with its own noise model, and rank them.
-
-All candidates get a small budget (FIRST_STEPS), the best of them the whole one: Jamieson & Talwalkar, *Non-stochastic
-best arm identification and hyperparameter optimization*, AISTATS (2016). Here with two rungs, and with as many in the
-second as come near the best (`_finalists`) instead of a half.
-
-First all of them in their best form with a few steps, then the finalists in several forms to the end; last, what only a
-finished fit can start: events in time, and the constant that a dependence may have come to.
-"""
+"""The rungs of a refit: what each fits, from what the earlier ones came to."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 
@@ -23,11 +15,10 @@ from adaptive_flot.discovery.candidates.shapes.relays import moves_often
 from adaptive_flot.discovery.candidates.shapes.step_events import refined
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
-from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.results import Alternative
-from adaptive_flot.discovery.search.alternatives import effect_bounds, fit_variant, variant_model
-from adaptive_flot.discovery.search.fit_jobs import (
+from adaptive_flot.discovery.search.alternatives import fit_variant, variant_model
+from adaptive_flot.discovery.search.halving.fit_jobs import (
     FittedJob,
     Job,
     ScoredLinearisation,
@@ -46,11 +37,10 @@ from adaptive_flot.discovery.search.fit_jobs import (
     step,
     unbent,
 )
-from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.rescaled import as_it_came, factors_of, rescaled
+from adaptive_flot.greybox.model import FloatArray
 
 FIRST_STEPS = 6
-"""Steps of the first rung, in which every candidate jobs."""
+"""Steps of the first rung, in which every candidate takes part."""
 FINALISTS = 4
 SURE_FINALISTS = 3
 NEAR_FINALIST = 0.5
@@ -67,46 +57,7 @@ FREED, MOST_FREED = 2, 8
 """Names whose time profile gets more freedom in the end; further ones where that was worth its price to the first."""
 
 
-def refit(
-    fitter: Fitter,
-    base: Fit,
-    linearisations: Sequence[ScoredLinearisation],
-    before: Alternative | None = None,
-    processes: int = 1,
-    done: Callable[[str], None] = lambda what: None,
-    rival: Alternative | None = None,
-) -> tuple[list[Alternative], bool]:
-    """Fit each shortlisted candidate on top of `before` (the base model by default), best first; and whether all were.
-
-    They were not where the time was up before every finalist had been fitted to the end.
-
-    A candidate may start from several linearisations; only that in which it comes furthest in the first rung goes on.
-    Where a `rival` of as many effects is known already, only those go on that come near it.
-    """
-    halving = _SuccessiveHalving(fitter, base, linearisations, before, processes, done)
-    first = halving.first()
-    went_on = [fitted for fitted in first if halving.keeps_up(fitted.alternative, rival, NEAR_FINALIST)]
-    if not went_on:
-        return [fitted.alternative for fitted in best_of_each(first)], not fitter.problem.time_is_up
-    last = halving.last(went_on)
-    last += halving.from_constants_of_the_best(last, first)
-    last += halving.astray(last, first)
-    compared = not fitter.problem.time_is_up
-    followers = halving.followers(last)
-    followers += halving.lines(last)
-    bent = halving.bent(followers, last)
-    best = best_of_each([*halving.steps(followers, last), *bent, *followers, *last, *first])
-    best = best_of_each([*halving.slower(best), *best])
-    best = best_of_each([*halving.trimmed(best[:MOST_FREED], last), *best])
-    best = best_of_each([*halving.freed(best, last), *best])
-    ranked = [fitted.alternative for fitted in best_of_each([*halving.flat(best), *best])]
-    done("the leaders at every row")
-    leaders = [a for a in ranked[:LEADERS] if halving.keeps_up(a, rival or ranked[0], CLOSE_GAIN)]
-    exact = _all_exact(fitter, base, leaders, processes)
-    return sorted([*exact, *(a for a in ranked if a not in leaders)], key=lambda a: a.fit.bic), compared
-
-
-class _SuccessiveHalving:
+class Rungs:
     """The rungs of one refit, in their order; each takes what the earlier ones came to."""
 
     def __init__(
@@ -176,11 +127,11 @@ class _SuccessiveHalving:
         furthest: dict[tuple[str, str], FittedJob] = {}
         for fitted in first:
             furthest.setdefault(fitted.score.candidate.name, fitted)
-        finalists = _finalists(self._start(0).loss, list(furthest.values()), self._tied())
+        chosen = finalists(self._start(0).loss, list(furthest.values()), self._tied())
         drawn = {(f.linearisation, f.score.candidate.name): f for f in reversed(first) if is_curve(f)}
-        coarse = [drawn.get((f.linearisation, f.score.candidate.name), f) for f in finalists]
+        coarse = [drawn.get((f.linearisation, f.score.candidate.name), f) for f in chosen]
         jobs = [job for f in coarse for job in forms(self.linearisations[f.linearisation], f)]
-        return self._run([*jobs, *self._switches({f.score.candidate.name for f in finalists})])
+        return self._run([*jobs, *self._switches({f.score.candidate.name for f in chosen})])
 
     def from_constants_of_the_best(self, last: list[FittedJob], first: list[FittedJob]) -> list[FittedJob]:
         """Whoever ended with constants far from those of the best one: once more, from there.
@@ -304,7 +255,8 @@ class _SuccessiveHalving:
         Where another form is the best of a name so far, its curve is trimmed all the same.
         """
         names = {fitted.alternative.names for fitted in jobs}
-        curves = best_of_each([fitted for fitted in last if fitted.alternative.names in names and is_curve(fitted)])
+        every = [fitted for fitted in (*jobs, *last) if fitted.alternative.names in names and is_curve(fitted)]
+        curves = best_of_each(every)
         return self._run(self._fewer([*(fitted for fitted in jobs if not is_curve(fitted)), *curves]))
 
     def _fewer(self, jobs: list[FittedJob]) -> list[Job]:
@@ -341,28 +293,7 @@ def _close(alternatives: list[Alternative]) -> list[Alternative]:
     return [a for a in alternatives if a.gain > CLOSE_GAIN * most]
 
 
-def _all_exact(fitter: Fitter, base: Fit, leaders: Sequence[Alternative], processes: int) -> list[Alternative]:
-    """The leaders as runs at every row have them, and at their own constants where these are uncertain."""
-
-    def exact(k: int) -> tuple[Fit, Mapping[str, float]]:
-        a = leaders[k]
-        bounds = {n: b for e in a.effects for n, b in effect_bounds(fitter.problem, a.fit.model, e).items()}
-        fit = fitter.at_its_constants(at_every_row(fitter, a.fit, bounds), bounds)
-        return fit, factors_of(fit.model)
-
-    found = []
-    for a, (fit, factors) in zip(leaders, parallel_map(exact, range(len(leaders)), processes), strict=True):
-        own = a.fit.model
-
-        def make(model: Model = own, factors: Mapping[str, float] = factors) -> Model:
-            return rescaled(model, factors) if factors else as_it_came(model)
-
-        fit = fit.with_model(make)
-        found.append(replace(a, fit=fit, gain=base.loss - fit.loss, delta_bic=fit.bic - base.bic))
-    return found
-
-
-def _finalists(loss: float, ranked: list[FittedJob], tied: set[tuple[str, str]]) -> list[FittedJob]:
+def finalists(loss: float, ranked: list[FittedJob], tied: set[tuple[str, str]]) -> list[FittedJob]:
     """Who goes on: the first few, more that come near them or tie with them to first order (few steps tell little).
 
     `loss` is that of the model as it is.

@@ -1,0 +1,14 @@
+"""The words of a verdict, and how many parts a class may have."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Word = Literal["none", "named", "class", "unnamed", "insufficient", "abstain"]
+
+WITH_A_NAME: tuple[Word, ...] = ("named", "class")
+"""Words that give a name, or one of a few."""
+TELLING: tuple[Word, ...] = (*WITH_A_NAME, "unnamed")
+"""Words that tell an effect, with or without its name."""
+LARGEST_CLASS = 3
+"""Most members of a class for each effect: more say too little."""
