@@ -49,6 +49,11 @@ def test_what_is_no_line_is_not_tried() -> None:
     assert limited_lines(score, curve, np.linspace(LOW, HIGH, 500)) == []
 
 
+def test_a_signal_at_rest_has_no_line() -> None:
+    score, curve = curve_of(np.linspace(1, 2, KNOTS), np.linspace(LOW, HIGH, KNOTS))
+    assert limited_lines(score, curve, np.full(100, 7.0)) == []
+
+
 @settings(deadline=None, max_examples=30)
 @given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(0.0, 30.0))
 def test_the_factor_is_straight_between_its_kinks_and_level_beyond(amplitude: float, slope: float, fan: float) -> None:

@@ -48,6 +48,8 @@ def limited_lines(score: Score, curve: Effect, seen: FloatArray) -> list[Score]:
         Values of its driver (N,) in the record.
     """
     low, high = (float(q) for q in np.quantile(seen, COVERED))
+    if not high > low:
+        return []
     at: FloatArray = np.quantile(seen, np.linspace(*COVERED, POINTS))
     values = drawn(curve, at)
     places = np.linspace(low, high, KINKS + 2).tolist()
