@@ -11,10 +11,19 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.results import Alternative
-from adaptive_flot.discovery.search.halving.fit_jobs import FittedJob, Job, ScoredLinearisation, flattened
+from adaptive_flot.discovery.search.halving.fit_jobs import (
+    EDGE_ROWS,
+    FittedJob,
+    Job,
+    ScoredLinearisation,
+    as_event_of,
+    flattened,
+    softer,
+)
 from adaptive_flot.discovery.search.halving.rungs import Rungs
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import Truth, changed, heated_tank, tank_record
 
 SENSOR, LOSS = ("thermometer", "time"), ("heat_loss", "time")
@@ -88,3 +97,29 @@ def test_a_constant_is_fitted_once_more_from_a_curve_that_came_further() -> None
     assert constant.alternative.names == (("thermometer", "constant"),)
     assert constant.alternative.fit.bic < curve.alternative.fit.bic < halving.base.bic
     assert halving.flat([resting]) == []
+
+
+def _pulse(halving: Rungs, name: tuple[str, str]) -> FittedJob:
+    """A pulse of a name, as if it had been fitted."""
+    curve = _curve(halving, name, 100.0)
+    values = {"amplitude": 0.3, "on_1": 6000.0, "for_1": 3000.0}
+    effect = Effect(*name, "switch", values, {"count": 1.0, "width": 45.0})
+    fit = replace(curve.alternative.fit, model=heated_tank().with_effects([effect]))
+    return replace(curve, alternative=replace(curve.alternative, fit=fit))
+
+
+def test_a_rival_of_an_event_is_fitted_as_the_same_event(halving: Rungs) -> None:
+    """At its times and constants, with no size yet; not at its own site, and nothing that is no change in time."""
+    leader, rival = _pulse(halving, SENSOR), _curve(halving, LOSS, 90.0)
+    (job,) = as_event_of(rival, leader)
+    effect = job.score.variant.effect
+    assert (effect.site, effect.driver, effect.form) == (*LOSS, "switch") and job.warm is leader.alternative.fit
+    assert job.score.start == {"amplitude": 0.0, "on_1": 6000.0, "for_1": 3000.0}
+    assert as_event_of(leader, leader) == []
+
+
+def test_a_pulse_is_tried_with_softer_edges_and_nothing_else_is(halving: Rungs) -> None:
+    jobs = softer(_pulse(halving, SENSOR), 30.0)
+    assert [job.score.variant.effect.settings["width"] for job in jobs] == [30.0 * rows for rows in EDGE_ROWS]
+    assert all(job.score.start["on_1"] == 6000.0 for job in jobs)
+    assert softer(_curve(halving, SENSOR, 10.0), 30.0) == []

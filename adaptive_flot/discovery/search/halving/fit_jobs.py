@@ -12,6 +12,7 @@ from adaptive_flot.discovery.candidates.knots import trimmed
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.shapes.limited_lines import limited_lines
 from adaptive_flot.discovery.candidates.shapes.step_events import event_scores, freer, slower_scores, step_score
+from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
@@ -24,6 +25,8 @@ MOST_PROFILES = 6
 """Curves in time that are tried as events."""
 MOST_LINES = 3
 """Curves over a signal that are tried as a line with kinks."""
+EDGE_ROWS = (3.0, 6.0, 12.0, 24.0)
+"""Rows over which the edges of a pulse are rounded that are tried beside sharp ones."""
 BENT = 0.3
 """A dependence is surely not flat when to flatten it costs this share of all it gained."""
 NEARLY = 0.9
@@ -198,6 +201,36 @@ def slower(fitted: FittedJob, span: float) -> list[Job]:
     """A ramp and a washout around a fitted step, where that is what was fitted; `span` is that of the record [s]."""
     around = slower_scores(fitted.score, fitted.alternative.effects[-1], span)
     return [Job(fitted.linearisation, s, fitted.alternative.fit, drawn=True) for s in around]
+
+
+def as_event_of(fitted: FittedJob, leader: FittedJob) -> list[Job]:
+    """A change in time at one site, as the event of another one: its form, times and constants, and no size yet."""
+    own, event = fitted.alternative.effects[-1], leader.alternative.effects[-1]
+    if own.driver != "time" or own.site == event.site:
+        return []
+    effect = replace(event, site=own.site, mode=own.mode, coefficients={})
+    shape = {c.name: event.coefficients[c.name] for c in event.terms if c.is_shape}
+    start = {c.name: 0.0 for c in event.terms if not c.is_shape} | shape
+    variant = Variant(effect, (), tuple(n for n in start if n not in shape), tuple(shape.items()))
+    return [
+        Job(fitted.linearisation, replace(fitted.score, variant=variant, start=start), leader.alternative.fit, True)
+    ]
+
+
+def softer(fitted: FittedJob, dt: float) -> list[Job]:
+    """A fitted pulse with edges over EDGE_ROWS rows, from where it stands; nothing for other forms."""
+    effect = fitted.alternative.effects[-1]
+    if not effect.family.passes:
+        return []
+    start = {c.name: effect.coefficients[c.name] for c in effect.terms}
+    shape = tuple((c.name, start[c.name]) for c in effect.terms if c.is_shape)
+    jobs = []
+    for rows in EDGE_ROWS:
+        soft = replace(effect, coefficients={}, settings={**effect.settings, "width": rows * dt})
+        variant = Variant(soft, (), tuple(n for n in start if n not in dict(shape)), shape)
+        score = replace(fitted.score, variant=variant, start=start)
+        jobs.append(Job(fitted.linearisation, score, fitted.alternative.fit, drawn=True))
+    return jobs
 
 
 def more_freedom(fitted: FittedJob, low: float, high: float) -> list[Job]:

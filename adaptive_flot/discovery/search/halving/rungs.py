@@ -22,6 +22,7 @@ from adaptive_flot.discovery.search.halving.fit_jobs import (
     FittedJob,
     Job,
     ScoredLinearisation,
+    as_event_of,
     best_of_each,
     constants,
     events,
@@ -34,6 +35,7 @@ from adaptive_flot.discovery.search.halving.fit_jobs import (
     lines,
     more_freedom,
     slower,
+    softer,
     step,
     unbent,
 )
@@ -213,6 +215,22 @@ class Rungs:
         most = max((fitted.alternative.gain for fitted in best), default=0.0)
         near = [fitted for fitted in best if fitted.alternative.gain > CLOSE_GAIN * most]
         return self._run([job for fitted in near for job in slower(fitted, self.high - self.low)])
+
+    def same_event(self, best: list[FittedJob]) -> list[FittedJob]:
+        """Where the best one is an event: those near it at other sites as the same event, at its times and constants.
+
+        An event has many local optima. One that happens to be found at the wrong site would outdo the cause.
+        """
+        leader = best[0]
+        if not leader.alternative.effects[-1].family.is_event:
+            return []
+        near = [f for f in best[1:MOST_FREED] if f.alternative.gain > CLOSE_GAIN * leader.alternative.gain]
+        return self._run([job for f in near for job in as_event_of(f, leader)])
+
+    def softer(self, best: list[FittedJob]) -> list[FittedJob]:
+        """Pulses with edges that take longer: else the site is told by how sharp its outputs' edges are."""
+        near = [f for f in best[:MOST_FREED] if f.alternative.gain > CLOSE_GAIN * best[0].alternative.gain]
+        return self._run([job for f in near for job in softer(f, self.fitter.problem.record.dt)])
 
     def flat(self, best: list[FittedJob]) -> list[FittedJob]:
         """Constants at the sites of the leaders once more, from where these have ended in the meantime.

@@ -60,7 +60,9 @@ def refit(
     best = best_of_each([*rungs.slower(best), *best])
     best = best_of_each([*rungs.trimmed(best[:MOST_FREED], last), *best])
     best = best_of_each([*rungs.freed(best, last), *best])
-    ranked = [fitted.alternative for fitted in best_of_each([*rungs.flat(best), *best])]
+    best = best_of_each([*rungs.flat(best), *best])
+    best = best_of_each([*rungs.same_event(best), *best])
+    ranked = [fitted.alternative for fitted in best_of_each([*rungs.softer(best), *best])]
     done("the leaders at every row")
     leaders = [a for a in ranked[:LEADERS] if rungs.keeps_up(a, rival or ranked[0], CLOSE_GAIN)]
     exact = _all_exact(fitter, base, leaders, processes)
