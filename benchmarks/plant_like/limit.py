@@ -25,7 +25,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import State, Verdict
-from adaptive_flot.discovery.search.halving.fit_jobs import ScoredLinearisation
+from adaptive_flot.discovery.search.halving.jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.halving.successive_halving import refit
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.stages import (

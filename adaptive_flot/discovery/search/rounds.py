@@ -18,7 +18,7 @@ from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Round
 from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist, with_each_output
-from adaptive_flot.discovery.search.halving.fit_jobs import ScoredLinearisation
+from adaptive_flot.discovery.search.halving.jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.halving.successive_halving import refit
 from adaptive_flot.discovery.search.simplify import simpler
 from adaptive_flot.discovery.search.substance import excess, repairs, still_wrong

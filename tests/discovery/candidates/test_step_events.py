@@ -9,7 +9,14 @@ import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate
 from adaptive_flot.discovery.candidates.score_test import Score
-from adaptive_flot.discovery.candidates.shapes.step_events import event_scores, freer, slow, slower_scores, step_score
+from adaptive_flot.discovery.candidates.shapes.step_events import (
+    event_scores,
+    freer,
+    other_shape,
+    slow,
+    slower_scores,
+    step_score,
+)
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.processes import flotation
 
@@ -111,3 +118,19 @@ def test_around_a_step_slower_events_are_tried() -> None:
     assert washout.start["onset"] < 1000.0 < washout.start["onset"] + 3 * washout.start["time_constant"]
     assert ramp.start["amplitude"] == washout.start["amplitude"] == 0.4
     assert slower_scores(score, curve, 3000.0) == slower_scores(score, _fitted(ramp), 3000.0) == []
+
+
+@pytest.mark.parametrize(("form", "length", "other", "expected"), [
+    ("ramp", {"duration": 300.0}, "washout", {"time_constant": 100.0}),
+    ("washout", {"time_constant": 100.0}, "ramp", {"duration": 300.0}),
+])  # fmt: skip
+def test_a_ramp_and_a_washout_are_tried_as_each_other(
+    form: str, length: dict[str, float], other: str, expected: dict[str, float]
+) -> None:
+    """From one onset, and over at one time."""
+    score, curve = score_of(np.zeros(14))
+    begun = {"amplitude": 0.4, "onset": 1000.0}
+    tried = other_shape(score, Effect("froth_recovery", "time", form, {**begun, **length}))
+    assert tried is not None and tried.variant.effect.form == other
+    assert tried.start == pytest.approx({**begun, **expected})
+    assert other_shape(score, curve) is None

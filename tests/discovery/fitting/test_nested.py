@@ -13,7 +13,9 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.alternatives import fit_variant
-from adaptive_flot.discovery.search.halving.fit_jobs import ADDS, FittedJob, constants, unbent
+from adaptive_flot.discovery.search.halving.constants import constants
+from adaptive_flot.discovery.search.halving.jobs import FittedJob
+from adaptive_flot.discovery.search.halving.restarts import ADDS, unbent
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.record import RecordSimulator

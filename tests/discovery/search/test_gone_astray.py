@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from adaptive_flot.discovery.candidates.spline import knots_of
+from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.results import Alternative
-from adaptive_flot.discovery.search.halving.fit_jobs import (
-    EDGE_ROWS,
-    FittedJob,
-    Job,
-    ScoredLinearisation,
-    as_event_of,
-    flattened,
-    softer,
-)
-from adaptive_flot.discovery.search.halving.rungs import Rungs
+from adaptive_flot.discovery.search.halving.constants import flat
+from adaptive_flot.discovery.search.halving.events import EDGE_ROWS, ramps_and_washouts, soft_edges
+from adaptive_flot.discovery.search.halving.jobs import FittedJob, Job, ScoredLinearisation
+from adaptive_flot.discovery.search.halving.refits import Refit
+from adaptive_flot.discovery.search.halving.restarts import _gone_astray, as_event_of, flattened
 from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
@@ -29,24 +26,24 @@ from tests.discovery.heated import Truth, changed, heated_tank, tank_record
 SENSOR, LOSS = ("thermometer", "time"), ("heat_loss", "time")
 
 
-def _halving(record: Dataset) -> Rungs:
-    """The rungs over a record of the tank, with changes in time at its loss and its thermometer."""
+def _halving(record: Dataset) -> Refit:
+    """A refit of a record of the tank, with changes in time at its loss and its thermometer."""
     problem = make_problem(record, heated_tank(), ("efficiency", "loss"), burn_in=30, guard=5, cycles=20)
     fitter = Fitter(problem)
     base = fitter.fit(heated_tank())
     assert base is not None
     scorer = scorer_of(problem, base)[0]
     linearisation = ScoredLinearisation(scorer, [s for s in scorer.scores() if s.candidate.name in (SENSOR, LOSS)])
-    return Rungs(fitter, base, [linearisation], None, 1, lambda what: None)
+    return Refit(fitter, base, [linearisation], None, 1, lambda what: None)
 
 
 @pytest.fixture(scope="module")
-def halving() -> Rungs:
+def halving() -> Refit:
     """The thermometer shows 0.5 K more from the middle of the record on."""
     return _halving(tank_record(Truth(exponent=0.0, offset=0.5)))
 
 
-def _curve(halving: Rungs, name: tuple[str, str], gain: float) -> FittedJob:
+def _curve(halving: Refit, name: tuple[str, str], gain: float) -> FittedJob:
     """A curve in time of a name, as if its fit had gained so much."""
     linearisation = halving.linearisations[0]
     candidate = next(s.candidate for s in linearisation.scores if s.candidate.name == name)
@@ -56,27 +53,27 @@ def _curve(halving: Rungs, name: tuple[str, str], gain: float) -> FittedJob:
     return FittedJob(0, score, Alternative((name,), (True,), fit, gain, -gain))
 
 
-def _astray(halving: Rungs, sensor: float, loss: float, best: Fit) -> list[Job]:
+def _astray(halving: Refit, sensor: float, loss: float, best: Fit) -> list[Job]:
     first = [_curve(halving, SENSOR, sensor), _curve(halving, LOSS, loss)]
-    return halving._gone_astray(first, first, best)
+    return _gone_astray(halving, first, first, best)
 
 
 def test_a_curve_that_promised_as_much_and_came_to_little_is_fitted_from_the_best_constants(
-    halving: Rungs, monkeypatch: pytest.MonkeyPatch
+    halving: Refit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     best = halving.base
-    monkeypatch.setattr(halving, "_tied", lambda: {SENSOR, LOSS})
+    monkeypatch.setattr(halving, "tied", lambda: {SENSOR, LOSS})
     (job,) = _astray(halving, 1000.0, 300.0, best)
     assert job.score.candidate.name == LOSS and job.warm is best and job.drawn
     assert _astray(halving, 1000.0, 800.0, best) == []
 
 
-def test_what_promised_less_stays_where_it_is(halving: Rungs, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(halving, "_tied", lambda: {SENSOR})
+def test_what_promised_less_stays_where_it_is(halving: Refit, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(halving, "tied", lambda: {SENSOR})
     assert _astray(halving, 1000.0, 300.0, halving.base) == []
 
 
-def test_it_starts_from_nothing_with_the_knots_of_a_finalist(halving: Rungs) -> None:
+def test_it_starts_from_nothing_with_the_knots_of_a_finalist(halving: Refit) -> None:
     curve = _curve(halving, LOSS, 100.0)
     job = flattened(curve, halving.base)
     assert set(job.score.start.values()) == {0.0}
@@ -92,14 +89,14 @@ def test_a_constant_is_fitted_once_more_from_a_curve_that_came_further() -> None
     score = scorer.variant_scores(candidate)[0]
     poor = replace(halving.base, model=heated_tank().with_effects([score.variant.effect]))
     resting = FittedJob(0, score, Alternative((candidate.name,), (True,), poor, 0.0, 0.0))
-    curve = halving._run([Job(0, _curve(halving, SENSOR, 0.0).score)])[0]
-    (constant,) = halving.flat([curve, resting])
+    curve = halving.run([Job(0, _curve(halving, SENSOR, 0.0).score)])[0]
+    (constant,) = flat(halving, [curve, resting])
     assert constant.alternative.names == (("thermometer", "constant"),)
     assert constant.alternative.fit.bic < curve.alternative.fit.bic < halving.base.bic
-    assert halving.flat([resting]) == []
+    assert flat(halving, [resting]) == []
 
 
-def _pulse(halving: Rungs, name: tuple[str, str]) -> FittedJob:
+def _pulse(halving: Refit, name: tuple[str, str]) -> FittedJob:
     """A pulse of a name, as if it had been fitted."""
     curve = _curve(halving, name, 100.0)
     values = {"amplitude": 0.3, "on_1": 6000.0, "for_1": 3000.0}
@@ -108,7 +105,7 @@ def _pulse(halving: Rungs, name: tuple[str, str]) -> FittedJob:
     return replace(curve, alternative=replace(curve.alternative, fit=fit))
 
 
-def test_a_rival_of_an_event_is_fitted_as_the_same_event(halving: Rungs) -> None:
+def test_a_rival_of_an_event_is_fitted_as_the_same_event(halving: Refit) -> None:
     """At its times and constants, with no size yet; not at its own site, and nothing that is no change in time."""
     leader, rival = _pulse(halving, SENSOR), _curve(halving, LOSS, 90.0)
     (job,) = as_event_of(rival, leader)
@@ -118,8 +115,28 @@ def test_a_rival_of_an_event_is_fitted_as_the_same_event(halving: Rungs) -> None
     assert as_event_of(leader, leader) == []
 
 
-def test_a_pulse_is_tried_with_softer_edges_and_nothing_else_is(halving: Rungs) -> None:
-    jobs = softer(_pulse(halving, SENSOR), 30.0)
+def test_a_pulse_is_tried_with_softer_edges_and_nothing_else_is(halving: Refit) -> None:
+    jobs = soft_edges(_pulse(halving, SENSOR), 30.0)
     assert [job.score.variant.effect.settings["width"] for job in jobs] == [30.0 * rows for rows in EDGE_ROWS]
     assert all(job.score.start["on_1"] == 6000.0 for job in jobs)
-    assert softer(_curve(halving, SENSOR, 10.0), 30.0) == []
+    assert soft_edges(_curve(halving, SENSOR, 10.0), 30.0) == []
+
+
+def test_a_washout_is_fitted_again_from_a_ramp_that_came_further() -> None:
+    """The thermometer comes to show 2 K more from 9000 s on, with a time constant of 1000 s."""
+    plain = tank_record(Truth(exponent=0.0))
+    settling = 1 - np.exp(-np.maximum(plain.time - 9000.0, 0.0) / 1000.0)
+    halving = _halving(changed(plain, plain.outputs[:, 0] + 2.0 * settling))
+    score = _curve(halving, SENSOR, 0.0).score
+    begun = ("onset", 9000.0), ("duration", 2500.0)
+    variant = Variant(Effect(*SENSOR, "ramp", mode="offset"), (), ("amplitude",), begun)
+    (ramp,) = halving.run([Job(0, replace(score, variant=variant, start={"amplitude": 2.0, **dict(begun)}))])
+    (washout,) = ramps_and_washouts(halving, [ramp])
+    found = washout.alternative.effects[-1]
+    assert found.form == "washout" and washout.alternative.fit.bic < ramp.alternative.fit.bic
+    assert found.coefficients["onset"] == pytest.approx(9000.0, abs=100.0)
+    assert found.coefficients["time_constant"] == pytest.approx(1000.0, rel=0.15)
+    (again,) = ramps_and_washouts(halving, [washout])
+    assert again.alternative.effects[-1].form == "ramp"
+    assert washout.alternative.fit.bic < again.alternative.fit.bic < ramp.alternative.fit.bic
+    assert ramps_and_washouts(halving, [_curve(halving, SENSOR, 10.0)]) == []

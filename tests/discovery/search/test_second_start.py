@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.search.halving.fit_jobs import FittedJob
-from adaptive_flot.discovery.search.halving.rungs import Rungs
+from adaptive_flot.discovery.search.halving.jobs import FittedJob
+from adaptive_flot.discovery.search.halving.refits import Refit
+from adaptive_flot.discovery.search.halving.restarts import from_constants_of_the_best
 
 
 def fitted(driver: str, bic: float, ua: float, holdup: float) -> FittedJob:
@@ -18,7 +19,7 @@ def fitted(driver: str, bic: float, ua: float, holdup: float) -> FittedJob:
 
 
 def test_who_stayed_with_absurd_constants_starts_again_from_those_of_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
-    halving = Rungs.__new__(Rungs)
+    halving = Refit.__new__(Refit)
     halving.fitter = SimpleNamespace(problem=SimpleNamespace(adapted=("ua", "holdup")))  # type: ignore[assignment]
     ran: list[Any] = []
 
@@ -26,9 +27,9 @@ def test_who_stayed_with_absurd_constants_starts_again_from_those_of_the_best(mo
         ran.extend(jobs)
         return []
 
-    monkeypatch.setattr(halving, "_run", run)
+    monkeypatch.setattr(halving, "run", run)
     best, near = fitted("best", -2000.0, 8.0, 140.0), fitted("near", -1900.0, 3.0, 60.0)
     far, early = fitted("far", -500.0, 2.5, 640.0), fitted("early", -400.0, 2.5, 640.0)
-    halving.from_constants_of_the_best([far, best, near], [early])
+    from_constants_of_the_best(halving, [far, best, near], [early])
     assert [(job.score, job.warm) for job in ran] == [("far", best.alternative.fit), ("early", best.alternative.fit)]
-    assert halving.from_constants_of_the_best([], [early]) == []
+    assert from_constants_of_the_best(halving, [], [early]) == []

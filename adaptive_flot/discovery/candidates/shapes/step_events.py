@@ -124,6 +124,20 @@ def slower_scores(score: Score, fitted: Effect, span: float) -> list[Score]:
     return [_event(score, form, amplitude, shape, fitted, {}) for form, shape in (("ramp", ramp), ("washout", washout))]
 
 
+def other_shape(score: Score, fitted: Effect) -> Score | None:
+    """The score with a washout where a fitted ramp of the same name is, and the reverse; None for other forms.
+
+    Both begin at one onset, and the washout has settled when the ramp is over.
+    """
+    if fitted.form not in ("ramp", "washout"):
+        return None
+    (amplitude,), (onset,), length = fitted.levels, fitted.values(CoefficientRole.ONSET), _length(fitted)
+    assert length is not None  # both forms have one
+    if fitted.form == "ramp":
+        return _event(score, "washout", amplitude, (("onset", onset), ("time_constant", length / SETTLES)), fitted, {})
+    return _event(score, "ramp", amplitude, (("onset", onset), ("duration", length * SETTLES)), fitted, {})
+
+
 def _event(
     score: Score,
     form: str,

@@ -2,7 +2,7 @@
 
 All candidates get a small budget (FIRST_STEPS), the best of them the whole one: Jamieson & Talwalkar, *Non-stochastic
 best arm identification and hyperparameter optimization*, AISTATS (2016). Here with two rungs, and with as many in the
-second as come near the best (`rungs.finalists`) instead of a half.
+second as come near the best (`first_rungs.finalists`) instead of a half.
 
 First all of them in their best form with a few steps, then the finalists in several forms to the end; last, what only a
 finished fit can start: events in time, and the constant that a dependence may have come to.
@@ -19,13 +19,15 @@ from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.alternatives import effect_bounds
-from adaptive_flot.discovery.search.halving.fit_jobs import (
-    ScoredLinearisation,
-    best_of_each,
-)
-from adaptive_flot.discovery.search.halving.rungs import CLOSE_GAIN, LEADERS, MOST_FREED, NEAR_FINALIST, Rungs
+from adaptive_flot.discovery.search.halving import constants, events, first_rungs, freedom, restarts
+from adaptive_flot.discovery.search.halving.first_rungs import NEAR_FINALIST
+from adaptive_flot.discovery.search.halving.jobs import CLOSE_GAIN, ScoredLinearisation, best_of_each
+from adaptive_flot.discovery.search.halving.refits import Refit
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.rescaled import as_it_came, factors_of, rescaled
+
+LEADERS = 4
+"""Alternatives that are run at every row in the end."""
 
 
 def refit(
@@ -44,27 +46,28 @@ def refit(
     A candidate may start from several linearisations; only that in which it comes furthest in the first rung goes on.
     Where a `rival` of as many effects is known already, only those go on that come near it.
     """
-    rungs = Rungs(fitter, base, linearisations, before, processes, done)
-    first = rungs.first()
-    went_on = [fitted for fitted in first if rungs.keeps_up(fitted.alternative, rival, NEAR_FINALIST)]
+    own = Refit(fitter, base, linearisations, before, processes, done)
+    first = first_rungs.first(own)
+    went_on = [fitted for fitted in first if own.keeps_up(fitted.alternative, rival, NEAR_FINALIST)]
     if not went_on:
         return [fitted.alternative for fitted in best_of_each(first)], not fitter.problem.time_is_up
-    last = rungs.last(went_on)
-    last += rungs.from_constants_of_the_best(last, first)
-    last += rungs.astray(last, first)
+    last = first_rungs.last(own, went_on)
+    last += restarts.from_constants_of_the_best(own, last, first)
+    last += restarts.astray(own, last, first)
     compared = not fitter.problem.time_is_up
-    followers = rungs.followers(last)
-    followers += rungs.lines(last)
-    bent = rungs.bent(followers, last)
-    best = best_of_each([*rungs.steps(followers, last), *bent, *followers, *last, *first])
-    best = best_of_each([*rungs.slower(best), *best])
-    best = best_of_each([*rungs.trimmed(best[:MOST_FREED], last), *best])
-    best = best_of_each([*rungs.freed(best, last), *best])
-    best = best_of_each([*rungs.flat(best), *best])
-    best = best_of_each([*rungs.same_event(best), *best])
-    ranked = [fitted.alternative for fitted in best_of_each([*rungs.softer(best), *best])]
+    followers = events.followers(own, last)
+    followers += events.ramps_and_washouts(own, followers)
+    followers += events.lines(own, last)
+    bent = restarts.bent(own, followers, last)
+    best = best_of_each([*events.steps(own, followers, last), *bent, *followers, *last, *first])
+    best = best_of_each([*events.slower(own, best), *best])
+    best = best_of_each([*freedom.simpler(own, best, last), *best])
+    best = best_of_each([*freedom.freed(own, best, last), *best])
+    best = best_of_each([*constants.flat(own, best), *best])
+    best = best_of_each([*restarts.same_event(own, best), *best])
+    ranked = [fitted.alternative for fitted in best_of_each([*events.softer(own, best), *best])]
     done("the leaders at every row")
-    leaders = [a for a in ranked[:LEADERS] if rungs.keeps_up(a, rival or ranked[0], CLOSE_GAIN)]
+    leaders = [a for a in ranked[:LEADERS] if own.keeps_up(a, rival or ranked[0], CLOSE_GAIN)]
     exact = _all_exact(fitter, base, leaders, processes)
     return sorted([*exact, *(a for a in ranked if a not in leaders)], key=lambda a: a.fit.bic), compared
 
