@@ -58,6 +58,8 @@ def with_later_inputs(state: State, verdict: Verdict) -> Dataset | None:
 
 def _is_about_a_row(effect: Effect, state: State) -> bool:
     """Whether inputs that act a row later may be taken for an effect: a dependence on one of them, or a short lag."""
+    if effect.values(CoefficientRole.READING):
+        return False
     if effect.driver in LATE:
         late = effect.values(CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME)
         return max(late, default=0.0) < MOST_ROWS * state.known_problem.record.dt

@@ -9,7 +9,7 @@ from typing import Literal
 import casadi as ca
 
 from adaptive_flot.errors import ModelError, near_match
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect, Mode, apply, remembered
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect, Mode, apply, remembered
 from adaptive_flot.greybox.quantities import Kind
 
 Role = Literal["process", "sensor", "actuator", "feed", "flow"]
@@ -122,7 +122,7 @@ class Scope:
         return value
 
     def _driver(self, effect: Effect) -> ca.SX:
-        if effect.driver == "time":
+        if effect.driver in ("time", *DYNAMIC_DRIVERS):  # what is late may go by the clock
             return self.time
         if effect.driver in STATELESS_DRIVERS:
             return ca.SX(0)

@@ -18,7 +18,7 @@ from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.forms.form import CoefficientRole
+from adaptive_flot.greybox.forms.form import CoefficientRole, FormKind, number
 from adaptive_flot.greybox.model import FloatArray, Model
 
 SHORTLIST = 12
@@ -35,8 +35,8 @@ WORTH_A_RESTART = 10.0
 """Gain of another start of a free time profile, which has most places to rest in, that is worth yet another."""
 EACH_OUTPUT = 2
 """Candidates for each output that is still wrong: over all outputs they may rank low."""
-LEAST_PULSE_ROWS = 10
-"""Least rows that a change which comes and goes lasts."""
+LEAST_PULSE_ROWS, EDGES = 10, 6.5
+"""Least rows that a change which comes and goes lasts, and least widths of its edges: it gets to 92 % of its size."""
 SAME_DRIVER = 1e-6
 """Drivers whose correlation differs from one by less say the same (level and froth depth)."""
 
@@ -226,6 +226,9 @@ def effect_bounds(problem: Problem, model: Model, effect: Effect) -> dict[str, t
     site = next(s for s in model.sites if s.name == effect.site)
     if (effect.mode or site.mode) == "factor":
         bounds |= {effect.parameter(c.name): (-MOST_CHANGE, MOST_CHANGE) for c in effect.terms if c.is_level}
+        if effect.family.kind is FormKind.THRESHOLD:  # from one end of a line to the other
+            slopes = effect.names(CoefficientRole.SLOPE)
+            bounds |= {effect.parameter(name): (-2 * MOST_CHANGE, 2 * MOST_CHANGE) for name in slopes}
     return bounds
 
 
@@ -244,7 +247,9 @@ def shape_bounds(problem: Problem, effect: Effect) -> dict[str, tuple[float, flo
         CoefficientRole.DURATION: (shortest, span),
         CoefficientRole.TIME_CONSTANT: (max(0.2 * dt, shortest) if is_event else dt, span),
         CoefficientRole.DEAD_TIME: (2.0 * dt, LONGEST_DELAY * span),
+        CoefficientRole.READING: (float(t[0]) - span, float(t[-1])),
     }
     if effect.family.passes:  # what is shorter is an outlier, or noise
-        by_role[CoefficientRole.DURATION] = LEAST_PULSE_ROWS * dt, span
+        width = number(effect.full_settings, "width")
+        by_role[CoefficientRole.DURATION] = max(LEAST_PULSE_ROWS * dt, EDGES * width), span
     return {effect.parameter(c.name): by_role[c.role] for c in effect.terms if c.role in by_role}

@@ -61,7 +61,7 @@ def conclude(state: State) -> Verdict:
     values = final.values[: len(labels)]
     effects = _effects(judgement, state.told) if tells else ()
     if any(e.effect.family.memory for e in effects):
-        effects = with_ranges(effects, _curves(state, effects))
+        effects = with_ranges(effects, _curves(state, effects), problem.record.dt)
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
     return Verdict(
         word=judgement.word,

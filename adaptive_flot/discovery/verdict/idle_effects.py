@@ -33,7 +33,8 @@ def without_idle_effects(problem: Problem, result: SearchResult, judged: Judgeme
         alone = next((a for a in earlier.alternatives if _does_as_well(a, best)), None)
         if alone is not None and all(alone.known):
             first = earlier.alternatives[0]
-            checked = verify(problem, result.base, first.fit, first.problem)
+            # a joint search has no rows that it did not fit
+            checked = verify(problem, result.base, first.fit, first.problem) if problem.whiten else None
             fewer = replace(result, alternatives=earlier.alternatives, verification=checked)
             return fewer, judge(fewer)
     return without_what_vanished(problem, result, judged)
@@ -47,31 +48,48 @@ def without_what_vanished(problem: Problem, result: SearchResult, judged: Judgem
 
         a' C^-1 a < q ln N + LEAST_MARGIN,   BIC(without it) < BIC(with it) + LEAST_MARGIN
 
-    with q coefficients and N measurements. Wald, *Trans. Am. Math. Soc.* 54 (1943) 426.
+    with q coefficients and N measurements. Wald, *Trans. Am. Math. Soc.* 54 (1943) 426. Whatever comes near it with the
+    same effect is fitted without it as well: none of them may lose its rivals with it.
     """
     best = judged.best
     if judged.word not in WITH_A_NAME or best is None or len(best.names) < 2 or best.adjusted_bic is not None:
+        return result, judged
+    if not problem.whiten:  # a joint search weighs its evidence in another way
         return result, judged
     fitter = Fitter(problem)
     price = float(np.log(max(problem.count(fitter.rows), 2)))
     for k, effect in enumerate(best.effects):
         if _evidence(best.fit, effect, price) > LEAST_MARGIN:
             continue
-        others = [e for i, e in enumerate(best.effects) if i != k]
-        fit = refitted(fitter, result.base, best, [replace(e, coefficients={}) for e in others])
-        if fit is None or fit.bic > best.fit.bic + LEAST_MARGIN:
+        fewer = _without(fitter, result, best, k)
+        if fewer is None or fewer.fit.bic > best.fit.bic + LEAST_MARGIN:
             continue
-        names, known = (*best.names[:k], *best.names[k + 1 :]), (*best.known[:k], *best.known[k + 1 :])
-        fewer = Alternative(names, known, fit, result.base.loss - fit.loss, fit.bic - result.base.bic)
-        earlier = [a for r in result.rounds for a in r.alternatives if len(a.names) == len(names)]
-        rivals = [a for a in earlier if set(a.names) != set(names)]
-        sds = loglik_difference_sds(problem, fit, [a.fit for a in rivals])
+        name = best.names[k]
+        near = [a for a in result.alternatives if a is not best and name in a.names and judged.near(a)]
+        again = [_without(fitter, result, a, a.names.index(name)) for a in near]
+        earlier = [a for r in result.rounds for a in r.alternatives if len(a.names) == len(fewer.names)]
+        by_name: dict[frozenset[tuple[str, str]], Alternative] = {}
+        for a in sorted((a for a in (*again, *earlier) if a is not None), key=lambda a: a.fit.bic):
+            if set(a.names) != set(fewer.names):
+                by_name.setdefault(frozenset(a.names), a)
+        rivals = list(by_name.values())
+        sds = loglik_difference_sds(problem, fewer.fit, [a.fit for a in rivals])
         compared = (replace(a, loglik_difference_sd=sd) for a, sd in zip(rivals, sds, strict=True))
         ranked = (fewer, *sorted(compared, key=lambda a: a.fit.bic))
-        checked = verify(problem, result.base, fit, fewer.problem)
+        checked = verify(problem, result.base, fewer.fit, fewer.problem)
         without = replace(result, alternatives=ranked, verification=checked)
         return without_what_vanished(problem, without, judge(without))
     return result, judged
+
+
+def _without(fitter: Fitter, result: SearchResult, a: Alternative, k: int) -> Alternative | None:
+    """An alternative without its k-th effect, fitted again from where it stands."""
+    others = [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k]
+    fit = refitted(fitter, result.base, a, others) if others else None
+    if fit is None:
+        return None
+    names, known = (*a.names[:k], *a.names[k + 1 :]), (*a.known[:k], *a.known[k + 1 :])
+    return Alternative(names, known, fit, result.base.loss - fit.loss, fit.bic - result.base.bic)
 
 
 def _evidence(fit: Fit, effect: Effect, price: float) -> float:

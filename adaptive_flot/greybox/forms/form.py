@@ -36,6 +36,7 @@ class CoefficientRole(Enum):
     DURATION = "time that an event takes"
     TIME_CONSTANT = "time constant of an exponential approach or of a first-order lag"
     DEAD_TIME = "time by which the value is delayed"
+    READING = "time at which the value is read, and kept until it is read again"
     THRESHOLD = "value of the driver at which something begins"
     LIMIT = "value that can not be passed"
     BAND = "half the width of a dead band"

@@ -1,4 +1,4 @@
-"""Forms with states of their own: the value is delayed (lags, dead time, a valve that sticks)."""
+"""Forms with states of their own: the value is delayed (lags, dead time, even readings, a valve that sticks)."""
 
 from __future__ import annotations
 
@@ -49,6 +49,28 @@ def _delay(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> 
         state = m.own_state(name)
         m.own_derivative(name, (x - state) / tau, decay=-1 / tau)
         x = state
+    return value + c["amplitude"] * (x * scale - value)
+
+
+READS_WITHIN, READS, LEAKS = 0.6, 3.0, 1e-6
+"""A reading takes about so many intervals (standard deviation of its bump), at a rate of so much an interval: 99 % of
+the way. Shorter ones would fall between the steps. Between them it leaks a little, so that a record begins with what
+was read."""
+
+
+def _held(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    """A state x that follows the value v while it is read, at the distance d in time from the nearest reading.
+
+    With the sampling interval h::
+
+        dx/dt = r (v - x),   r = READS / h exp(-(d / (READS_WITHIN h))^2 / 2),   d = P / pi sin(pi (t - first) / P)
+    """
+    scale, interval = number(s, "scale"), number(s, "interval_s")
+    period = (c["last_reading"] - c["first_reading"]) / number(s, "periods")
+    x = m.own_state("held")
+    distance = period / ca.pi * ca.sin(ca.pi * (driver - c["first_reading"]) / period)
+    rate = (LEAKS + READS * ca.exp(-0.5 * (distance / (READS_WITHIN * interval)) ** 2)) / interval
+    m.own_derivative("held", rate * (value / scale - x), decay=-rate)
     return value + c["amplitude"] * (x * scale - value)
 
 
@@ -112,6 +134,22 @@ LAGGING_FORMS: tuple[Form, ...] = (
         {"scale": "value"},
         direct=_delay,
         states=_delay_states,
+        abrupt=True,
+    ),
+    Form(
+        "held",
+        "read at even intervals, and kept in between",
+        FormKind.MEMORY,
+        fixed(
+            BLEND,
+            Coefficient("first_reading", CoefficientRole.READING, 0.0, scale=10.0, unit="s"),
+            Coefficient("last_reading", CoefficientRole.READING, 1000.0, scale=10.0, unit="s"),
+        ),
+        ("delay",),
+        {"scale": None, "periods": 10.0, "interval_s": 1.0},
+        {"scale": "value", "interval_s": "s"},
+        direct=_held,
+        states=lambda settings: ("held",),
         abrupt=True,
     ),
     Form(

@@ -20,7 +20,7 @@ from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of
 from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
-from adaptive_flot.discovery.verdict.words.thresholds import same_course
+from adaptive_flot.discovery.verdict.words.thresholds import SETTLES, same_course
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
@@ -180,11 +180,20 @@ def test_a_switch_that_a_fit_made_a_step_of_is_none() -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 10_000), st.floats(2.0, 60.0))
-def test_a_switch_that_moves_slowly_is_a_first_order_lag_of_its_course(seed: int, rows: float) -> None:
-    """Against the difference equation row by row; it starts at rest."""
-    is_on = np.repeat(np.random.default_rng(seed).random(20) > 0.5, 7)
-    share, moved = 1 - np.exp(-1 / rows), float(is_on[0])
-    for wanted, found in zip(is_on, late(is_on, rows), strict=True):
-        moved += share * (float(wanted) - moved)
-        assert found == pytest.approx(moved, abs=1e-12)
-    assert late(is_on, 1.0).tolist() == is_on.astype(float).tolist()
+def test_a_slow_switch_moves_as_its_equation_does(seed: int, rows: float) -> None:
+    """Against the difference equation row by row: between the thresholds it stays where it has got to."""
+    driver = np.repeat(np.random.default_rng(seed).normal(size=20), 7)
+    share, at = 1 - np.exp(-1 / rows), float(course(driver, 0.5, -0.5)[0])
+    for value, found in zip(driver, late(driver, 0.5, -0.5, rows), strict=True):
+        at = at + share * (1 - at) if value > 0.5 else at - share * at if value < -0.5 else at
+        assert found == pytest.approx(at, abs=1e-12)
+    assert late(driver, 0.5, -0.5, 1.0).tolist() == course(driver, 0.5, -0.5).astype(float).tolist()
+
+
+@pytest.mark.parametrize("rows", [1.0, 12.0, 36.0])
+def test_a_slow_switch_has_the_thresholds_of_a_quick_one(rows: float) -> None:
+    """Along a sine: the ranges hold the true thresholds, though the switch is half way long after they are passed."""
+    driver = np.sin(2 * np.pi * np.arange(2000) / 400)
+    is_on = late(driver, 0.5, -0.5, rows) > 0.5
+    upper, lower = same_course(driver, is_on, SETTLES + int(np.ceil(np.log(2) * rows)))
+    assert upper[0] <= 0.5 <= upper[1] and lower[0] <= -0.5 <= lower[1]

@@ -49,6 +49,36 @@ def test_an_effect_whose_size_has_vanished_is_left_out(draught: Discovery) -> No
     assert result.verification is not None and result.verification.confirmed
 
 
+def test_what_comes_near_with_what_vanished_stays_a_rival(draught: Discovery) -> None:
+    """The heater's dependence on the fan is as near beside the idle thermometer: without it, it is still there."""
+    assert draught.search is not None and draught.problem is not None
+    idle = Effect("thermometer", "constant", "shift")
+    both, own = _both(draught, idle), draught.search.alternatives[0]
+    fit = refitted(
+        Fitter(draught.problem),
+        draught.search.base,
+        own,
+        [Effect("heating", "fan_speed", "power", settings=own.effects[0].settings), idle],
+    )
+    assert fit is not None
+    near = replace(both, names=(HEATER, SENSOR), fit=replace(fit, bic=both.fit.bic + 1.0))
+    judged = replace(judge(draught.search), word="class", best=both, members=(FAN, HEATER))
+    result, _ = without_what_vanished(
+        draught.problem, replace(draught.search, alternatives=(both, near), rounds=()), judged
+    )
+    assert [a.names for a in result.alternatives] == [(FAN,), (HEATER,)]
+
+
+def test_a_joint_search_keeps_what_it_found(draught: Discovery) -> None:
+    """It weighs its evidence in another way, and has no rows that it did not fit."""
+    assert draught.search is not None and draught.problem is not None
+    both = _both(draught, Effect("thermometer", "constant", "shift"))
+    judged = replace(judge(draught.search), word="named", best=both)
+    found = replace(draught.search, alternatives=(both,))
+    joint = replace(draught.problem, whiten=False)
+    assert without_what_vanished(joint, found, judged) == (found, judged)
+
+
 def test_an_effect_that_the_fit_needs_stays(draught: Discovery) -> None:
     """Here the draught is the further one: without it nothing is explained."""
     assert draught.search is not None and draught.problem is not None
@@ -70,6 +100,16 @@ def test_two_dependences_on_one_signal_are_a_class(draught: Discovery) -> None:
     said = reason_words(judged, found, (), ())
     assert "heat_loss or heating depends on fan_speed, or both" in said
     assert "Certain" not in said
+
+
+def test_what_all_have_is_certain_though_the_best_has_another_on_its_signal(draught: Discovery) -> None:
+    assert draught.search is not None
+    best = draught.search.alternatives[0]
+    two = replace(best, names=(FAN, HEATER), known=(True, True))
+    near = replace(best, names=(FAN, ("thermometer", "time")), known=(True, True))
+    found = replace(draught.search, alternatives=(two, near), left=0.0, left_threshold=10.0)
+    said = reason_words(judge(found), found, (), ())
+    assert "Certain: heat_loss by fan_speed." in said and "or both" not in said
 
 
 def test_two_dependences_on_different_signals_are_no_class() -> None:
@@ -101,7 +141,7 @@ def test_one_course_in_time_at_two_places_is_not_told(
     draught: Discovery, seed: int, size: float, sign: float, level: float
 ) -> None:
     """Whatever the sizes, signs and levels of the two."""
-    course = np.random.default_rng(seed).normal(0, 0.2, len(KNOTS)).cumsum()
+    course = np.random.default_rng(seed).normal(0, 0.2, len(KNOTS)).cumsum() + np.array([0, 1, -1, 1, -1, 0, 0])
     told = heed_one_course(_state(draught, course, sign * size * course + level))
     assert told.judged.word == "abstain"
     assert f"heat loss and heating change with one course in time (correlation {sign:.2f})" in told.contradiction
@@ -118,9 +158,23 @@ def test_a_course_beside_a_level_is_no_common_course(draught: Discovery) -> None
     assert heed_one_course(state) is state
 
 
+def test_two_straight_lines_say_nothing_of_one_cause(draught: Discovery) -> None:
+    """They have one course whatever is behind them."""
+    state = _state(draught, np.linspace(0, 0.4, 7), np.linspace(0.3, -0.2, 7))
+    assert heed_one_course(state) is state
+
+
+def test_parts_that_are_certain_are_asked_for_one_course_too(draught: Discovery) -> None:
+    course = np.array([0, 0.3, 0.1, 0.5, 0.2, 0.2, 0.2])
+    state = _state(draught, course, course)
+    judged = replace(state.judged, part=state.judged.best.names)  # type: ignore[union-attr]
+    told = heed_one_course(replace(state, judgement=judged, likelihood=50.0))
+    assert told.judged.word == "abstain" and told.judged.part == () and told.likelihood == 0.0
+
+
 @pytest.mark.parametrize("word", ["none", "abstain"])
 def test_what_is_not_told_stays_as_it_is(draught: Discovery, word: str) -> None:
-    course = np.linspace(0, 0.4, 7)
+    course = np.array([0, 0.3, 0.1, 0.5, 0.2, 0.2, 0.2])
     state = _state(draught, course, course)
     state = replace(state, judgement=replace(state.judged, word=word))  # type: ignore[arg-type]
     assert heed_one_course(state) is state

@@ -28,6 +28,7 @@ SETTINGS: dict[str, dict[str, float | tuple[float, ...]]] = {
     "span": {"middle": 1.5e-3},
     "lag": {"scale": 1e-6},
     "lags": {"scale": 1e-6},
+    "held": {"scale": 1e-6},
     "delay": {"scale": 1e-6},
     "stiction": {"scale": 1e-6},
 }

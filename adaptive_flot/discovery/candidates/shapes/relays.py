@@ -18,7 +18,6 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from adaptive_flot.discovery.candidates.dynamics import FOLLOWS
 from adaptive_flot.discovery.candidates.responses import TimeProfile
@@ -104,7 +103,8 @@ def _relay(scorer: Scorer, score: Score) -> Score | None:
     follows = FOLLOWS
     for rows in LAGS:
         slower = _best(scorer, score, [(on, off)], rows)
-        if slower is not None and slower[1] > gain:
+        price = float(np.log(scorer.measurements)) if follows == FOLLOWS else 0.0
+        if slower is not None and slower[1] > gain + price:
             follows, (_, gain, amplitude) = rows, slower
     start = {"amplitude": amplitude, "on_above": on, "off_below": off}
     penalised = gain - (PARAMETERS + (follows > FOLLOWS)) * float(np.log(scorer.measurements))
@@ -124,7 +124,7 @@ def _best(
     if not often:
         return None
     kept = list(often.values())
-    profiles = [TimeProfile(site.name, late(courses[pair], rows), site.mode == "offset") for pair in kept]
+    profiles = [TimeProfile(site.name, late(driver, *pair, rows), site.mode == "offset") for pair in kept]
     X = scorer.projected_profiles(profiles)
     along, strength = X.T @ scorer.residual, np.einsum("ij,ij->j", X, X)
     sure = strength > 1e-9 * np.max(strength, initial=1e-300)
@@ -133,20 +133,26 @@ def _best(
     return kept[k], float(gains[k]), float(along[k] / max(strength[k], 1e-300))
 
 
-def late(is_on: BoolArray, rows: float) -> FloatArray:
-    """The course (N,) of a switch that moves with a time constant of some rows, from rest."""
+def late(driver: FloatArray, on_above: float, off_below: float, rows: float) -> FloatArray:
+    """The course (N,) of a switch along a driver (N,) that moves with a time constant of some rows, from rest.
+
+    Between the thresholds it stays where it has got to, as in the law of the form.
+    """
+    is_on = course(driver, on_above, off_below)
     if rows <= FOLLOWS:
         return is_on.astype(float)
-    stays = float(np.exp(-1 / rows))
-    begun = [stays * float(is_on[0])]
-    moved: FloatArray = lfilter([1 - stays], [1, -stays], is_on.astype(float), zi=begun)[0]
+    share, at = 1 - float(np.exp(-1 / rows)), float(is_on[0])
+    moved = np.empty(len(driver))
+    for k, (up, down) in enumerate(zip((driver > on_above).tolist(), (driver < off_below).tolist(), strict=True)):
+        at += share * (1 - at) if up else -share * at if down else 0.0
+        moved[k] = at
     return moved
 
 
 def _variant(scorer: Scorer, score: Score, start: dict[str, float], rows: float) -> Variant:
     site, driver = score.candidate.site, score.candidate.driver
-    is_on = course(scorer.drivers[driver], start["on_above"], start["off_below"])
+    moved = late(scorer.drivers[driver], start["on_above"], start["off_below"], rows)
     effect = Effect(site.name, driver, RELAY, settings={"follow_s": rows * scorer.problem.record.dt})
-    profile = TimeProfile(site.name, late(is_on, rows), site.mode == "offset")
+    profile = TimeProfile(site.name, moved, site.mode == "offset")
     shape = ("on_above", start["on_above"]), ("off_below", start["off_below"])
     return Variant(effect, (profile,), ("amplitude",), shape)

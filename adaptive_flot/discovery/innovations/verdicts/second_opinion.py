@@ -49,7 +49,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
-from adaptive_flot.discovery.results.words import TELLING, WITH_A_NAME
+from adaptive_flot.discovery.results.words import ONE_CAUSE, TELLING, WITH_A_NAME
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.discovery.verdict.words.wording import beside_a_part
@@ -70,7 +70,8 @@ def second_opinion(state: State) -> State:
     """
     problem, (before, _) = state.known_problem, state.refitted
     given = replace(problem.record, initial_state=before.initial_state)
-    record = searchable(given, before.model) if is_asked(state) else None
+    asked_for = is_asked(state) and ONE_CAUSE not in state.contradiction
+    record = searchable(given, before.model) if asked_for else None
     if record is None:
         return state
     if time.monotonic() > state.ends:

@@ -9,5 +9,6 @@ first_rungs.py         Everyone with a few steps, then the finalists to the end.
 restarts.py            Fits that rested in a wrong place, from what another came to.
 events.py              Events in time and lines with kinks, from fitted curves.
 constants.py           The constant that a dependence may have come to.
+late.py                Sensors that are read at intervals.
 freedom.py             Time profiles with more freedom, and curves with less.
 """

@@ -10,10 +10,12 @@ from adaptive_flot.discovery.candidates.shapes.limited_lines import limited_line
 from adaptive_flot.discovery.candidates.shapes.step_events import event_scores, other_shape, slower_scores, step_score
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.results import Alternative
+from adaptive_flot.discovery.search.alternatives import EDGES
 from adaptive_flot.discovery.search.halving.constants import constants
 from adaptive_flot.discovery.search.halving.jobs import CLOSE_GAIN, FittedJob, Job, best_of_each, is_curve, near
 from adaptive_flot.discovery.search.halving.refits import Refit
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS
+from adaptive_flot.greybox.forms.form import CoefficientRole
 
 MOST_PROFILES = 6
 """Curves in time that are tried as events."""
@@ -55,14 +57,15 @@ def events(scores: list[Score], ended: list[Alternative]) -> list[Score]:
 
 def lines(refit: Refit, last: list[FittedJob]) -> list[FittedJob]:
     """Lines with kinks, which start from a fitted curve over a signal."""
-    return refit.run(with_kinks(best_of_each(near(last)), [each.scorer for each in refit.linearisations]))
+    curves = best_of_each([fitted for fitted in near(last) if is_curve(fitted)])
+    return refit.run(with_kinks(curves, [each.scorer for each in refit.linearisations]))
 
 
-def with_kinks(runs: list[FittedJob], scorers: Sequence[Scorer]) -> list[Job]:
+def with_kinks(curves: list[FittedJob], scorers: Sequence[Scorer]) -> list[Job]:
     """Lines with kinks in place of the best curves over a signal; `scorers` tell what each signal has seen."""
-    curves = [f for f in runs if is_curve(f) and f.alternative.effects[-1].driver not in STATELESS_DRIVERS]
+    over_a_signal = [f for f in curves if f.alternative.effects[-1].driver not in STATELESS_DRIVERS]
     jobs = []
-    for f in curves[:MOST_LINES]:
+    for f in over_a_signal[:MOST_LINES]:
         effect = f.alternative.effects[-1]
         seen = scorers[f.linearisation].drivers[effect.driver]
         jobs += [Job(f.linearisation, s, f.alternative.fit, drawn=True) for s in limited_lines(f.score, effect, seen)]
@@ -112,14 +115,18 @@ def softer(refit: Refit, best: list[FittedJob]) -> list[FittedJob]:
 
 
 def soft_edges(fitted: FittedJob, dt: float) -> list[Job]:
-    """A fitted pulse with edges over EDGE_ROWS rows, from where it stands; nothing for other forms."""
+    """A fitted pulse with edges over EDGE_ROWS rows, from where it stands; nothing for other forms.
+
+    Edges that would take up the pulse are left out: its size would be that of a pulse which never gets there.
+    """
     effect = fitted.alternative.effects[-1]
     if not effect.family.passes:
         return []
+    shortest = min(effect.values(CoefficientRole.DURATION))
     start = {c.name: effect.coefficients[c.name] for c in effect.terms}
     shape = tuple((c.name, start[c.name]) for c in effect.terms if c.is_shape)
     jobs = []
-    for rows in EDGE_ROWS:
+    for rows in (rows for rows in EDGE_ROWS if EDGES * rows * dt < shortest):
         soft = replace(effect, coefficients={}, settings={**effect.settings, "width": rows * dt})
         variant = Variant(soft, (), tuple(n for n in start if n not in dict(shape)), shape)
         score = replace(fitted.score, variant=variant, start=start)

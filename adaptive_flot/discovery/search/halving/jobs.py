@@ -59,7 +59,9 @@ def best_of_each(jobs: list[FittedJob]) -> list[FittedJob]:
     return list(best.values())
 
 
-def near(runs: Sequence[FittedJob], among: Sequence[FittedJob] | None = None) -> list[FittedJob]:
+def near(
+    runs: Sequence[FittedJob], among: Sequence[FittedJob] | None = None, share: float = CLOSE_GAIN
+) -> list[FittedJob]:
     """Those that gained about as much as the best of some others, by default of themselves."""
     most = max((fitted.alternative.gain for fitted in (runs if among is None else among)), default=0.0)
-    return [fitted for fitted in runs if fitted.alternative.gain > CLOSE_GAIN * most]
+    return [fitted for fitted in runs if fitted.alternative.gain > share * most]

@@ -19,7 +19,7 @@ from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.alternatives import effect_bounds
-from adaptive_flot.discovery.search.halving import constants, events, first_rungs, freedom, restarts
+from adaptive_flot.discovery.search.halving import constants, events, first_rungs, freedom, late, restarts
 from adaptive_flot.discovery.search.halving.first_rungs import NEAR_FINALIST
 from adaptive_flot.discovery.search.halving.jobs import CLOSE_GAIN, ScoredLinearisation, best_of_each
 from adaptive_flot.discovery.search.halving.refits import Refit
@@ -54,6 +54,7 @@ def refit(
     last = first_rungs.last(own, went_on)
     last += restarts.from_constants_of_the_best(own, last, first)
     last += restarts.astray(own, last, first)
+    last += late.held(own, last)
     compared = not fitter.problem.time_is_up
     followers = events.followers(own, last)
     followers += events.ramps_and_washouts(own, followers)

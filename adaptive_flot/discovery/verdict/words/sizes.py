@@ -10,7 +10,7 @@ from adaptive_flot.discovery.hypotheses.wording import clock
 from adaptive_flot.discovery.results import Alternative, NamedEffect
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.greybox.effects import Effect
-from adaptive_flot.greybox.forms.form import CoefficientRole
+from adaptive_flot.greybox.forms.form import CoefficientRole, number
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.scope import Site
 
@@ -53,6 +53,9 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     elif effect.driver == "lag":
         taus = " and ".join(f"{v:.3g} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
         said = f"{name} answers slowly, with a time constant of {taus}"
+    elif effect.driver == "delay" and (read := effect.values(CoefficientRole.READING)):
+        interval = (read[1] - read[0]) / number(effect.full_settings, "periods")
+        said = f"{name} is read every {interval:.3g} s, and kept in between"
     elif effect.driver == "delay":
         (dead,) = effect.values(CoefficientRole.DEAD_TIME)
         said = f"{name} answers {dead:.3g} s late"

@@ -139,8 +139,8 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
             said += f" At the same places it may as well be: {alike}."
         return f"{said} {beside_a_part(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
-    either = [n for n in same_site(judgement.best.names) if n in shared]
-    both = [n for n in same_signal(judgement.best.names) if n in shared and n not in either]
+    either = same_site(shared)
+    both = same_signal([n for n in shared if n not in either])
     words = [LACKS_SEVERAL]
     if sure := ", ".join(f"{s} by {d}" for s, d in shared if (s, d) not in (*either, *both)):
         begun, ended = ("All that come near have", f"; still wrong: {', '.join(wrong)}") if wrong else ("Certain:", "")
