@@ -10,8 +10,8 @@ from adaptive_flot.greybox.forms.direct import DIRECT_FORMS
 from adaptive_flot.greybox.forms.faults import FAULT_FORMS
 from adaptive_flot.greybox.forms.form import Form
 from adaptive_flot.greybox.forms.lagging import LAGGING_FORMS
-from adaptive_flot.greybox.forms.relay import RELAY_FORM
+from adaptive_flot.greybox.forms.relay import RELAY_FORMS
 from adaptive_flot.greybox.forms.static import STATIC_FORMS
 
-_ALL = (*STATIC_FORMS, *DIRECT_FORMS, *LAGGING_FORMS, *FAULT_FORMS, RELAY_FORM)
+_ALL = (*STATIC_FORMS, *DIRECT_FORMS, *LAGGING_FORMS, *FAULT_FORMS, *RELAY_FORMS)
 FORMS: Mapping[str, Form] = {form.name: form for form in _ALL}

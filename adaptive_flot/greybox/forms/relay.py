@@ -3,9 +3,10 @@
 The textbook's relay with hysteresis (Krasnosel'skii & Pokrovskii, *Systems with Hysteresis*, 1989, 1.1; a thermostat, a
 Schmitt trigger, a float switch), as a flip-flop that is set and reset::
 
-    dh/dt = (s((d - on) / w) (1 - h) - s((off - d) / w) h) / tau,   s(x) = 1 / (1 + exp(-x)),   g = a h
+    dh/dt = (s((d - on) / w) (1 - h) - s((off - d) / w) h) / tau,   s(x) = 1 / (1 + exp(-x)),   g = off + (on - off) h
 
-with the driver d, the state h between 0 and 1, and w = EDGE (on - off): between the thresholds it stays where it is.
+with the driver d, the state h between 0 and 1, the levels off (none in `relay`) and on, and w = EDGE (on_above -
+off_below): between the thresholds it stays where it is.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from adaptive_flot.greybox.forms.form import (
     FormKind,
     Settings,
     SiteScope,
+    StaticLaw,
     fixed,
     number,
 )
@@ -50,21 +52,39 @@ def _size(h: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     return g
 
 
-RELAY_FORM = Form(
-    "relay",
-    "two levels, with two thresholds of the driver: on above the one, off below the other",
-    FormKind.THRESHOLD,
-    fixed(
-        Coefficient("amplitude", CoefficientRole.LEVEL, unit="g"),
-        Coefficient("on_above", CoefficientRole.THRESHOLD, 1.0, scale=1.0, unit="driver"),
-        Coefficient("off_below", CoefficientRole.THRESHOLD, 0.0, scale=1.0, unit="driver"),
+def _two_levels(h: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    del s
+    g: ca.SX = c["off"] + (c["on"] - c["off"]) * h
+    return g
+
+
+def _relay_form(name: str, description: str, levels: tuple[Coefficient, ...], law: StaticLaw) -> Form:
+    on = Coefficient("on_above", CoefficientRole.THRESHOLD, 1.0, scale=1.0, unit="driver")
+    off = Coefficient("off_below", CoefficientRole.THRESHOLD, 0.0, scale=1.0, unit="driver")
+    return Form(
+        name,
+        f"{description}, with two thresholds of the driver: on above the one, off below the other",
+        FormKind.THRESHOLD,
+        fixed(*levels, on, off),
+        ("signal",),
+        {"follow_s": 2.0},
+        {"follow_s": "s"},
+        static=law,
+        memory=_relay,
+        states=lambda settings: ("on",),
+        abrupt=True,
+    )
+
+
+def _level(name: str) -> Coefficient:
+    return Coefficient(name, CoefficientRole.LEVEL, unit="g")
+
+
+_OFF, _ON = _level("off"), _level("on")
+RELAY_FORMS = (
+    _relay_form("relay", "a level while it is on, and none while it is off", (_level("amplitude"),), _size),
+    _relay_form(
+        "two_levels", "a level while it is off, and another while it is on", (_level("off"), _level("on")), _two_levels
     ),
-    ("signal",),
-    {"follow_s": 2.0},
-    {"follow_s": "s"},
-    static=_size,
-    memory=_relay,
-    states=lambda settings: ("on",),
-    abrupt=True,
 )
-"""Nothing, to the bit, while its amplitude is 0."""
+"""Nothing, to the bit, while their levels are 0."""

@@ -13,10 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.candidates.score_test import Scorer
-from adaptive_flot.discovery.candidates.shapes.relays import LEAST_MOVES, RELAY, course, late, moves_often, with_relays
+from adaptive_flot.discovery.candidates.shapes.relays import (
+    LEAST_MOVES,
+    RELAY,
+    TWO_LEVELS,
+    course,
+    late,
+    moves_often,
+    with_relays,
+)
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
+from adaptive_flot.discovery.results import NamedEffect
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of
 from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
@@ -25,7 +34,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from tests.discovery.heated import CAPACITY, DT, NOISE, ROOM, heated_tank, moves
+from tests.discovery.heated import CAPACITY, DT, NOISE, ROOM, Truth, changed, heated_tank, moves, tank_record
 
 OPENS, CLOSES, MORE = 14.0, 9.0, 0.5
 """Fan speeds above which the vent opens and below which it closes [1/s], and how much more heat is then lost."""
@@ -119,6 +128,34 @@ def test_a_switch_scores_better_than_any_curve_over_the_same_signal() -> None:
     assert best.penalised > plain.penalised + 50
     (x,) = scorer.projected_profiles(list(best.variant.profiles)).T
     assert best.gain == pytest.approx(float(x @ scorer.residual) ** 2 / float(x @ x), rel=1e-6)
+
+
+@pytest.mark.parametrize("off", [-1.0, 2.0])
+def test_a_switch_that_is_off_may_have_a_level_of_its_own(off: float) -> None:
+    """The thermometer shows 1.5 K more while the fan is fast, and another error else."""
+    plain = tank_record(Truth(exponent=0.0))
+    is_on = np.array(latched(plain.inputs[:, 1], OPENS, CLOSES))
+    scorer = scored(changed(plain, plain.outputs[:, 0] + np.where(is_on, 1.5, off)))
+    best = with_relays(scorer, scorer.scores())[0]
+    assert (best.candidate.site.name, best.candidate.driver) == ("thermometer", "fan_speed")
+    assert best.variant.effect.form == TWO_LEVELS
+    assert best.start["on"] - best.start["off"] == pytest.approx(1.5 - off, rel=0.1)
+    assert best.start["off"] == pytest.approx(off, abs=0.3)
+    X = scorer.projected_profiles(list(best.variant.profiles))
+    fitted = X @ np.linalg.lstsq(X, scorer.residual, rcond=None)[0]
+    assert best.gain == pytest.approx(float(scorer.residual @ fitted), rel=1e-6)
+    assert best.penalised == pytest.approx(best.gain - 4 * np.log(scorer.measurements))
+
+
+def test_a_switch_with_two_levels_is_told_with_both() -> None:
+    model = heated_tank()
+    values = {"off": -0.5, "on": 0.4, "on_above": OPENS, "off_below": CLOSES}
+    effect = Effect("heat_loss", "fan_speed", TWO_LEVELS, values, {"follow_s": DT})
+    said = words_of_effects(model, [NamedEffect(effect, "", {"off": (-0.6, -0.4), "on": (0.3, 0.5)}, ())], [])
+    assert said == (
+        "Heat loss is 49 % larger once fan speed has risen above 14 1/s, until it falls below 9 1/s, "
+        "and is 39 % smaller otherwise"
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))

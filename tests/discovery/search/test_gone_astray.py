@@ -14,7 +14,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.problem import make_problem
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.halving.constants import flat
-from adaptive_flot.discovery.search.halving.events import EDGE_ROWS, ramps_and_washouts, soft_edges
+from adaptive_flot.discovery.search.halving.events import EDGE_ROWS, ramps_and_washouts, slow_switches, soft_edges
 from adaptive_flot.discovery.search.halving.jobs import FittedJob, Job, ScoredLinearisation
 from adaptive_flot.discovery.search.halving.refits import Refit
 from adaptive_flot.discovery.search.halving.restarts import _gone_astray, as_event_of, flattened
@@ -121,6 +121,18 @@ def test_a_pulse_is_tried_with_softer_edges_and_nothing_else_is(halving: Refit) 
     assert [job.score.variant.effect.settings["width"] for job in jobs] == [30.0 * rows for rows in EDGE_ROWS[:3]]
     assert all(job.score.start["on_1"] == 6000.0 for job in jobs)
     assert soft_edges(_curve(halving, SENSOR, 10.0), 30.0) == []
+
+
+def test_a_switch_is_tried_with_other_speeds(halving: Refit) -> None:
+    """All but its own, from where it stands; other forms have none."""
+    curve = _curve(halving, LOSS, 100.0)
+    values = {"off": -0.1, "on": 0.2, "on_above": 14.0, "off_below": 9.0}
+    effect = Effect("heat_loss", "fan_speed", "two_levels", values, {"follow_s": 120.0})
+    fit = replace(curve.alternative.fit, model=heated_tank().with_effects([effect]))
+    jobs = slow_switches(replace(curve, alternative=replace(curve.alternative, fit=fit)), 30.0)
+    assert [job.score.variant.effect.settings["follow_s"] for job in jobs] == [30.0, 360.0, 1080.0]
+    assert all(job.score.start == values and job.warm is fit for job in jobs)
+    assert slow_switches(curve, 30.0) == []
 
 
 def test_a_washout_is_fitted_again_from_a_ramp_that_came_further() -> None:

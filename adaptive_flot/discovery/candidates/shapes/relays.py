@@ -7,6 +7,7 @@ and the residual e::
     gain = (x'e)^2 / (x'x)
 
 is the score statistic of the pair, and x'e over x'x its amplitude: Rao, *Proc. Cambridge Philos. Soc.* 44 (1948) 50.
+With a level of its own while it is off, x and e are what the response to a constant leaves of them; that gains as well.
 The thresholds are even ones over what the signal covers; then closer ones around the best two. A switch that moves once
 or twice is left out: a step or a pulse in time would be the same.
 """
@@ -14,7 +15,7 @@ or twice is left out: a step or a pulse in time would be the same.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -29,8 +30,8 @@ from adaptive_flot.greybox.effects import STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
-RELAY = "relay"
-"""The form of a switch with two thresholds."""
+RELAY, TWO_LEVELS = "relay", "two_levels"
+"""The forms of a switch with two thresholds: off it does nothing, or something else."""
 MOST = 24
 """Dependences, best first, that are tried as a switch."""
 THRESHOLDS, BETWEEN = 9, 5
@@ -40,7 +41,7 @@ COVERED = (0.02, 0.98)
 LEAST_MOVES = 3
 """Least times that a switch goes on or off: fewer are a step or a pulse."""
 PARAMETERS = 3
-"""Amplitude and two thresholds; one more where it moves slowly."""
+"""A level and two thresholds; one more where it moves slowly, and one where it has two levels."""
 LAGS = (4.0, 12.0, 36.0)
 """Rows in which a switch moves that are tried beside FOLLOWS: what opens may take its time."""
 
@@ -78,7 +79,7 @@ def moves_often(problem: Problem, fit: Fit, effect: Effect) -> bool:
 
     A fit may move a threshold to where the switch goes on once: that is a step in time by another name.
     """
-    if effect.form != RELAY:
+    if effect.form not in (RELAY, TWO_LEVELS):
         return True
     record, model = problem.record, fit.model
     run = Stepper(model, record.dt).simulate(
@@ -86,6 +87,18 @@ def moves_often(problem: Problem, fit: Fit, effect: Effect) -> bool:
     )
     is_on = run.states[:, model.names("states").index(f"{effect.label}.on")] > 0.5
     return bool(np.count_nonzero(is_on[1:] != is_on[:-1]) >= LEAST_MOVES)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A switch that was scored: thresholds, rows in which it moves, levels off and on, gain, that less its price."""
+
+    pair: Thresholds
+    rows: float
+    off: float
+    on: float
+    gain: float
+    penalised: float
 
 
 def _relay(scorer: Scorer, score: Score) -> Score | None:
@@ -97,24 +110,24 @@ def _relay(scorer: Scorer, score: Score) -> Score | None:
     if best is None:
         return None
     step = (even[1] - even[0]) * np.linspace(-0.75, 0.75, BETWEEN)
-    on, off = best[0]
+    on, off = best.pair
     close = [(on + a, off + b) for a in step.tolist() for b in step.tolist() if on + a > off + b]
-    (on, off), gain, amplitude = _best(scorer, score, [(on, off), *close]) or best
-    follows = FOLLOWS
-    for rows in LAGS:
-        slower = _best(scorer, score, [(on, off)], rows)
-        price = float(np.log(scorer.measurements)) if follows == FOLLOWS else 0.0
-        if slower is not None and slower[1] > gain + price:
-            follows, (_, gain, amplitude) = rows, slower
-    start = {"amplitude": amplitude, "on_above": on, "off_below": off}
-    penalised = gain - (PARAMETERS + (follows > FOLLOWS)) * float(np.log(scorer.measurements))
-    return replace(score, variant=_variant(scorer, score, start, follows), gain=gain, penalised=penalised, start=start)
+    best = _best(scorer, score, [best.pair, *close]) or best
+    tried = [best, *(_best(scorer, score, [best.pair], rows) for rows in LAGS)]
+    best = max((found for found in tried if found is not None), key=lambda found: found.penalised)
+    variant = _variant(scorer, score, best)
+    levels = {"amplitude": best.on} if variant.effect.form == RELAY else {"off": best.off, "on": best.on}
+    return replace(
+        score,
+        variant=variant,
+        gain=best.gain,
+        penalised=best.penalised,
+        start={**levels, "on_above": best.pair[0], "off_below": best.pair[1]},
+    )
 
 
-def _best(
-    scorer: Scorer, score: Score, pairs: Sequence[Thresholds], rows: float = FOLLOWS
-) -> tuple[Thresholds, float, float] | None:
-    """The best pair of thresholds with its gain and amplitude; None where no switch moves often enough.
+def _best(scorer: Scorer, score: Score, pairs: Sequence[Thresholds], rows: float = FOLLOWS) -> _Found | None:
+    """The best pair of thresholds, with one level or two; None where no switch moves often enough.
 
     `rows` is the time constant with which it moves, in rows.
     """
@@ -123,14 +136,35 @@ def _best(
     often = {c.tobytes(): pair for pair, c in courses.items() if np.count_nonzero(c[1:] != c[:-1]) >= LEAST_MOVES}
     if not often:
         return None
-    kept = list(often.values())
-    profiles = [TimeProfile(site.name, late(driver, *pair, rows), site.mode == "offset") for pair in kept]
-    X = scorer.projected_profiles(profiles)
-    along, strength = X.T @ scorer.residual, np.einsum("ij,ij->j", X, X)
+    kept, offset = list(often.values()), site.mode == "offset"
+    profiles = [TimeProfile(site.name, late(driver, *pair, rows), offset) for pair in kept]
+    constant, X = np.split(
+        scorer.projected_profiles([TimeProfile(site.name, np.ones(len(driver)), offset), *profiles]), [1], axis=1
+    )
+    price = float(np.log(scorer.measurements))
+    numbers = PARAMETERS + (rows > FOLLOWS)
+    gains, levels = _gains(X, scorer.residual)
+    one = int(np.argmax(gains))
+    found = _Found(kept[one], rows, 0.0, float(levels[one]), float(gains[one]), float(gains[one]) - numbers * price)
+    own, level = _gains(constant, scorer.residual)
+    if not own[0] > price:  # what is free already takes a constant up, or there is none
+        return found
+    base = constant / np.linalg.norm(constant)
+    beside, more = _gains(X - base @ (base.T @ X), scorer.residual - base[:, 0] * float(base[:, 0] @ scorer.residual))
+    two = int(np.argmax(beside))
+    gain = float(own[0] + beside[two])
+    if gain - (numbers + 1) * price <= found.penalised:
+        return found
+    off = float(level[0] - more[two] * (constant[:, 0] @ X[:, two]) / (constant[:, 0] @ constant[:, 0]))
+    return _Found(kept[two], rows, off, off + float(more[two]), gain, gain - (numbers + 1) * price)
+
+
+def _gains(X: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What each response (values, n) alone gains, and its size then (n,)."""
+    along, strength = X.T @ residual, np.einsum("ij,ij->j", X, X)
     sure = strength > 1e-9 * np.max(strength, initial=1e-300)
-    gains = np.where(sure, along**2 / np.where(sure, strength, 1.0), 0.0)
-    k = int(np.argmax(gains))
-    return kept[k], float(gains[k]), float(along[k] / max(strength[k], 1e-300))
+    sizes = np.where(sure, along / np.where(sure, strength, 1.0), 0.0)
+    return along * sizes, sizes
 
 
 def late(driver: FloatArray, on_above: float, off_below: float, rows: float) -> FloatArray:
@@ -149,10 +183,13 @@ def late(driver: FloatArray, on_above: float, off_below: float, rows: float) -> 
     return moved
 
 
-def _variant(scorer: Scorer, score: Score, start: dict[str, float], rows: float) -> Variant:
-    site, driver = score.candidate.site, score.candidate.driver
-    moved = late(scorer.drivers[driver], start["on_above"], start["off_below"], rows)
-    effect = Effect(site.name, driver, RELAY, settings={"follow_s": rows * scorer.problem.record.dt})
-    profile = TimeProfile(site.name, moved, site.mode == "offset")
-    shape = ("on_above", start["on_above"]), ("off_below", start["off_below"])
-    return Variant(effect, (profile,), ("amplitude",), shape)
+def _variant(scorer: Scorer, score: Score, found: _Found) -> Variant:
+    site, driver, offset = score.candidate.site, score.candidate.driver, score.candidate.site.mode == "offset"
+    moved = late(scorer.drivers[driver], *found.pair, found.rows)
+    settings = {"follow_s": found.rows * scorer.problem.record.dt}
+    shape = ("on_above", found.pair[0]), ("off_below", found.pair[1])
+    on = TimeProfile(site.name, moved, offset)
+    if not found.off:
+        return Variant(Effect(site.name, driver, RELAY, settings=settings), (on,), ("amplitude",), shape)
+    off = TimeProfile(site.name, 1 - moved, offset)
+    return Variant(Effect(site.name, driver, TWO_LEVELS, settings=settings), (off, on), ("off", "on"), shape)

@@ -64,14 +64,14 @@ def constants(scorer: Scorer, ended: list[Alternative]) -> list[tuple[Score, Fit
 def _bend(fit: Fit, effect: Effect) -> float:
     """How much minus two log-likelihood would rise if the dependence were flat, to second order.
 
-    With the coefficients v that are zero where it is flat (of a curve, the differences of its values) and their
+    With the coefficients v that are zero where it is flat (of values or levels, their differences) and their
     covariance C: v' C^-1 v, Wald's statistic, *Trans. Am. Math. Soc.* 54 (1943) 426.
     """
     size = (CoefficientRole.LEVEL,) if effect.family.memory else (CoefficientRole.KNOT_VALUE, CoefficientRole.SLOPE)
     names = map(effect.parameter, effect.names(*size))
     where = [fit.names.index(n) for n in names if n in fit.names]
     values, covariance = fit.values[where], fit.covariance[np.ix_(where, where)]
-    if effect.family.is_curve:
+    if effect.family.is_curve or (effect.family.memory and len(where) > 1):
         difference = np.diff(np.eye(len(where)), axis=0)
         values, covariance = difference @ values, difference @ covariance @ difference.T
     return float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from adaptive_flot.discovery.candidates.dynamics import FOLLOWS
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.candidates.shapes.limited_lines import limited_lines
+from adaptive_flot.discovery.candidates.shapes.relays import LAGS
 from adaptive_flot.discovery.candidates.shapes.step_events import event_scores, other_shape, slower_scores, step_score
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.results import Alternative
@@ -15,7 +17,7 @@ from adaptive_flot.discovery.search.halving.constants import constants
 from adaptive_flot.discovery.search.halving.jobs import CLOSE_GAIN, FittedJob, Job, best_of_each, is_curve, near
 from adaptive_flot.discovery.search.halving.refits import Refit
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS
-from adaptive_flot.greybox.forms.form import CoefficientRole
+from adaptive_flot.greybox.forms.form import CoefficientRole, number
 
 MOST_PROFILES = 6
 """Curves in time that are tried as events."""
@@ -110,8 +112,9 @@ def around_step(fitted: FittedJob, span: float) -> list[Job]:
 
 
 def softer(refit: Refit, best: list[FittedJob]) -> list[FittedJob]:
-    """Pulses with edges that take longer: else the site is told by how sharp its outputs' edges are."""
-    return refit.run([job for f in near(best[:MOST_SOFT]) for job in soft_edges(f, refit.fitter.problem.record.dt)])
+    """Pulses and switches that take longer to move: else the site is told by how sharp its outputs' edges are."""
+    dt = refit.fitter.problem.record.dt
+    return refit.run([job for f in near(best[:MOST_SOFT]) for job in (*soft_edges(f, dt), *slow_switches(f, dt))])
 
 
 def soft_edges(fitted: FittedJob, dt: float) -> list[Job]:
@@ -123,12 +126,25 @@ def soft_edges(fitted: FittedJob, dt: float) -> list[Job]:
     if not effect.family.passes:
         return []
     shortest = min(effect.values(CoefficientRole.DURATION))
+    widths = (rows * dt for rows in EDGE_ROWS if EDGES * rows * dt < shortest)
+    return [_with_setting(fitted, "width", width) for width in widths]
+
+
+def slow_switches(fitted: FittedJob, dt: float) -> list[Job]:
+    """A fitted switch by a signal that moves within a row, or over LAGS rows, from where it stands; none else."""
+    effect = fitted.alternative.effects[-1]
+    if not effect.family.memory:
+        return []
+    own = number(effect.full_settings, "follow_s")
+    return [_with_setting(fitted, "follow_s", rows * dt) for rows in (FOLLOWS, *LAGS) if rows * dt != own]
+
+
+def _with_setting(fitted: FittedJob, name: str, value: float) -> Job:
+    """The same form with another value of one of its settings, from where it stands."""
+    effect = fitted.alternative.effects[-1]
+    other = replace(effect, coefficients={}, settings={**effect.settings, name: value})
     start = {c.name: effect.coefficients[c.name] for c in effect.terms}
     shape = tuple((c.name, start[c.name]) for c in effect.terms if c.is_shape)
-    jobs = []
-    for rows in (rows for rows in EDGE_ROWS if EDGES * rows * dt < shortest):
-        soft = replace(effect, coefficients={}, settings={**effect.settings, "width": rows * dt})
-        variant = Variant(soft, (), tuple(n for n in start if n not in dict(shape)), shape)
-        score = replace(fitted.score, variant=variant, start=start)
-        jobs.append(Job(fitted.linearisation, score, fitted.alternative.fit, drawn=True))
-    return jobs
+    variant = Variant(other, (), tuple(n for n in start if n not in dict(shape)), shape)
+    score = replace(fitted.score, variant=variant, start=start)
+    return Job(fitted.linearisation, score, fitted.alternative.fit, drawn=True)

@@ -130,17 +130,22 @@ def _event(site: Site, effect: Effect) -> str:
 
 def _switched(model: Model, site: Site, effect: Effect) -> str:
     """A switch with two thresholds: `is 20 % smaller once level has risen above 0.4 m, until it falls below 0.3 m`."""
-    (level,) = effect.levels
+    *others, level = effect.levels
     on_above, off_below = (effect.coefficients[n] for n in effect.names(CoefficientRole.THRESHOLD))
     units = {q.name: q.unit for q in (*model.inputs, *model.states, *model.signals)}
     unit = units.get(effect.driver, "-")
     unit = "" if unit == "-" else f" {unit}"
-    if site.role == "sensor":
-        what = f"shows {_amount(site, effect, level)} {'more' if level > 0 else 'less'}"
-    else:
-        what = f"is {_amount(site, effect, level)} {'larger' if level > 0 else 'smaller'}"
+    what, *before = (_off(site, effect, each) for each in (level, *others))
     begun = f"once {spaced(effect.driver)} has risen above {on_above:.3g}{unit}"
-    return f"{what} {begun}, until it falls below {off_below:.3g}{unit}"
+    otherwise = f", and {before[0]} otherwise" if before else ""
+    return f"{what} {begun}, until it falls below {off_below:.3g}{unit}{otherwise}"
+
+
+def _off(site: Site, effect: Effect, level: float) -> str:
+    """How far a part is off: `shows 2 K more`, `is 20 % smaller`."""
+    if site.role == "sensor":
+        return f"shows {_amount(site, effect, level)} {'more' if level > 0 else 'less'}"
+    return f"is {_amount(site, effect, level)} {'larger' if level > 0 else 'smaller'}"
 
 
 def _until_the_end(site: Site, curve: EffectCurve) -> str:
@@ -251,7 +256,7 @@ def _interval(site: Site, told: NamedEffect) -> str:
     level = effect.driver not in ("lag", "delay")
     roles = (CoefficientRole.LEVEL,) if level else (CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME)
     known = [told.interval95[n] for n in effect.names(*roles) if n in told.interval95]
-    if not known:
+    if len(known) != 1 and (not known or effect.family.memory):  # of two levels, each has its own
         return ""
     low, high = sorted(known[0], key=abs)
     if not level:
