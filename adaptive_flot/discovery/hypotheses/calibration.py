@@ -167,13 +167,14 @@ def excluded_by(calibration: Calibration, fit: JointFit) -> bool:
     fitter = JointFitter(held, calibration.rows, nothing, (), calibration.fit.initial)
     with np.errstate(all="ignore"):
         there = fitter.fit(fitter.unknowns.start())
-    lost = _criterion(calibration.rows, there) - _criterion(calibration.rows, calibration.fit)
+    lost = criterion(calibration.rows, there) - criterion(calibration.rows, calibration.fit)
     first = len(fit.coefficients)
     charged = float(np.sum(fit.unknowns[first : first + len(names)] ** 2))
     return not lost <= charged + EXCLUDED  # a run that fails excludes them as well
 
 
-def _criterion(rows: Rows, fit: JointFit) -> float:
+def criterion(rows: Rows, fit: JointFit) -> float:
+    """Criterion of a fit to some rows, without its priors."""
     return float(sum(loss.sum() for loss in rows.losses(fit.errors)))
 
 

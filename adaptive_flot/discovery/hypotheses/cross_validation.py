@@ -127,7 +127,7 @@ def fit_all_rows(
     """
     extended = model_with(model, hypothesis)
     own = hypothesis.parameters if hypothesis else ()
-    initial = [_with_effect_states(extended, x) for x in first_states(model, rows.records)]
+    initial = [with_effect_states(extended, x) for x in first_states(model, rows.records)]
     fitter = JointFitter(extended, rows, constants, own, initial)
     fit = (
         fitter.fit_from_afar(fitter.unknowns.start())
@@ -270,6 +270,6 @@ def refined(model: Model, rows: Rows, first: Fitted, refresh: int = REFRESH) -> 
     return replace(first, fit=fit) if fit.cost <= first.fit.cost else first
 
 
-def _with_effect_states(model: Model, x: FloatArray) -> FloatArray:
+def with_effect_states(model: Model, x: FloatArray) -> FloatArray:
     """Initial state (nx,) with those of the effect behind: a lag starts where it follows, a store at rest."""
     return stores_at_rest(model, np.concatenate([x, np.ones(len(model.states) - len(x))]))

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
+import numpy as np
+
+from adaptive_flot.discovery.hypotheses.calibration import criterion
+from adaptive_flot.discovery.hypotheses.comparison import LEAST_DIFFERENCE
+from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows, model_with, with_effect_states
 from adaptive_flot.discovery.hypotheses.families import EVENTS
+from adaptive_flot.discovery.hypotheses.joint.fit import JointFitter
+from adaptive_flot.discovery.hypotheses.joint.known_before import loose_constants
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.results.words import WITH_A_NAME
@@ -36,6 +42,8 @@ def why_not_new(compared: Comparison, confirmed: bool) -> str:
         return ""
     if _is_there_before(compared):
         return "it explains the reference as well, so that the model lacks it there too"
+    if _explains_all_records_better(compared):
+        return "on all records it explains more than since the reference alone, so that nothing says that it is new"
     calibration = compared.calibration
     wanders = bool((calibration.usual.overall > AT_NOISE * calibration.noise).any())
     little = all(c.before <= FAR_ABOVE * c.noise for c in verdict.error)
@@ -71,3 +79,29 @@ def _is_there_before(compared: Comparison) -> bool:
         return False
     sizes = ((there.fit.value(n), best.fit.value(n)) for n in h.parameters)
     return all(before * now > 0 and abs(before) >= AS_LARGE * abs(now) for before, now in sizes)
+
+
+def _explains_all_records_better(compared: Comparison) -> bool:
+    """Whether the best hypothesis on the reference as well, with constants that fit it, is better than since it alone.
+
+    A law of the model that is a little wrong shows where a record runs at other conditions. Constants of the reference
+    hide it there, and a fault of the new record alone makes up for it here. With the criteria C of reference (r) and
+    new record (n), the hypothesis h, and the distance d of constants from what the reference says::
+
+        C_rn(h on both) < C_r(without) + C_n(h) + d^2 - LEAST_DIFFERENCE
+
+    A change that is new makes the reference worse. One that the reference could not show is the same on both sides.
+    """
+    best, calibration = compared.judged.best, compared.calibration
+    h = best.hypothesis if best is not None else None
+    if best is None or h is None or h.kind in (*EVENTS, SEARCHED) or not h.free:
+        return False
+    both = compared.rows.behind(calibration.rows)
+    extended = model_with(calibration.model, h)
+    before = [with_effect_states(extended, x) for x in calibration.fit.initial]
+    constants = loose_constants(calibration.model, calibration.constants.names)
+    fitter = JointFitter(extended, both, constants, h.parameters, [*before, *best.fit.initial])
+    with np.errstate(all="ignore"):
+        fit = fitter.fit_from_afar(fitter.unknowns.start({n: best.fit.value(n) for n in h.parameters}))
+    now = criterion(calibration.rows, calibration.fit) + criterion(compared.rows, best.fit)
+    return criterion(both, fit) < now + best.moved(len(calibration.constants.names)) - LEAST_DIFFERENCE

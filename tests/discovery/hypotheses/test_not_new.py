@@ -7,7 +7,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.since_reference import not_new
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.tank import record, tank
@@ -32,3 +35,15 @@ def test_what_the_reference_does_not_have_may_be_new() -> None:
     assert compared.verdict.word in ("named", "class"), compared.verdict.reason
     assert why_not_new(compared, confirmed=False) == ""
     assert why_not_new(_named_late(compared), confirmed=False) == ""
+
+
+@pytest.mark.parametrize(("before", "is_new"), [(LATE, False), (None, True)])
+def test_what_explains_all_records_better_has_not_changed(
+    before: Effect | None, is_new: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the rule that asks the reference alone: its constants may hide there what it lacks."""
+    monkeypatch.setattr(not_new, "_is_there_before", lambda compared: False)
+    old = record("old", 2, before) if before else record("old", 2)
+    compared = compare(tank(), [record("new", 3, LATE)], [old])
+    why = why_not_new(_named_late(compared), confirmed=True)
+    assert why == "" if is_new else "on all records it explains more" in why

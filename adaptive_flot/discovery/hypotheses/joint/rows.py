@@ -66,6 +66,15 @@ class Rows:
         kept = tuple(a & ~b for a, b in zip(self.counted, left_out, strict=True))
         return replace(self, counted=kept)
 
+    def behind(self, before: Rows) -> Rows:
+        """The rows of other records of the same outputs, and these behind them; the memory is theirs."""
+        return replace(
+            before,
+            records=(*before.records, *self.records),
+            sizes=(*before.sizes, *self.sizes),
+            counted=(*before.counted, *self.counted),
+        )
+
     def there(self, which: int) -> BoolArray:
         """Values (N, m) of one record that were measured, in rows that count."""
         measured: BoolArray = np.isfinite(self.records[which].outputs[:, list(self.columns)])
