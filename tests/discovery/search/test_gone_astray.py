@@ -94,6 +94,16 @@ def test_a_constant_is_fitted_once_more_from_a_curve_that_came_further() -> None
     assert constant.alternative.names == (("thermometer", "constant"),)
     assert constant.alternative.fit.bic < curve.alternative.fit.bic < halving.base.bic
     assert flat(halving, [resting]) == []
+    assert len(flat(halving, [_rising(curve, 0.02)])) == 1, "no constant was fitted, and the curve is a level"
+    assert flat(halving, [_rising(curve, 0.3)]) == []
+
+
+def _rising(curve: FittedJob, by: float) -> FittedJob:
+    """A fitted curve, with values that begin at 2 and rise from knot to knot."""
+    (effect,), fit = curve.alternative.effects, curve.alternative.fit
+    values = {name: 2.0 + by * k for k, name in enumerate(effect.coefficients)}
+    model = heated_tank().with_effects([replace(effect, coefficients=values)])
+    return replace(curve, alternative=replace(curve.alternative, fit=replace(fit, model=model)))
 
 
 def _pulse(halving: Refit, name: tuple[str, str]) -> FittedJob:
