@@ -1,9 +1,10 @@
 """A model with sites where it has none: at the balances of its states, at its inputs, and beside what is a factor.
 
-Five things may act there. With the balance ``dx/dt = f(x, u)``, an input u, a site of value v, and A the change::
+Six things may act there. With the balance ``dx/dt = f(x, u)``, an input u, a site of value v, and A the change::
 
     balance of x    dx/dt = f + A               a leak, a load, a heat that nobody counts
-    loss of x       dx/dt = f - A x / |x|_max   a leak in proportion to what is there
+    loss of x       dx/dt = f - A x / x_max     a leak in proportion to what is there
+    drag on x       dx/dt = f - A x |x| / x_max^2   a resistance that grows with the square of a flow or a speed
     rate of x       dx/dt = f exp(A)            another capacity, volume or mass: exp(-A) times as large
     reading of u    dx/dt = f(x, u + A)         an input that is another than the record says
     amount at v     v + A                       a seat that no longer closes, where a change is a factor
@@ -23,7 +24,9 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.greybox.scope import Role, Scope, Site
 
-BALANCE, LOSS, RATE, READING, AMOUNT = "balance of ", "loss of ", "rate of ", "reading of ", "amount at "
+BALANCE, LOSS, DRAG, RATE, READING, AMOUNT = (
+    "balance of ", "loss of ", "drag on ", "rate of ", "reading of ", "amount at ",
+)  # fmt: skip
 """How the names of the further sites begin."""
 ENDS, ROUNDING = (0.05, 0.95), 0.01
 """Quantiles that stand for the ends of what was seen, and a share of their distance that is none."""
@@ -72,8 +75,9 @@ class _WithFurtherSites:
             if name in self.stores:
                 rate = m.site(RATE + name, rate, "process")
             if name in sizes:
-                lost = m.site(LOSS + name, ca.SX(0), "process", "offset")
-                rate = rate - lost * m.state(name) / sizes[name]
+                lost, braked = (m.site(kind + name, ca.SX(0), "process", "offset") for kind in (LOSS, DRAG))
+                share = m.state(name) / sizes[name]
+                rate = rate - lost * share - braked * share * ca.fabs(share)
             m.derivatives[name] = m.site(BALANCE + name, rate, "process", "offset")
 
 
@@ -98,7 +102,7 @@ def loss_size(state: Quantity) -> float:
 
 def further_sites(model: Model) -> tuple[Site, ...]:
     """The further sites of such a model."""
-    return tuple(s for s in model.sites if s.name.startswith((BALANCE, LOSS, RATE, READING, AMOUNT)))
+    return tuple(s for s in model.sites if s.name.startswith((BALANCE, LOSS, DRAG, RATE, READING, AMOUNT)))
 
 
 def is_part(place: str, site: str) -> bool:

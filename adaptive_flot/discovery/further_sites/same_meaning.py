@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import passed_on
-from adaptive_flot.discovery.further_sites.places import BALANCE, LOSS, READING, is_part
+from adaptive_flot.discovery.further_sites.places import BALANCE, DRAG, LOSS, READING, is_part
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -35,8 +35,9 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
     is_amount = mode == site.mode == "offset"
     if is_amount and place.startswith(BALANCE):
         return True
-    if is_amount and place.startswith(LOSS):
-        moved = _moves(model, site.name, mode)[:, model.index("states", place.removeprefix(LOSS))]
+    if is_amount and place.startswith((LOSS, DRAG)):
+        state = place.removeprefix(LOSS).removeprefix(DRAG)
+        moved = _moves(model, site.name, mode)[:, model.index("states", state)]
         return bool(np.any(np.isfinite(moved) & (moved != 0)))
     if not does_the_same and place.startswith(BALANCE) and mode == "offset" != site.mode:
         return False

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adaptive_flot.discovery.further_sites.places import AMOUNT, BALANCE, LOSS, RATE, READING, loss_size
+from adaptive_flot.discovery.further_sites.places import AMOUNT, BALANCE, DRAG, LOSS, RATE, READING, loss_size
 from adaptive_flot.greybox.model import Model
 
 NO_SITE = "the model has no site for that"
@@ -48,6 +48,18 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
         name = site.removeprefix(LOSS)
         share = abs(amount) / loss_size(model.states[model.index("states", name)])
         rate = f"{100 * share:.3g} % of itself every second" if measured else "a share of itself"
+        return f"{_plain(name)} {'lost' if amount > 0 else 'gained'} {rate}{at}"
+    if site.startswith(DRAG):
+        name = site.removeprefix(DRAG)
+        state = model.states[model.index("states", name)]
+        lost = abs(amount) * (state.scale / loss_size(state)) ** 2
+        unit = "1" if state.unit in ("", "-") else state.unit
+        at_scale = f"{state.scale:.3g} {unit}".removesuffix(" 1")
+        rate = (
+            f"{lost:.3g} {unit}/s where it is {at_scale}, and more with its square"
+            if measured
+            else "more with its square"
+        )
         return f"{_plain(name)} {'lost' if amount > 0 else 'gained'} {rate}{at}"
     name = site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit

@@ -18,6 +18,7 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import (
     AMOUNT,
     BALANCE,
+    DRAG,
     ENDS,
     LOSS,
     further_sites,
@@ -139,13 +140,13 @@ def unless_without_a_site(
 
 
 def _changes(model: Model, seen: Mapping[str, FloatArray]) -> Sequence[Hypothesis]:
-    """A constant change at each further site, its scale what the site has seen; a loss that of its balance.
+    """A constant change at each further site, its scale what the site has seen; a loss or a drag that of its balance.
 
     Beside a factor that hardly moves an amount says nothing of its own.
     """
     places = [s for s in further_sites(model) if not s.name.startswith(AMOUNT) or _moves(seen[s.name])]
     own = {s.name: float(np.ptp(np.quantile(seen[s.name], ENDS))) for s in places}
-    sizes = ((s, own[s.name.replace(LOSS, BALANCE, 1)]) for s in places)
+    sizes = ((s, own[s.name.replace(LOSS, BALANCE, 1).replace(DRAG, BALANCE, 1)]) for s in places)
     return [constant_change(site, size) for site, size in sizes if size > 0]
 
 

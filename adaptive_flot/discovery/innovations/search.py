@@ -166,11 +166,25 @@ class Search:
             if count > 1:
                 best_few = parallel_map(self.settled, ranked[: 2 * BEAM], self.processes)
                 ranked = _distinct([*best_few, *ranked[2 * BEAM :]])
+                found += self.events_alone(ranked[:BEAM])
             found += ranked
             if not ranked or ranked[0].criterion < best.criterion + LEAST_GAIN:
                 break
             beam, best = ranked[:BEAM], ranked[0]
-        return sorted(found, key=lambda e: -worth(e))
+        return sorted(_distinct(found), key=lambda e: -worth(e))
+
+    def events_alone(self, pairs: Sequence[Explanation]) -> list[Explanation]:
+        """The event of each pair with one, without the other effect: its times may be better than those it had alone.
+
+        An event that starts while constants make up for it may rest at a wrong time. A partner of no size then lets it
+        go to the right one, and two effects would be told for one.
+        """
+        found = []
+        for pair in pairs:
+            others = [h for h in pair.hypotheses if h.kind not in EVENTS]
+            if len(pair.hypotheses) == 2 and len(others) == 1:
+                found.append(self.without(pair, others[0]))
+        return [e for e in found if np.isfinite(e.fit.log_likelihood)]
 
     def _further(self, start: Explanation) -> list[Explanation]:
         """The explanation with one more effect, for each that is worth its numbers."""

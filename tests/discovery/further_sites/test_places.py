@@ -119,6 +119,7 @@ def test_a_model_with_further_sites_gives_the_same_run(model: Model) -> None:
 def test_what_has_no_store_or_no_zero_has_no_such_place() -> None:
     names = {s.name for s in further_sites(with_further_sites(oscillator()))}
     assert "rate of position" not in names and "rate of speed" in names  # a position is moved by its speed alone
+    assert "drag on speed" in names and "drag on position" not in names
     assert "loss of temperature" not in {s.name for s in further_sites(with_further_sites(block()))}  # degC
     assert "loss of pressure" in {s.name for s in further_sites(with_further_sites(vessel()))}
 
@@ -143,6 +144,23 @@ def test_a_loss_is_said_as_a_share_by_the_second() -> None:
     """Of a pressure up to 10 bar, 0.02 bar/s at 10 bar is 0.002 of it a second."""
     said = change_in_words(with_further_sites(vessel()), "loss of pressure", 0.02, "", measured=True)
     assert said == "pressure lost 0.2 % of itself every second"
+
+
+def test_a_drag_grows_with_the_square_of_its_state() -> None:
+    """Against Euler's rule: gas that is lost by 0.02 bar/s at 10 bar, and by a quarter of that at 5 bar."""
+    model = with_further_sites(vessel())
+    effect = Effect("drag on pressure", "constant", "shift", {"amplitude": 0.02})
+    extended = model.with_effects([effect])
+    opening, p, expected = np.linspace(0.1, 1.0, 60), 2.0, []
+    for k in range(60):
+        expected.append(p)
+        for _ in range(400 if k + 1 < 60 else 0):
+            p += DT / 400 * (0.05 * opening[k + 1] - 0.015 * np.sqrt(p) - 0.02 * (p / 10.0) ** 2)
+    data = Dataset("any", DT * np.arange(60, dtype=float), DT, opening[:, None], np.zeros((60, 1)))
+    found = RecordSimulator(extended, DT).outputs(data, np.array([2.0]), extended.parameter_values)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=2e-4)
+    said = change_in_words(model, effect.site, 0.02, "", measured=True)
+    assert said == "pressure lost 5e-05 bar/s where it is 0.5 bar, and more with its square"
 
 
 def test_a_capacity_says_what_its_place_says_and_a_heater_does_not() -> None:

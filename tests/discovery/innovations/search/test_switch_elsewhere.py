@@ -10,6 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.hypotheses.cross_validation import model_with
+from adaptive_flot.discovery.hypotheses.families import constant_change
 from adaptive_flot.discovery.innovations.search import Search
 from adaptive_flot.greybox import Dataset
 from benchmarks.other_processes.plants.room_air import DT, make_model
@@ -94,6 +96,20 @@ def test_the_site_of_a_large_event_explains_more_than_one_that_the_regression_pr
     fitted = halved.model_of(best)
     p = fitted.parameters[fitted.index("parameters", event.effect.parameter("amplitude"))]
     assert np.exp(p.value) == pytest.approx(LEFT, abs=0.1)
+
+
+def test_an_event_that_was_found_beside_something_of_no_size_is_fitted_alone(halved: Search) -> None:
+    """With the times that it has there; nothing else is fitted anew."""
+    best = halved.run(halved.base(halved.model.parameter_values))[0]
+    (event,) = best.hypotheses
+    breath = next(s for s in halved.model.sites if s.name == "breath")
+    idle = constant_change(breath, 1.0)
+    p = model_with(halved.model_of(best), idle).parameter_values
+    pair = halved.added(best, idle, p)
+    (alone,) = halved.events_alone([pair, best])
+    assert alone.hypotheses == (event,)
+    assert alone.criterion == pytest.approx(best.criterion, abs=0.5)
+    assert halved.events_alone([halved.without(pair, event)]) == []
 
 
 def test_where_nothing_happens_there_is_no_event_at_any_site() -> None:
