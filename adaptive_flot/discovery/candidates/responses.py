@@ -107,8 +107,8 @@ class Responses:
         z_of, value_of = model.ode.map(len(record)), model.site_values.map(len(record))
         arguments = record.time, self.states.T, record.inputs.T, p
         _, _, s, z = z_of(*arguments)
-        values = np.array(value_of(*arguments, z))
-        signals = np.array(s)
+        # states between nodes are drawn, and at a kink there may be no algebraic variables that belong to them
+        values, signals = (_filled(np.array(each)) for each in (value_of(*arguments, z), s))
         table = {q.name: record.inputs[:, j] for j, q in enumerate(model.inputs)}
         table |= {q.name: self.states[:, j] for j, q in enumerate(model.states)}
         table |= {q.name: signals[j] for j, q in enumerate(model.signals)}
@@ -239,3 +239,13 @@ class Responses:
         a, b = (x / np.maximum(np.linalg.norm(x, axis=0), 1e-300) for x in (a, b))
         alike = np.abs(a.T @ b).max(axis=1)
         return tuple(s for s, c in zip(self.sites, alike, strict=True) if c > 1 - 1e-6)
+
+
+def _filled(series: FloatArray) -> FloatArray:
+    """Series (k, N) in which what is not finite is drawn between its neighbours; a row without any stays as it is."""
+    filled, rows = series.copy(), np.arange(series.shape[1])
+    for own in filled:
+        there = np.isfinite(own)
+        if there.any() and not there.all():
+            own[~there] = np.interp(rows[~there], rows[there], own[there])
+    return filled
