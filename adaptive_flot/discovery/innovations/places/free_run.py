@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
-from adaptive_flot.discovery.candidates.catalogue import nameable
+from adaptive_flot.discovery.candidates.catalogue import nameable, passed_on
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.parallel import parallel_map
@@ -39,7 +39,8 @@ def compare_with_what_has_no_site(state: State) -> State:
     large one takes too long.
     """
     problem, result = state.searched
-    judged = state.judged if state.sentence else with_twins(result.base.model, state.judged)
+    model = result.base.model
+    judged = state.judged if state.sentence else or_the_part_itself(model, with_twins(model, state.judged))
     state = state if judged is state.judged else replace(state, judgement=judged)
     best = judged.best
     told = judged.word in WITH_A_NAME and not state.contradiction and not state.sentence
@@ -70,6 +71,30 @@ def compare_with_what_has_no_site(state: State) -> State:
         return replace(state, judgement=replace(judged, word="abstain", members=()))
     judged = replace(judged, word="class", members=(*members, *first.names), beside=words[0])
     return replace(state, judgement=judged)
+
+
+def or_the_part_itself(model: Model, judged: Judgement) -> Judgement:
+    """The judgement; a class with an actuator where what depends on its input does the same as its own curve would.
+
+    A doser at its limit gives less where much is asked. A demand of the water that grows with the dose is the same.
+
+    Parameters
+    ----------
+    model
+        The model as it is.
+    judged
+        What a free run tells.
+    """
+    best = judged.best
+    if judged.word not in WITH_A_NAME or best is None or len(best.names) != 1 or judged.part:
+        return judged
+    (effect,), told = best.effects, judged.members or best.names
+    asked = passed_on(model)
+    parts = [s.name for s in twins(model, effect) if s.role == "actuator" and asked.get(s.name) == effect.driver]
+    further = [(part, "own_value") for part in parts if all(site != part for site, _ in told)]
+    if not further or len(told) + len(further) > LARGEST_CLASS:
+        return judged if not further else replace(judged, word="abstain", members=())
+    return replace(judged, word="class", members=(*told, *further))
 
 
 def with_twins(model: Model, judged: Judgement) -> Judgement:

@@ -130,7 +130,7 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     sets = [a for a in (judgement.best, *judgement.rivals) if judgement.near(a)]
     if judgement.part or all(len(a.names) == 1 for a in sets):
         alone = {a.names[0]: words_alone(a) for a in reversed(sets) if len(a.names) == 1}
-        each = [alone.get(name, " by ".join(name)) for name in judgement.members]
+        each = [alone.get(name) or _of_name(*name) for name in judgement.members]
         if judgement.beside:
             each[-1] = f"as if {judgement.beside}, and {NO_SITE}"
         members = "; or ".join(each)
@@ -156,6 +156,11 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         listed = "; ".join(r or "nothing more" for r in rest)
         words.append(f"This record can not tell these apart, of which the first is kept: {listed}.")
     return " ".join(words)
+
+
+def _of_name(site: str, driver: str) -> str:
+    """A member of a class that has no fit of its own, in words."""
+    return f"{spaced(site)} gives another amount than is asked" if driver == "own_value" else f"{site} by {driver}"
 
 
 def beside_a_part(judgement: Judgement) -> str:

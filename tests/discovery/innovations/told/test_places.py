@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.innovations.places.free_run import with_twins
+from adaptive_flot.discovery.innovations.places.free_run import or_the_part_itself, with_twins
 from adaptive_flot.discovery.results import Alternative, Judgement
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import Effect, Mode
+from benchmarks.other_processes.plants.dosing import make_model as basin
 from tests.discovery.whole_records.test_hardening_spring import oscillator
 
 KNOTS = {"knots": (-0.1, 0.1)}
@@ -45,3 +46,21 @@ def test_what_depends_on_the_same_beside_it_is_not_told() -> None:
 @pytest.mark.parametrize("effects", [(BENT,), (LATE, GAUGE)])
 def test_one_effect_has_been_searched_at_all_sites_and_a_sensor_has_no_twin(effects: tuple[Effect, ...]) -> None:
     assert told(*effects).word == "named"
+
+
+@pytest.mark.parametrize(("site", "driver", "is_class"), [
+    ("demand", "dose", True), ("demand", "flow", False), ("decay", "dose", False), ("doser", "own_value", False),
+])  # fmt: skip
+def test_what_depends_on_what_is_asked_of_an_actuator_may_be_the_actuator(
+    site: str, driver: str, is_class: bool
+) -> None:
+    """A doser at its limit was told as a demand of the water that grows with the dose: both enter one balance."""
+    form = "saturation" if driver == "own_value" else "curve"
+    mode: Mode | None = None if driver == "own_value" else "offset" if site == "demand" else "factor"
+    settings = {"width": 0.1} if driver == "own_value" else {"knots": (10.0, 60.0)}
+    effect = Effect(site, "saturation" if driver == "own_value" else driver, form, settings=settings, mode=mode)
+    fit: Any = SimpleNamespace(model=basin().with_effects([effect]), bic=0.0)
+    best = Alternative(((effect.site, effect.driver),), (True,), fit, 100.0, -100.0)
+    found = or_the_part_itself(basin(), Judgement("named", best, (), (), 10.0))
+    assert found.word == ("class" if is_class else "named")
+    assert found.members == ((("demand", "dose"), ("doser", "own_value")) if is_class else ())
