@@ -147,7 +147,8 @@ def _best(scorer: Scorer, score: Score, pairs: Sequence[Thresholds], rows: float
     one = int(np.argmax(gains))
     found = _Found(kept[one], rows, 0.0, float(levels[one]), float(gains[one]), float(gains[one]) - numbers * price)
     own, level = _gains(constant, scorer.residual)
-    if not own[0] > price:  # what is free already takes a constant up, or there is none
+    turns = any(v.effect.family.turns for v in score.candidate.variants)  # two levels would draw that, and no better
+    if turns or not own[0] > price:  # what is free already takes a constant up, or there is none
         return found
     base = constant / np.linalg.norm(constant)
     beside, more = _gains(X - base @ (base.T @ X), scorer.residual - base[:, 0] * float(base[:, 0] @ scorer.residual))

@@ -35,7 +35,7 @@ SLOW_S, SLOW_ROWS = 120.0, 50
 there to follow. Over fewer rows a record can not tell it from a step."""
 LARGE = 0.4
 """Change of a logarithm (a factor of 1.5) beyond any drift that adaptation is known to follow: a quarter."""
-SUDDEN = 0.03
+SUDDEN = 0.1
 """Share of the record up to which a ramp or a washout may as well be a step."""
 TAKES, SETTLES = 0.06, 3.0
 """Share of the record that an event around a step takes at first, and time constants after which it is over."""

@@ -75,11 +75,21 @@ def with_kinks(curves: list[FittedJob], scorers: Sequence[Scorer]) -> list[Job]:
 
 
 def ramps_and_washouts(refit: Refit, followers: list[FittedJob]) -> list[FittedJob]:
-    """Ramps and washouts of names near the best as each other, where the one came further than the other.
+    """Ramps and washouts of names near the best as each other, where the one came much further than the other.
 
     Each started where a curve with few knots drew it. From there an onset may have run away.
     """
-    return refit.run([job for fitted in best_of_each(near(followers)) for job in ramp_or_washout(fitted)])
+
+    def reached(name: tuple[tuple[str, str], ...], form: str) -> float:
+        there = (f for f in followers if f.alternative.names == name and f.alternative.effects[-1].form == form)
+        return max((f.alternative.gain for f in there), default=0.0)
+
+    jobs = []
+    for fitted in best_of_each(near(followers)):
+        for job in ramp_or_washout(fitted):
+            other = reached(fitted.alternative.names, job.score.variant.effect.form)
+            jobs += [job] if other < CLOSE_GAIN * fitted.alternative.gain else []
+    return refit.run(jobs)
 
 
 def ramp_or_washout(fitted: FittedJob) -> list[Job]:
@@ -95,9 +105,9 @@ def steps(refit: Refit, followers: list[FittedJob], last: list[FittedJob]) -> li
 
 
 def step(fitted: FittedJob, span: float) -> list[Job]:
-    """A step where a fitted event is over at once; `span` is the length of the record [s]."""
+    """A step where a fitted event is over soon, from where it stands; `span` is the length of the record [s]."""
     score = step_score(fitted.score, fitted.alternative.effects[-1], span)
-    return [Job(fitted.linearisation, score)] if score else []
+    return [Job(fitted.linearisation, score, fitted.alternative.fit, drawn=True)] if score else []
 
 
 def slower(refit: Refit, best: list[FittedJob]) -> list[FittedJob]:

@@ -71,8 +71,9 @@ def _switches(refit: Refit, names: set[tuple[str, str]]) -> list[Job]:
 
 def first_forms(linearisation: ScoredLinearisation, score: Score) -> list[Score]:
     """The forms of the first rung: the best one, for what depends on time its curve too, and what a switch replaced."""
-    if score.variant.effect.family.memory:
-        return [score, *linearisation.scorer.variant_scores(score.candidate)[:1]]
+    if score.variant.effect.family.memory:  # what turns with a sign looks like a switch at it
+        best, *others = linearisation.scorer.variant_scores(score.candidate)
+        return [score, best, *(s for s in others if _turns(s))]
     if score.candidate.driver != "time":  # to first order a curve bends towards any turn
         return [score, *(s for s in linearisation.scorer.variant_scores(score.candidate) if _turns(s) and s != score)]
     curves = [s for s in linearisation.scorer.variant_scores(score.candidate) if s.variant.effect.family.is_curve][:1]
