@@ -112,9 +112,9 @@ def held_score(responses: Responses, plain: Fit, score: Score) -> Score | None:
     answers = responses.of([TimeProfile(site, np.ones(len(value)), True)])[:, :, 0]
     strength = np.nanmedian(np.abs(answers) / problem.weights, axis=0)
     j = int(np.argmax(strength))
-    if not strength[j] > 0:
-        return None
     own = float(np.median(answers[:, j]))
+    if not strength[j] > 0 or not own:
+        return None
     residual = without_spikes(plain.residual(problem) / problem.weights)[:, j]
     counted = np.isfinite(residual) & problem.rows("estimate")
     shown = value + np.nan_to_num(residual) * problem.weights[:, j] / own

@@ -89,11 +89,16 @@ def or_the_part_itself(model: Model, judged: Judgement) -> Judgement:
     if judged.word not in WITH_A_NAME or best is None or len(best.names) != 1 or judged.part:
         return judged
     (effect,), told = best.effects, judged.members or best.names
-    asked = passed_on(model)
-    parts = [s.name for s in twins(model, effect) if s.role == "actuator" and asked.get(s.name) == effect.driver]
-    further = [(part, "own_value") for part in parts if all(site != part for site, _ in told)]
-    if not further or len(told) + len(further) > LARGEST_CLASS:
-        return judged if not further else replace(judged, word="abstain", members=())
+    asked, sites = passed_on(model), {site for site, _ in told}
+    acting = [s.name for s in model.sites if s.role == "actuator" and asked.get(s.name) == effect.driver]
+    if sites.issuperset(acting):  # nothing is worked out for what depends on no actuator's input
+        return judged
+    alike = {s.name for s in twins(model, effect)}
+    further = [(part, "own_value") for part in acting if part in alike and part not in sites]
+    if not further:
+        return judged
+    if len(told) + len(further) > LARGEST_CLASS:
+        return replace(judged, word="abstain", members=())
     return replace(judged, word="class", members=(*told, *further))
 
 
