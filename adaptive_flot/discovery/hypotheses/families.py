@@ -15,12 +15,14 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
 Kind = Literal[
-    "switch", "ramp", "periodic", "stuck", "leaks", "gain", "offset", "span", "range", "sign", "lag", "hysteresis",
-    "dead zone", "depends", "turns", "store", "alternative",
+    "switch", "ramp", "periodic", "stuck", "stuck for a time", "leaks", "gain", "offset", "span", "range", "sign",
+    "lag", "hysteresis", "dead zone", "depends", "turns", "store", "alternative",
 ]  # fmt: skip
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""
-EVENTS = ("switch", "ramp")
+SWITCHED = ("switch", "stuck for a time")
+"""What is there between times, at once."""
+EVENTS = (*SWITCHED, "ramp")
 """What begins at some time."""
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Levels at which a part may be stuck or leak, as shares of the range that its signal has been seen in."""
@@ -110,7 +112,7 @@ class Hypothesis:
         """When an event is there and for how long [s], FOREVER where it stays; none of anything else."""
         if self.kind == "ramp":
             return ((self.effect.coefficients["onset"], FOREVER),)
-        told = self.effect.coefficients if self.kind == "switch" else {}
+        told = self.effect.coefficients if self.kind in SWITCHED else {}
         return tuple((told[c], told[c.replace("on_", "for_")]) for c in told if c.startswith("on_"))
 
     @property

@@ -8,6 +8,7 @@ Map
 linear_response.py  How the innovations answer to what happens at a site.
 courses.py          What each family would change at a site along a record.
 switching.py        When something was switched on and off.
+halting.py          When a part did not follow what it was asked.
 screening.py        Which further effects are worth a refit.
 noise_fit.py        How large process and measurement noise are.
 refit.py            A model with effects, fitted.

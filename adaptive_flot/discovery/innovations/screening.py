@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis, constant_change
+from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, MATTERS, Hypothesis, constant_change
+from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
+from adaptive_flot.discovery.innovations.halting import MOST_EDGES as HALTS
+from adaptive_flot.discovery.innovations.halting import Halt, best_halt
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
 from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -83,6 +87,7 @@ class Screening:
         found = [x for site, group in by_site.items() for x in self._regressions(site, group)]
         if events:
             found += [x for site in self.model.sites if (x := self.switch(site)) is not None]
+            found += [x for site in self.model.sites if (x := self.halt(site)) is not None]
             found += [x for site in self.model.sites for x in self._swings(site)]
         if ramps:
             found += [x for site in self.model.sites if (x := self.ramp(site)) is not None]
@@ -116,16 +121,13 @@ class Screening:
         if by is None:
             return None
         late = {s.name: _late(s, record.dt) for s in self.model.sites}
-        told = dict(switch.effect.coefficients)
-        lengths = {name: told[name.replace("on_", "for_")] for name in told if name.startswith("on_")}
+        pulses = [(on + late[site.name] - late[switch.site], length) for on, length in switch.pulses]
         mask = np.zeros(len(by), dtype=bool)
-        for name, length in lengths.items():
-            told[name] += late[site.name] - late[switch.site]
-            mask |= (record.time[1:] > told[name]) & (record.time[1:] <= told[name] + length)
-        numbers = sum(1 + (length < FOREVER) for length in lengths.values())
-        effect = replace(switch.effect, site=site.name, coefficients=told, mode=mode)
-        hypothesis = Hypothesis(site.name, "time", "switch", effect, switch.free, ({},))
-        suspect = Suspect(hypothesis, (by * mask)[:, None], switch.free, numbers)
+        for on, length in pulses:
+            mask |= (record.time[1:] > on) & (record.time[1:] <= on + length)
+        numbers = sum(1 + (length < FOREVER) for _, length in pulses)
+        hypothesis = switch_at(site, mode, pulses, record.dt)
+        suspect = Suspect(hypothesis, (by * mask)[:, None], hypothesis.free, numbers)
         return next(iter(self._regressions(site.name, [suspect])), None)
 
     def _course(self, site: Site, mode: Mode) -> FloatArray | None:
@@ -147,10 +149,48 @@ class Screening:
         if switch is None or not self._is_sharp(site.name, by, switch):
             return None
         numbers = sum(1 + (b < count) for _, b in switch.pulses)
-        effect = _switch_effect(site, mode, switch, record.time, record.dt)
-        hypothesis = Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))
-        suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], ("amplitude",), numbers)
+        pulses = [_pulse(site, record, a, b) for a, b in switch.pulses]
+        hypothesis = switch_at(site, mode, pulses, record.dt)
+        suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], hypothesis.free, numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
+
+    def halt(self, site: Site) -> Screened | None:
+        """The best time for which an actuator or sensor stays at a level; None where a constant change does as well."""
+        v, count = self._values[site.name], len(self._response.record) - 1
+        spread = float(np.ptp(v))
+        if site.role not in ("actuator", "sensor") or not spread > LEAST_MOVE * ordinary_size(v):
+            return None
+        apart = max(1, -(-count // HALTS))
+        found = self._best_halt(site, v, np.arange(1, count - 1, apart))
+        if found is not None and apart > 1:
+            near = np.array([e for e in (found.begin, found.end) if e < count])[:, None] + np.arange(1 - apart, apart)
+            again = self._best_halt(site, v, np.unique(near[(near > 0) & (near < count - 1)]))
+            found = again if again is not None and again.gain > found.gain else found
+        if found is None or found.beyond < SHARP + float(np.log(self._count)) / 2:
+            return None
+        on, length = _pulse(site, self._response.record, found.begin, found.end)
+        told = {"amplitude": 1.0, "level": found.level, "on_1": on, "for_1": length}
+        effect = Effect(site.name, "time", "stuck_while", told, {"width": EDGE * self._response.record.dt})
+        limits = {"level": self._levels(site)} if site.role == "actuator" else {}
+        scales = {"level": MATTERS * spread}
+        hypothesis = Hypothesis(site.name, "time", "stuck for a time", effect, ("level",), ({},), limits, scales)
+        stands = (np.arange(count) >= found.begin) & (np.arange(count) < found.end)
+        suspect = Suspect(hypothesis, ((found.level - v) * stands)[:, None], (), 2 + (length < FOREVER))
+        return Screened(suspect, np.empty(0), found.gain - self._charge(suspect))
+
+    def _levels(self, site: Site) -> tuple[float, float]:
+        """Where a part may stand: an actuator within its range as seen, a sensor anywhere."""
+        v = self._values[site.name]
+        return (float(v.min()), float(v.max())) if site.role == "actuator" else (-np.inf, np.inf)
+
+    def _best_halt(self, site: Site, v: FloatArray, edges: IntArray) -> Halt | None:
+        count = len(v)
+        after = np.arange(count)[:, None] >= edges[None, :]
+        steps = (after * v[:, None], after.astype(float))
+        responses = tuple(self._rest(self._response.respond(site.name, s)) for s in steps)
+        if not all(np.isfinite(r).all() for r in responses):
+            return None
+        return best_halt(responses, edges, self._left, count, self._count, self._levels(site))  # type: ignore[arg-type]
 
     def constant(self, site: Site) -> list[Screened]:
         """A constant change in the way of a site, whatever it gains; none where the record says nothing of the site."""
@@ -255,11 +295,18 @@ def _late(site: Site, dt: float) -> float:
     return dt / 2 if site.role == "sensor" else 0.0
 
 
-def _switch_effect(site: Site, mode: Mode, switch: Switch, time: FloatArray, dt: float) -> Effect:
-    late = _late(site, dt)
-    coefficients: dict[str, float] = {"amplitude": 0.0}
-    for k, (a, b) in enumerate(switch.pulses, 1):
-        coefficients[f"on_{k}"] = float(time[a] + late)
-        coefficients[f"for_{k}"] = float(time[b] - time[a]) if b < len(time) - 1 else FOREVER
-    settings = {"count": float(len(switch.pulses)), "width": EDGE * dt}
-    return Effect(site.name, "time", "switch", coefficients, settings, mode=mode)
+def _pulse(site: Site, record: Dataset, begin: int, end: int) -> tuple[float, float]:
+    """When an event of some intervals begins [s], and how long it is there [s]: FOREVER where it lasts to the end."""
+    time = record.time
+    lasts = end >= len(time) - 1
+    return float(time[begin] + _late(site, record.dt)), FOREVER if lasts else float(time[end] - time[begin])
+
+
+def switch_at(site: Site, mode: Mode, pulses: Sequence[tuple[float, float]], dt: float) -> Hypothesis:
+    """A switch whose size is free, from its times and durations [s]."""
+    told = {"amplitude": 0.0}
+    for k, (on, length) in enumerate(pulses, 1):
+        told |= {f"on_{k}": on, f"for_{k}": length}
+    settings = {"count": float(len(pulses)), "width": EDGE * dt}
+    effect = Effect(site.name, "time", "switch", told, settings, mode=mode)
+    return Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))

@@ -14,7 +14,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis, Kind
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, SWITCHED, Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.refit import Refit, Refitter
@@ -198,7 +198,7 @@ class Search:
             constant = [s for s in beside if s.suspect.hypothesis.kind in CONSTANT and s.gain >= LEAST_GAIN]
             spread = [s for s in _spread(beside) if not any(s is c for c in constant)]
             refits += self.all_with(start, [*spread, *constant], held)
-        switched = [e for e in refits if e.hypotheses[-1].kind == "switch"]
+        switched = [e for e in refits if e.hypotheses[-1].kind in SWITCHED]
         if switched:
             switch = max(switched, key=lambda e: e.criterion).hypotheses[-1]
             there = [s for site in self.model.sites for s in screening.at_times_of(switch, site)]
@@ -244,12 +244,13 @@ class Search:
 
     def settled(self, explanation: Explanation) -> Explanation:
         """The same, its switch placed anew beside the other effects, where that is better."""
-        switch = next((h for h in explanation.hypotheses if h.kind == "switch"), None)
+        switch = next((h for h in explanation.hypotheses if h.kind in SWITCHED), None)
         if switch is None or len(explanation.hypotheses) < 2:
             return explanation
         without = self.without(explanation, switch)
         site = next(s for s in self.model.sites if s.name == switch.site)
-        placed = self.screening(without, [site.name]).switch(site)
+        screening = self.screening(without, [site.name])
+        placed = screening.switch(site) if switch.kind == "switch" else screening.halt(site)
         again = self._with(without, placed) if placed is not None else None
         return again if again is not None and again.criterion > explanation.criterion else explanation
 

@@ -22,7 +22,12 @@ from adaptive_flot.discovery.verdict.words.curve import EffectCurve, effect_curv
 from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
 from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.discovery.verdict.words.thresholds import with_ranges
-from adaptive_flot.discovery.verdict.words.wording import beside_words, drift_words, reason_words
+from adaptive_flot.discovery.verdict.words.wording import (
+    beside_words,
+    drift_words,
+    reason_words,
+    still_wrong_or_wandering,
+)
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.stretches import LONGEST_IS_USED
 from adaptive_flot.greybox.effects import Effect
@@ -89,8 +94,8 @@ def conclude(state: State) -> Verdict:
 
 def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
     """The verdict in one paragraph: in the words of the innovations form where that has decided."""
+    wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
     if not state.sentence:
-        wrong = [c.output for c in state.error if c.after > STILL_WRONG * c.noise]
         told = words_of_effects(state.told.model, effects, _curves(state, effects)) if effects else ""
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
         likelier = beside_words(state.likelihood, much_better(state.error))
@@ -98,7 +103,8 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         return " ".join(filter(None, (said, likelier, state.certain, state.background, part)))
     errors = ", ".join(c.words for c in state.error)
     told = f"{state.sentence} Error of the free run on held-out rows: {errors}."
-    return " ".join(filter(None, (told, state.certain, _part_of_record(state.screening.notes))))
+    left = still_wrong_or_wandering(wrong) if state.judged.word in TELLING else ""
+    return " ".join(filter(None, (told, left, state.certain, _part_of_record(state.screening.notes))))
 
 
 def _part_of_record(notes: Sequence[str]) -> str:

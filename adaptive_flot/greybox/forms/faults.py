@@ -30,6 +30,14 @@ def _stuck(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> 
     return value + c["amplitude"] * (c["level"] - value)
 
 
+def _stuck_while(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    """V + a q (level - v), q = 1 from `on_1` on for `for_1`, else 0, its edges rounded over `width`."""
+    del m
+    width = number(s, "width")
+    begun, over = (1 + ca.tanh((driver - t) / (2 * width)) for t in (c["on_1"], c["on_1"] + c["for_1"]))
+    return value + c["amplitude"] * (begun - over) / 2 * (c["level"] - value)
+
+
 def _leak(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     """V + a (max(v, level) - v), the maximum rounded over `width`."""
     del m, driver
@@ -101,6 +109,23 @@ FAULT_FORMS: tuple[Form, ...] = (
         ("own_value",),
         {},
         direct=_stuck,
+    ),
+    Form(
+        "stuck_while",
+        "the value stays where it is for a time, whatever is asked",
+        FormKind.EVENT,
+        fixed(
+            BLEND,
+            Coefficient("level", CoefficientRole.POSITION, 0.0, scale=1.0, unit="value"),
+            Coefficient("on_1", CoefficientRole.ONSET, 0.0, scale=60.0, unit="s"),
+            Coefficient("for_1", CoefficientRole.DURATION, 3600.0, 0.0, scale=60.0, unit="s"),
+        ),
+        ("time",),
+        {"width": 2.0},
+        {"width": "s"},
+        direct=_stuck_while,
+        abrupt=True,
+        passes=True,
     ),
     Form(
         "leak",

@@ -38,7 +38,7 @@ def score_map(scores: Sequence[Score], chosen: Sequence[tuple[str, str]] = ()) -
 
 
 def curve_chart(c: EffectCurve) -> Chart:
-    """An effect over its driver with its 95 % band, and below how often the record was there."""
+    """An effect over its driver with its 95 % band, and below how often the record was there, where it is not time."""
     power = exponent(c.driver)
     x, seen = c.driver * 10.0**-power, c.seen * 10.0**-power
     unit = c.unit or "-"
@@ -47,11 +47,10 @@ def curve_chart(c: EffectCurve) -> Chart:
     effect = [was, Trace(risen, x, c.change, Role.ESTIMATE, std=(c.high - c.low) / 4)]
     if c.falling is not None:
         effect.append(Trace("while it falls", x, c.falling, Role.ESTIMATE, BACK))
-    counts, edges = np.histogram(seen, bins=BINS, range=(float(x[0]), float(x[-1])))
-    rows = Trace("rows", edges, np.concatenate([counts[:1], counts]).astype(float), Role.ESTIMATE, GREY, held=True)
     what = "factor on" if c.relative else "added to"
-    panels = (
-        Panel(f"{what} {spaced(c.effect.site)}", unit, tuple(effect), height=1.6),
-        Panel("rows of the record", "-", (rows,), height=0.6),
-    )
-    return Chart(panels, x_label=spaced(c.effect.driver), x_unit=unit_text(c.driver_unit or "-", power))
+    panels = [Panel(f"{what} {spaced(c.effect.site)}", unit, tuple(effect), height=1.6)]
+    if c.effect.driver != "time":  # rows are where they are in time
+        counts, edges = np.histogram(seen, bins=BINS, range=(float(x[0]), float(x[-1])))
+        rows = Trace("rows", edges, np.concatenate([counts[:1], counts]).astype(float), Role.ESTIMATE, GREY, held=True)
+        panels.append(Panel("rows of the record", "-", (rows,), height=0.6))
+    return Chart(tuple(panels), x_label=spaced(c.effect.driver), x_unit=unit_text(c.driver_unit or "-", power))

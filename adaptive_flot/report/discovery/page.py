@@ -179,10 +179,9 @@ def _curve_pictures(discovery: Discovery, problem: Problem, after: Fit, album: A
         return []
     told = "the effect" if discovery.verdict.effects else "the best alternative, which the verdict does not tell"
     names = capital(tables.effect_text([(c.effect.site, c.effect.driver) for c in curves]))
-    caption = (
-        f"{names}: {told}, over what the record covers, with the 95 % band from the covariance of the fit. Below: how "
-        "often the record was there."
-    )
+    caption = f"{names}: {told}, over what the record covers, with the 95 % band from the covariance of the fit."
+    if any(c.effect.driver != "time" for c in curves):
+        caption += " Below: how often the record was there."
     if any(c.bend_only for c in curves):
         caption += (
             " Only how it bends away from a straight line through the middle of the record is shown: a straight part "

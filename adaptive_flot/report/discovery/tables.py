@@ -44,26 +44,30 @@ def error_table(discovery: Discovery) -> Table:
 
 
 def coefficient_table(discovery: Discovery) -> Table:
-    """Coefficients of the effects that the verdict tells, with their intervals."""
-    rows = []
-    for named in discovery.verdict.effects:
-        units = discovery.model.effect_units(named.effect)
+    """Coefficients of the effects that the verdict tells, with their intervals.
+
+    A single effect and its form stand in the caption, so that the rest fits on a phone.
+    """
+    rows, effects = [], [named.effect for named in discovery.verdict.effects]
+    texts = [effect_text([(e.site, e.driver)]) for e in effects]
+    for named, text in zip(discovery.verdict.effects, texts, strict=True):
+        units, first = discovery.model.effect_units(named.effect), (text,) if len(texts) > 1 else ()
         if len(named.effect.coefficients) > MOST_COEFFICIENTS:
-            site, count = effect_text([(named.effect.site, named.effect.driver)]), len(named.effect.coefficients)
-            rows.append((site, named.effect.form, f"{count} values at knots", "–", "see figure", "see figure"))
+            count = len(named.effect.coefficients)
+            rows.append((*first, f"{count} values at knots", "–", "see figure", "see figure"))
             continue
         for name, value in named.effect.coefficients.items():
             low, high = named.interval95.get(name, (np.nan, np.nan))
             interval = "held" if np.isnan(low) else f"{number(low, '.4g')} to {number(high, '.4g')}"
-            site = effect_text([(named.effect.site, named.effect.driver)])
-            unit = unit_text(units.get(name) or "-")
-            rows.append((site, named.effect.form, spaced(name), unit, number(value, ".4g"), interval))
+            rows.append((*first, spaced(name), unit_text(units.get(name) or "-"), number(value, ".4g"), interval))
     by = "with process noise, on all rows" if discovery.by_process_noise else "on the estimation and confirm splits"
+    forms = ", ".join(f"{text} (form {e.form})" for text, e in zip(texts, effects, strict=True))
     caption = (
-        f"Coefficients of the effect, fitted {by}. A factor form multiplies its site by "
+        f"Coefficients of {forms}, fitted {by}. A factor form multiplies its site by "
         "exp(g); coefficients of g are logarithms of that factor."
     )
-    return Table(caption, ("Effect", "Form", "Coefficient", "Unit", "Value", "95 % interval"), tuple(rows), words=4)
+    header = (*(("Effect",) if len(texts) > 1 else ()), "Coefficient", "Unit", "Value", "95 % interval")
+    return Table(caption, header, tuple(rows), words=len(header) - 2)
 
 
 def alternative_table(discovery: Discovery) -> Table:

@@ -12,8 +12,17 @@ DT = 15.0
 LIDS = ((1000.0, 1150.0), (2000.0, 2090.0), (3000.0, 3120.0))
 
 
-def record(lids: Sequence[tuple[float, float]] = LIDS, rows: int = 260, seed: int = 0, zero: float = 0.0) -> Dataset:
-    """Temperature of the air while the heater is stepped; the loss is four times as large while the lid is open."""
+def record(
+    lids: Sequence[tuple[float, float]] = LIDS,
+    rows: int = 260,
+    seed: int = 0,
+    zero: float = 0.0,
+    stuck: tuple[float, float, float] | None = None,
+) -> Dataset:
+    """Temperature of the air while the heater is stepped; the loss is four times as large while the lid is open.
+
+    The heater is `stuck` between two times [s] at a power [W].
+    """
     rng = np.random.default_rng(seed)
     power: list[float] = []
     while len(power) < rows:
@@ -27,7 +36,8 @@ def record(lids: Sequence[tuple[float, float]] = LIDS, rows: int = 260, seed: in
             room += h * (22.0 - room) / 3000.0 + 0.02 * np.sqrt(h / 60.0) * rng.normal()
             open_lid = any(a <= t < b for a, b in lids)
             flow = 3.0 * (air - wall)
-            air += h * (u[k + 1] - 0.8 * (air - room) * (4.0 if open_lid else 1.0) - flow) / 400.0
+            power_on = stuck[2] if stuck and stuck[0] <= t < stuck[1] else u[k + 1]
+            air += h * (power_on - 0.8 * (air - room) * (4.0 if open_lid else 1.0) - flow) / 400.0
             wall += h * (flow - 0.2 * (wall - room)) / 2500.0
     y += 0.03 * rng.normal(size=rows) + zero
     return Dataset("box", DT * np.arange(rows, dtype=float), DT, u[:, None], y[:, None])

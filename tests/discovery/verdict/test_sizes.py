@@ -130,4 +130,4 @@ def test_the_values_of_a_course_have_one_line_in_the_table_of_coefficients(draug
     values = {f"value_{k + 1}": 0.1 for k in range(96)}
     wanders = NamedEffect(Effect("heat_loss", "time", "polyline", values, {"knots": knots}), "", {}, ())
     table = coefficient_table(replace(draught, verdict=replace(draught.verdict, effects=(wanders,))))
-    assert [row[2] for row in table.rows] == ["96 values at knots"]
+    assert [row[0] for row in table.rows] == ["96 values at knots"]

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.verification import AT_NOISE
 from adaptive_flot.discovery.candidates.catalogue import nameable
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
@@ -230,6 +231,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         told = with_what_stood_beside(both, told)
         judgement = _judgement(state, told, best)
     _, result = state.searched
+    left = any(c.after > AT_NOISE * s for c, s in zip(error, noise, strict=True) if s > 0)
     members = [e for e, _ in told.open]
     rivals = others(told.best, members, lambda e: _free_run(state, search, e, before), before)
     # members are near by what the innovations form has compared, whatever the difference of their criteria
@@ -241,7 +243,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
         sizes=after.with_sizes(*search.sizes(told.best)),
         error=error,
         contradiction="",
-        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside else "",
+        certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside and left else "",
         sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
     )
 

@@ -94,6 +94,7 @@ def effect_curves(problem: Problem, fit: Fit, count: int) -> tuple[EffectCurve, 
 def _has_curve(fit: Fit, effect: Effect) -> bool:
     remembers = any(q.name.startswith(f"{effect.label}.") for q in fit.model.states)
     without_driver = effect.driver in ("constant", "lag", "delay", "saturation", "own_value")
+    without_driver |= effect.driver == "time" and effect.family.direct is not None  # what it adds follows what is asked
     return not without_driver and (effect.family.memory is not None or not remembers)
 
 

@@ -62,6 +62,10 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     elif effect.driver == "saturation":
         (limit,) = effect.values(CoefficientRole.LIMIT)
         said = f"{name} does not go beyond {limit:.3g}{_unit(site)}"
+    elif effect.family.is_event and (level := effect.values(CoefficientRole.POSITION)):
+        (begin,), (long,) = effect.values(CoefficientRole.ONSET), effect.values(CoefficientRole.DURATION)
+        verb, asked = ("showed", "") if site.role == "sensor" else ("stayed at", ", whatever was asked")
+        said = f"{name} {verb} {level[0]:.3g}{_unit(site)} from {clock(begin)} s to {clock(begin + long)} s{asked}"
     elif curve is not None and effect.family.is_event and _ends(effect) > curve.driver[-1]:
         # what has happened until then is told, without the interval of all that would
         return f"{name} {_until_the_end(site, curve)}" + (f" ({told.meaning})" if told.meaning else "")

@@ -109,6 +109,12 @@ def _still_wrong(wrong: Sequence[str]) -> str:
     return f" Still far above the noise: {', '.join(map(spaced, wrong))}." if wrong else ""
 
 
+def still_wrong_or_wandering(wrong: Sequence[str]) -> str:
+    """The same for a free run beside process noise, whose error what wanders makes larger; empty for none."""
+    said = ", ".join(map(spaced, wrong))
+    return f"Still far above the noise, by what wanders or by a further cause: {said}." if wrong else ""
+
+
 def beside_words(likelihood: float, smaller: bool = False) -> str:
     """Why a name is told although no error on held-out rows is surely smaller; empty without a `likelihood`."""
     if not likelihood:
