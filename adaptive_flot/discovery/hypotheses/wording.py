@@ -48,9 +48,9 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.kind == "stuck for a time":
         ((begin, long),) = h.pulses
         when = f"from {clock(begin)} s on" if long >= FOREVER else f"at {clock(begin)}-{clock(begin + long)} s"
-        return f"{name} {'shows' if site.role == 'sensor' else 'stays at'} {first:.3g}{unit} {when}" + (
-            "" if site.role == "sensor" else ", whatever is asked"
-        )
+        if site.role == "sensor":
+            return f"{name} shows {first:.3g}{unit} and nothing else {when}"
+        return f"{name} stays at {first:.3g}{unit} {when}, whatever is asked"
     if h.kind == "leaks":
         return f"{name} does not go below {first:.3g}{unit}"
     if h.kind == "range":

@@ -3,6 +3,9 @@
 Between the times the value v is replaced by a level L. Both columns of the regression, v and 1 between the times, are
 differences of the responses to steps, so that all pairs of edges are compared through matrices of products, as those of
 a switch are (`switching.py`).
+
+The filter follows a sensor, so that v is what a sensor shows, and nothing tells it from its level. A sensor that has
+stopped is known by what it shows: nothing but noise about one level, for long.
 """
 
 from __future__ import annotations
@@ -20,6 +23,10 @@ LEAST_SHARE = 0.2
 """Share of the change from v to L that a regression must find at least; far from the truth it finds too little."""
 SINGULAR = 1e-6
 """Least determinant of the two columns, as a share of the product of their squares: else v is a constant there."""
+STILL, MOVES = 1.5, 5.0
+"""Spread of a sensor in its noise from row to row, up to which it is still, and from which it has moved otherwise."""
+LONG = 0.03
+"""Share of the rows for which a sensor is still at least."""
 
 
 @dataclass(frozen=True)
@@ -106,3 +113,36 @@ def _pulse_products(G: FloatArray) -> FloatArray:
     diagonal = np.diag(G)
     found: FloatArray = diagonal[:, None] + diagonal[None, :] - G - G.T
     return found
+
+
+def still_stretch(shown: FloatArray, noise: float) -> tuple[int, int, float] | None:
+    """Find the longest stretch in which a sensor that moves otherwise shows nothing but noise about one level.
+
+    Parameters
+    ----------
+    shown
+        What it shows, row by row (n,); NaN where it is missing.
+    noise
+        Its noise from row to row.
+
+    Returns
+    -------
+    tuple or None
+        First row, first row after it, and the level; None where there is none of LONG of the rows.
+    """
+    there = np.flatnonzero(np.isfinite(shown))
+    y = shown[there]
+    least = max(int(LONG * len(shown)), 10)
+    if len(y) < 2 * least or not noise > 0 or not y.std() > MOVES * noise:
+        return None
+    sums, squares = (np.concatenate([[0.0], np.cumsum(x)]) for x in (y - y.mean(), (y - y.mean()) ** 2))
+    best, a = (0, 0), 0
+    for b in range(1, len(y) + 1):
+        # the first row moves up until the rest is still: a stretch within a still one is still, but for chance
+        while (squares[b] - squares[a]) / (b - a) - ((sums[b] - sums[a]) / (b - a)) ** 2 > (STILL * noise) ** 2:
+            a += 1
+        best = max(best, (a, b), key=lambda s: s[1] - s[0])
+    a, b = best
+    if b - a < least:
+        return None
+    return int(there[a]), int(there[b - 1]) + 1, float(np.median(y[a:b]))

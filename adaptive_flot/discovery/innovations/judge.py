@@ -168,14 +168,20 @@ def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Exp
     """An event beside another effect that explains much of the same: it draws what is left of a wrong model.
 
     Nothing else draws an event that is there. So without it most of the gain is lost (OWN). Not so beside a constant
-    error at its site: that and the event are the level before and after.
+    error at its site: that and the event are the level before and after. Nor is it given up where it explains most of
+    it (OWN) alone: it is the other effect, then, that draws what is left.
     """
-    total = best.criterion - base.criterion
+    if len(best.hypotheses) < 2:
+        return ()
+    most = OWN * (best.criterion - base.criterion)
     levels = {h.site for h in best.hypotheses if h.driver == "constant"}
-    beside = [h for h in best.hypotheses if h.site not in levels] if len(best.hypotheses) > 1 else []
-    return tuple(
-        h for h in beside if h.kind in EVENTS and best.criterion - without[h.label].criterion < OWN * total
-    )  # fmt: skip
+    events = [h for h in best.hypotheses if h.kind in EVENTS and h.site not in levels]
+
+    def is_needed(event: Hypothesis) -> bool:
+        alone = max(without[h.label].criterion for h in best.hypotheses if h is not event)
+        return best.criterion - without[event.label].criterion >= most or alone - base.criterion >= most
+
+    return tuple(h for h in events if not is_needed(h))
 
 
 def _follows_an_input(search: Search, event: Hypothesis) -> bool:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray, noise_floor
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
@@ -170,6 +170,17 @@ class LinearResponse:
         moved = linear_run((self._A, self._B, self._H, self._h), start, source, course, as_machine_code=True)
         moved *= self._weight[:, :, None]
         return moved.reshape(self._weight.size, len(source))
+
+    def shown_by(self, site: str) -> tuple[FloatArray, float] | None:
+        """What the output shows that changes one to one with a sensor (N,), and its noise from row to row.
+
+        None where there is no such output.
+        """
+        own = self._h[:, :, self._functions.sites.index(site)]
+        shown = [c for j, c in enumerate(self._functions.columns) if np.allclose(own[:, j], 1.0)]
+        if len(shown) != 1:
+            return None
+        return self.record.outputs[:, shown[0]], float(noise_floor([self.record], shown)[0])
 
     def seen(self) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
         """Value at each site, and of each input, state and signal, in the interval that leads to each row (N - 1,)."""

@@ -11,7 +11,7 @@ from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, MAT
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
 from adaptive_flot.discovery.innovations.halting import MOST_EDGES as HALTS
-from adaptive_flot.discovery.innovations.halting import Halt, best_halt
+from adaptive_flot.discovery.innovations.halting import Halt, best_halt, still_stretch
 from adaptive_flot.discovery.innovations.linear_response import LinearResponse
 from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -22,6 +22,8 @@ from adaptive_flot.greybox.scope import Site
 EDGE = 0.05
 """Width of the edges of a switch, in sampling intervals."""
 NOTHING = 1e-9
+CERTAIN = 0.5
+"""Gain of log-likelihood for each row of a sensor that is still: what its spread says when it falls to its noise."""
 BALANCE = ("process", "flow", "feed")
 """Roles of sites whose value enters a balance."""
 SHARP = 6.0
@@ -156,41 +158,53 @@ class Screening:
 
     def halt(self, site: Site) -> Screened | None:
         """The best time for which an actuator or sensor stays at a level; None where a constant change does as well."""
-        v, count = self._values[site.name], len(self._response.record) - 1
+        v, record = self._values[site.name], self._response.record
         spread = float(np.ptp(v))
         if site.role not in ("actuator", "sensor") or not spread > LEAST_MOVE * ordinary_size(v):
             return None
+        found = self._still(site) if site.role == "sensor" else self._halt(site, v)
+        if found is None:
+            return None
+        on, length = _pulse(site, record, found.begin, found.end)
+        told = {"amplitude": 1.0, "level": found.level, "on_1": on, "for_1": length}
+        effect = Effect(site.name, "time", "stuck_while", told, {"width": EDGE * record.dt})
+        limits = {"level": (float(v.min()), float(v.max()))} if site.role == "actuator" else {}
+        scales = {"level": MATTERS * spread}
+        hypothesis = Hypothesis(site.name, "time", "stuck for a time", effect, ("level",), ({},), limits, scales)
+        stands = (np.arange(len(v)) >= found.begin) & (np.arange(len(v)) < found.end)
+        suspect = Suspect(hypothesis, ((found.level - v) * stands)[:, None], (), 2 + (length < FOREVER))
+        return Screened(suspect, np.empty(0), found.gain - self._charge(suspect))
+
+    def _halt(self, site: Site, v: FloatArray) -> Halt | None:
+        """When an actuator stays at a level, by its response."""
+        count = len(v)
         apart = max(1, -(-count // HALTS))
         found = self._best_halt(site, v, np.arange(1, count - 1, apart))
         if found is not None and apart > 1:
             near = np.array([e for e in (found.begin, found.end) if e < count])[:, None] + np.arange(1 - apart, apart)
             again = self._best_halt(site, v, np.unique(near[(near > 0) & (near < count - 1)]))
             found = again if again is not None and again.gain > found.gain else found
-        if found is None or found.beyond < SHARP + float(np.log(self._count)) / 2:
-            return None
-        on, length = _pulse(site, self._response.record, found.begin, found.end)
-        told = {"amplitude": 1.0, "level": found.level, "on_1": on, "for_1": length}
-        effect = Effect(site.name, "time", "stuck_while", told, {"width": EDGE * self._response.record.dt})
-        limits = {"level": self._levels(site)} if site.role == "actuator" else {}
-        scales = {"level": MATTERS * spread}
-        hypothesis = Hypothesis(site.name, "time", "stuck for a time", effect, ("level",), ({},), limits, scales)
-        stands = (np.arange(count) >= found.begin) & (np.arange(count) < found.end)
-        suspect = Suspect(hypothesis, ((found.level - v) * stands)[:, None], (), 2 + (length < FOREVER))
-        return Screened(suspect, np.empty(0), found.gain - self._charge(suspect))
-
-    def _levels(self, site: Site) -> tuple[float, float]:
-        """Where a part may stand: an actuator within its range as seen, a sensor anywhere."""
-        v = self._values[site.name]
-        return (float(v.min()), float(v.max())) if site.role == "actuator" else (-np.inf, np.inf)
+        return found if found is not None and found.beyond >= SHARP + float(np.log(self._count)) / 2 else None
 
     def _best_halt(self, site: Site, v: FloatArray, edges: IntArray) -> Halt | None:
         count = len(v)
-        after = np.arange(count)[:, None] >= edges[None, :]
-        steps = (after * v[:, None], after.astype(float))
-        responses = tuple(self._rest(self._response.respond(site.name, s)) for s in steps)
-        if not all(np.isfinite(r).all() for r in responses):
+        after = (np.arange(count)[:, None] >= edges[None, :]).astype(float)
+        moved, one = (self._rest(self._response.respond(site.name, steps)) for steps in (after * v[:, None], after))
+        if not (np.isfinite(moved).all() and np.isfinite(one).all()):
             return None
-        return best_halt(responses, edges, self._left, count, self._count, self._levels(site))  # type: ignore[arg-type]
+        return best_halt((moved, one), edges, self._left, count, self._count, (float(v.min()), float(v.max())))
+
+    def _still(self, site: Site) -> Halt | None:
+        """When the sensor of an output shows nothing but noise; as if each row of it gained as much as one can."""
+        shown = self._response.shown_by(site.name)
+        if shown is None:
+            return None
+        measured, noise = shown
+        found = still_stretch(measured[1:], noise)
+        if found is None:
+            return None
+        begin, end, level = found
+        return Halt(begin, end, level, CERTAIN * (end - begin), np.inf)
 
     def constant(self, site: Site) -> list[Screened]:
         """A constant change in the way of a site, whatever it gains; none where the record says nothing of the site."""

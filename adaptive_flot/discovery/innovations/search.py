@@ -28,6 +28,8 @@ REFITTED, SAME_SITE = 6, 2
 """Suspects that are refitted, and of these at one site."""
 LAGS_ELSEWHERE = 3
 """Lags that are refitted besides, one a site."""
+HALTS = 2
+"""Parts that are stuck for a time, which are refitted besides."""
 BEAM = 3
 """Explanations that are carried on."""
 MOST_EFFECTS = 2
@@ -376,9 +378,10 @@ def _is_lag(effect: Effect, free: Sequence[str]) -> bool:
 
 
 def _spread(ranked: Sequence[Screened]) -> list[Screened]:
-    """The best few, one of a kind and few at one site; the best store, which most models leave out; and lags elsewhere.
+    """The best few, one of a kind and few at one site; the best store, which most models leave out; and what is hidden.
 
-    A lag is all or nothing, and process noise follows what it does, so that a regression says little of it.
+    Process noise follows what a lag does, and the filter what a sensor shows that has stopped. A regression says little
+    of either.
     """
     chosen: list[Screened] = []
     for s in ranked:
@@ -390,6 +393,8 @@ def _spread(ranked: Sequence[Screened]) -> list[Screened]:
             break
     stores = [s for s in ranked if s.suspect.hypothesis.kind == "store" and s.gain >= LEAST_GAIN]
     further = [] if any(s in chosen for s in stores) else stores[:1]
+    halts = [s for s in ranked if s.suspect.hypothesis.kind == "stuck for a time" and s.gain >= LEAST_GAIN]
+    further += [s for s in halts[:HALTS] if s not in chosen]
     by_site = {
         s.suspect.hypothesis.site: s for s in reversed(ranked) if s.suspect.hypothesis.kind == "lag" and s.gain > 0
     }

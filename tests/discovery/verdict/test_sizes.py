@@ -85,6 +85,14 @@ def curve(effect: NamedEffect, driver: FloatArray, change: FloatArray, unit: str
             "heat loss wanders in time, between 20 % less and 11 % more",
         ),
         (told("heating", "delay", "delay", amplitude=1.0, dead_time=30.0), "heating answers 30 s late"),
+        (
+            told("heating", "time", "stuck_while", amplitude=1.0, level=40.0, on_1=600.0, for_1=300.0),
+            "heating stayed at 40 W from 600 s to 900 s, whatever was asked",
+        ),
+        (
+            told("thermometer", "time", "stuck_while", amplitude=1.0, level=21.5, on_1=600.0, for_1=300.0),
+            "thermometer showed 21.5 K from 600 s to 900 s",
+        ),
     ],
 )
 def test_an_effect_is_told_with_size_direction_and_time(effect: NamedEffect, said: str) -> None:

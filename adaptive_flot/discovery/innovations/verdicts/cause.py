@@ -20,6 +20,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, 
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, usual_over_folds
 from adaptive_flot.discovery.results import Judgement
@@ -41,7 +42,7 @@ def with_cause(
     """The comparison with the cause told; unchanged where errors over stretches do not fall to those of the reference.
 
     Unchanged, too, where without the cause none of them is above ABOVE_USUAL times that of the reference: there is
-    nothing to explain then.
+    nothing to explain then. Only outputs that the cause can change are asked.
 
     Parameters
     ----------
@@ -58,13 +59,15 @@ def with_cause(
     error = errors_over_folds(search, base, told.best)
     usual = usual_over_folds(*reference)
     error = tuple(replace(c, noise=usual[c.output]) for c in error)
-    if all(c.before <= ABOVE_USUAL * c.noise for c in error):
+    reached = set(outputs_in_reach(search.model, search.model_of(told.best)))
+    shown = tuple(c for c in error if c.output in reached)
+    if all(c.before <= ABOVE_USUAL * c.noise for c in shown):
         return compared
     word: Literal["named", "class"] = "named" if told.word == "named" else "class"
     if _too_many_parts(compared, told):
         return compared
     against = contradiction(Judgement(word, None, (), (), 0.0), error, np.array([c.noise for c in error]))
-    if against or hardly_explained(error, ABOVE_USUAL, MOST):
+    if against or hardly_explained(shown, ABOVE_USUAL, MOST):
         return compared
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"), told.beside)
     calibration = replace(compared.calibration, model=search.model)

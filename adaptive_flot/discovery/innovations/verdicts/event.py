@@ -18,6 +18,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 
@@ -25,9 +26,9 @@ from adaptive_flot.discovery.results.words import WITH_A_NAME
 def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     """The comparison with the event told; unchanged where free runs do not get better by it, or need not.
 
-    Where no output's error without the event is above what is usual on the reference, there is nothing to explain.
-    Where an output keeps more than half of what its squared error is above that, there is more than the event explains,
-    and its name would be a guess. So it is where the error of another output grows.
+    Of the outputs that the event can change: where no error without it is above what is usual on the reference, there
+    is nothing to explain. Where one keeps more than half of what its squared error is above that, there is more than
+    the event explains, and its name would be a guess. So it is where the error of any output grows.
 
     Parameters
     ----------
@@ -55,7 +56,9 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"), told.beside)  # type: ignore[arg-type]
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, compared.verdict.seconds)
-    if all(c.before <= ABOVE_USUAL * c.noise for c in verdict.error) or hardly_explained(verdict.error, ABOVE_USUAL):
+    reached = set(outputs_in_reach(model, model_with(model, found[0].hypothesis)))
+    shown = tuple(c for c in verdict.error if c.output in reached)
+    if all(c.before <= ABOVE_USUAL * c.noise for c in shown) or hardly_explained(shown, ABOVE_USUAL):
         return compared
     if worse_outputs(rows, blocks, null, found[0], compared.calibration.usual.overall):
         return compared

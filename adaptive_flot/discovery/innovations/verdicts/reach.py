@@ -5,13 +5,15 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.greybox.model import Model
 
 
 def outputs_in_reach(before: Model, after: Model) -> tuple[str, ...]:
     """Names of the outputs that the effects of one model can change which another one lacks.
 
-    Those of a sensor change what it shows, and nothing else. Those of anything that a state depends on may change all.
+    Those of a sensor change what it shows, and nothing else. Those of what a state depends on change that state, each
+    state that depends on it, and the outputs that show one of these.
 
     Parameters
     ----------
@@ -21,11 +23,18 @@ def outputs_in_reach(before: Model, after: Model) -> tuple[str, ...]:
     names = after.names("outputs")
     nx, n_p = len(before.states), len(before.parameters)
 
-    def depends(result: int) -> np.ndarray:
-        on_states, on_parameters = (np.array(ca.DM(after.ode.jac_sparsity(result, k), 1)) != 0 for k in (1, 3))
-        reached: np.ndarray = on_states[:, nx:].any(axis=1) | on_parameters[:, n_p:].any(axis=1)
-        return reached
+    def by(result: int, argument: int) -> BoolArray:
+        found: BoolArray = np.array(ca.DM(after.ode.jac_sparsity(result, argument), 1)) != 0
+        return found
 
-    if depends(0)[:nx].any() or depends(3).any():
-        return names
-    return tuple(n for n, reached in zip(names, depends(1), strict=True) if reached)
+    def touched(result: int) -> BoolArray:
+        brought = np.hstack([by(result, 1)[:, nx:], by(result, 3)[:, n_p:]])
+        return np.asarray(brought.any(axis=1), dtype=bool)
+
+    # the algebraic variable is solved for inside, so that what goes by it is seen as well
+    states, on_states = touched(0), by(0, 1)
+    for _ in range(len(states)):
+        states |= on_states[:, states].any(axis=1)
+    states[nx:] = False  # what an effect brings with it is no state of the process
+    shown = touched(1) | by(1, 1)[:, states].any(axis=1)
+    return tuple(n for n, reached in zip(names, shown, strict=True) if reached)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.innovations.halting import best_halt
+from adaptive_flot.discovery.innovations.halting import best_halt, still_stretch
 
 N = 120
 EDGES = np.arange(1, N - 1)
@@ -75,3 +75,24 @@ def test_a_level_outside_its_limits_is_none() -> None:
     v = _asked(3)
     found, _ = _found(v, np.where(np.arange(N) >= 50, 9.0, v), 3)
     assert found is None or 0.0 <= found.level <= 4.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 1000), begin=st.integers(20, 150), length=st.integers(30, 120), missing=st.booleans())
+def test_a_sensor_that_is_still_is_found_where_it_is(seed: int, begin: int, length: int, missing: bool) -> None:
+    rng = np.random.default_rng(seed)
+    shown = 60 + np.cumsum(0.5 * rng.normal(size=300)) + 0.1 * rng.normal(size=300)
+    shown[begin : begin + length] = 25.0 + 0.1 * rng.normal(size=length)
+    if missing:
+        shown[rng.choice(300, 20, replace=False)] = np.nan
+    found = still_stretch(shown, 0.1)
+    assert found is not None
+    assert abs(found[0] - begin) <= 5 and abs(found[1] - begin - length) <= 5
+    assert found[2] == pytest.approx(25.0, abs=0.1)
+
+
+def test_what_always_moves_or_never_does_is_not_still() -> None:
+    rng = np.random.default_rng(0)
+    assert still_stretch(np.cumsum(0.5 * rng.normal(size=300)), 0.1) is None
+    assert still_stretch(25 + 0.1 * rng.normal(size=300), 0.1) is None
+    assert still_stretch(np.full(300, np.nan), 0.1) is None

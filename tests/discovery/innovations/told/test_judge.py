@@ -288,6 +288,13 @@ def test_an_event_beside_another_effect_explains_what_nothing_else_does(without:
     assert said.word == "named" and [h.site for h in said.certain] == sites
 
 
+def test_an_event_that_explains_most_alone_is_not_given_up_for_what_another_effect_draws_of_it() -> None:
+    """A condenser that fouls, of which a dependence on the flow draws a third and adds a tenth."""
+    law, fouls = replace(lag("transfer"), kind="depends", driver="flow"), event("condenser", (250.0, 1e7))
+    said = told(Given((law, fouls), 500.0, 0.9), Given((law,), 150.0, 0.3), Given((fouls,), 450.0, 0.8))
+    assert said.word == "named" and [h.site for h in said.certain] == ["condenser"]
+
+
 @pytest.mark.parametrize(
     ("alone", "apart", "said"),
     [(300.0, True, "leak switch with heater depends"), (300.0, False, "leak switch explains"), (90.0, False, "")],

@@ -20,7 +20,7 @@ def tanks() -> Model:
         ([Effect("lower_gauge", "lag", "lag", {"amplitude": 1.0}, {"scale": 1.0})], ("lower",)),
         ([Effect("upper_gauge", "constant", "shift"), Effect("lower_gauge", "constant", "shift")], ("upper", "lower")),
         ([Effect("pump", "constant", "shift")], ("upper", "lower")),
-        ([Effect("lower_outlet", "constant", "shift")], ("upper", "lower")),  # through a state: not asked how far
+        ([Effect("lower_outlet", "constant", "shift")], ("lower",)),  # nothing flows back into the upper one
         ([], ()),
     ],
 )
