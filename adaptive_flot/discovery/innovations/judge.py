@@ -13,9 +13,10 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
-from adaptive_flot.discovery.innovations.refit import Refitter
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
-from adaptive_flot.discovery.innovations.switching import chance_of_edges
+from adaptive_flot.discovery.innovations.events.switching import chance_of_edges
+from adaptive_flot.discovery.innovations.filter.refit import Refitter
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import low_end, told_apart
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray

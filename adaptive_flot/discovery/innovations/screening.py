@@ -10,10 +10,10 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, MATTERS, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
-from adaptive_flot.discovery.innovations.halting import MOST_EDGES as HALTS
-from adaptive_flot.discovery.innovations.halting import Halt, best_halt, still_stretch
-from adaptive_flot.discovery.innovations.linear_response import LinearResponse
-from adaptive_flot.discovery.innovations.switching import MOST_EDGES, IntArray, Switch, best_switch
+from adaptive_flot.discovery.innovations.events.halting import MOST_EDGES as HALTS
+from adaptive_flot.discovery.innovations.events.halting import Halt, best_halt, still_stretch
+from adaptive_flot.discovery.innovations.events.switching import MOST_EDGES, IntArray, Switch, best_switch
+from adaptive_flot.discovery.innovations.filter.linear_response import LinearResponse
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import bootstrap
 
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, worth
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, worth
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox.model import FloatArray
 
 NEAR = 0.05

@@ -25,11 +25,13 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE, Hypot
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
+from adaptive_flot.discovery.innovations.events.pauses import with_pauses_closed
+from adaptive_flot.discovery.innovations.filter.thinning import is_short_since_reference
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search
-from adaptive_flot.discovery.innovations.thinning import is_short_since_reference
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend, unless_hardly_off
@@ -259,7 +261,7 @@ def _with_process_noise(
     progress("what the reference lacks")
     before = Search(model, reference, columns, floor, constants.names, constants, processes, LACKING, ends=ends)
     start = before.base(model.parameter_values)
-    lacking = judge(before, start, before.run(start))
+    lacking = judge(before, start, best_explanations(before, start))
     if before.time_is_up:
         return None
     explanation = lacking.best if lacking.word == "named" else start
@@ -271,7 +273,7 @@ def _with_process_noise(
         extended, record, columns, floor, constants.names, known, processes, since_reference=True, ends=ends
     )
     base = search.base(extended.parameter_values)
-    found = with_pauses_closed(search, search.run(base, progress))
+    found = with_pauses_closed(search, best_explanations(search, base, progress))
     if search.time_is_up:
         return None
     before = replace(before, model=extended)

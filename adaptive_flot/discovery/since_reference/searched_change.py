@@ -20,7 +20,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, what_is_left
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results import Discovery, OutputChange, Verdict

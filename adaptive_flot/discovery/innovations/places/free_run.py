@@ -23,7 +23,7 @@ from adaptive_flot.discovery.further_sites.places import further_sites, is_possi
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.seen import seen_along
-from adaptive_flot.discovery.innovations.thinning import searchable
+from adaptive_flot.discovery.innovations.filter.thinning import searchable
 from adaptive_flot.discovery.results import Alternative, Judgement, State
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN

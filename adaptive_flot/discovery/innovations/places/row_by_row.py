@@ -21,7 +21,8 @@ from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import AT_REST
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.scope import Site

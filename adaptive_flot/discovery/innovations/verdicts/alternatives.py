@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME

@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from adaptive_flot.discovery.innovations.judge import Told
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.innovations.search import Explanation
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.telling_apart import block_sums
 from adaptive_flot.discovery.results import Alternative
 

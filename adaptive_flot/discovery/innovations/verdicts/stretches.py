@@ -14,8 +14,9 @@ import numpy as np
 from adaptive_flot.discovery.assessment.reduction import reduction
 from adaptive_flot.discovery.assessment.verification import BLOCK_ROWS
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
-from adaptive_flot.discovery.innovations.refit import Refitter
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.filter.refit import Refitter
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.results import OutputChange
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray

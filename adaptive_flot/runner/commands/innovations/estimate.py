@@ -16,7 +16,7 @@ import pandas as pd
 from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit, ParameterEstimate
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.thinning import is_short
+from adaptive_flot.discovery.innovations.filter.thinning import is_short
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import NoiseModel
 from adaptive_flot.greybox.model import Model

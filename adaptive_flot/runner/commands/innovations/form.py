@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.contracts.batch import ParameterEstimate
-from adaptive_flot.discovery.innovations.refit import NU, Refit, Refitter
+from adaptive_flot.discovery.innovations.filter.refit import NU, Refit, Refitter
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter, prediction_errors, smooth
 from adaptive_flot.greybox.model import FloatArray, Model

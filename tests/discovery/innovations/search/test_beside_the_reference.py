@@ -13,9 +13,11 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations import search as searching
 from adaptive_flot.discovery.innovations.screening import Screened
-from adaptive_flot.discovery.innovations.search import CONSTANT, LEAST_GAIN, Explanation, Search
+from adaptive_flot.discovery.innovations.search import beam
+from adaptive_flot.discovery.innovations.search.beam import CONSTANT, held_at_the_reference, screened_beside
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Dataset
 from tests.discovery.innovations.thermostat import CAPACITY, LOSS, model, record
 
@@ -44,7 +46,7 @@ def too_warm(by: float) -> Dataset:
 
 def test_the_regression_beside_the_reference_holds_its_constants_and_the_noise_of_the_record() -> None:
     search, base = since_a_reference(too_warm(2.0))
-    held = search._held(base)
+    held = held_at_the_reference(search, base)
     where = list(search.model.indices("parameters", NAMES))
     np.testing.assert_array_equal(held.fit.p, search.model.parameter_values)
     assert not np.allclose(base.fit.p[where], held.fit.p[where], rtol=1e-3), "the fit has moved them"
@@ -62,10 +64,10 @@ def test_every_constant_change_that_it_sees_is_refitted(monkeypatch: pytest.Monk
             refitted.extend(chosen)
         return []
 
-    monkeypatch.setattr(searching.Search, "all_with", noted)
+    monkeypatch.setattr(Search, "all_with", noted)
     with np.errstate(all="ignore"):
-        search._further(base)
-        seen = search._screened(search._held(base))[1]
+        beam._further(search, base)
+        seen = screened_beside(search, held_at_the_reference(search, base))[1]
     constant = {
         s.suspect.hypothesis.label for s in seen if s.suspect.hypothesis.kind in CONSTANT and s.gain >= LEAST_GAIN
     }

@@ -4,7 +4,8 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from tests.discovery.innovations.thermostat import CAPACITY, LOSS, model, record
 
 NAMES = ("conductance", "capacity")

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.innovations import linear_response
-from adaptive_flot.discovery.innovations.linear_response import ResponseFunctions
-from adaptive_flot.discovery.innovations.noise_fit import search_noise
+from adaptive_flot.discovery.innovations.filter import linear_response
+from adaptive_flot.discovery.innovations.filter.linear_response import ResponseFunctions
+from adaptive_flot.discovery.innovations.filter.noise_fit import search_noise
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import NoiseModel, RecordFilter
 from tests.discovery.innovations.box import DT, model, record

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.innovations.noise_fit import RHO, THETA, search_noise
+from adaptive_flot.discovery.innovations.filter.noise_fit import RHO, THETA, search_noise
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import LANES
 
 ROWS = 600

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.refit import single_outliers
+from adaptive_flot.discovery.innovations.filter.refit import single_outliers
 from adaptive_flot.discovery.innovations.screening import Screening
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search.search import Search
 from tests.discovery.innovations.thermostat import model, record
 
 

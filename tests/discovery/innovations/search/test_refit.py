@@ -7,7 +7,7 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.innovations.refit import Refitter
+from adaptive_flot.discovery.innovations.filter.refit import Refitter
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.innovations.late_tank import LATE, TIME, model, record
 

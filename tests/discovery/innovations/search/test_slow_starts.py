@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.search import Search
 from benchmarks.other_processes.plants.heat_exchanger import make_model as model
 from tests.discovery.innovations.exchanger import HOLDUP, LATE, UA, record
 
@@ -19,7 +20,7 @@ def test_a_late_thermometer_is_found_from_the_constants_as_the_model_came(seed: 
         floor = noise_floor([data], (0,))
         search = Search(plain, data, (0,), floor, NAMES, as_given=given, kinds=("lag",))
         with np.errstate(all="ignore"):
-            found = search.run(search.base(np.array([UA, 2.5 * HOLDUP])))[0]
+            found = best_explanations(search, search.base(np.array([UA, 2.5 * HOLDUP])))[0]
         assert "thermometer lag" in [h.label for h in found.hypotheses]
         return found.criterion, found.fit.p
 

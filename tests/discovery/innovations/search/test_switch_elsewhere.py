@@ -12,7 +12,8 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import constant_change
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations, events_alone
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Dataset
 from benchmarks.other_processes.plants.room_air import DT, make_model
 
@@ -89,7 +90,7 @@ def test_what_enters_a_balance_is_tried_by_an_amount_as_well(halved: Search) -> 
 
 def test_the_site_of_a_large_event_explains_more_than_one_that_the_regression_prefers(halved: Search) -> None:
     base = halved.base(halved.model.parameter_values)
-    best = halved.run(base)[0]
+    best = best_explanations(halved, base)[0]
     (event,) = (h for h in best.hypotheses if h.kind == "switch")
     assert event.site == "fan"
     assert event.effect.coefficients["on_1"] == pytest.approx(DT * BEGINS, abs=20 * DT)
@@ -100,19 +101,19 @@ def test_the_site_of_a_large_event_explains_more_than_one_that_the_regression_pr
 
 def test_an_event_that_was_found_beside_something_of_no_size_is_fitted_alone(halved: Search) -> None:
     """With the times that it has there; nothing else is fitted anew."""
-    best = halved.run(halved.base(halved.model.parameter_values))[0]
+    best = best_explanations(halved, halved.base(halved.model.parameter_values))[0]
     (event,) = best.hypotheses
     breath = next(s for s in halved.model.sites if s.name == "breath")
     idle = constant_change(breath, 1.0)
     p = model_with(halved.model_of(best), idle).parameter_values
     pair = halved.added(best, idle, p)
-    (alone,) = halved.events_alone([pair, best])
+    (alone,) = events_alone(halved, [pair, best])
     assert alone.hypotheses == (event,)
     assert alone.criterion == pytest.approx(best.criterion, abs=0.5)
-    assert halved.events_alone([halved.without(pair, event)]) == []
+    assert events_alone(halved, [halved.without(pair, event)]) == []
 
 
 def test_where_nothing_happens_there_is_no_event_at_any_site() -> None:
     quiet = search(1.0)
-    best = quiet.run(quiet.base(quiet.model.parameter_values))[0]
+    best = best_explanations(quiet, quiet.base(quiet.model.parameter_values))[0]
     assert all(h.kind != "switch" for h in best.hypotheses)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.innovations.switching import Switch, best_switch, chance_of_edges
+from adaptive_flot.discovery.innovations.events.switching import Switch, best_switch, chance_of_edges
 
 N = 120
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.innovations.thinning import (
+from adaptive_flot.discovery.innovations.filter.thinning import (
     FEWEST_ROWS,
     MOST_WORK,
     is_short,

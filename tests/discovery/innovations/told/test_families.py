@@ -7,7 +7,8 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.courses import suspects
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
 from tests.discovery.innovations.thermostat import BAND, LAMP, PERIOD, SWING, ZONE, Wrong, model, record
 
@@ -18,7 +19,7 @@ def _told(wrong: Wrong) -> tuple[Told, str, Search]:
     search = Search(plain, data, (0,), noise_floor([data], (0,)), ("conductance", "capacity"))
     with np.errstate(all="ignore"):
         base = search.base(plain.parameter_values)
-        told = judge(search, base, search.run(base))
+        told = judge(search, base, best_explanations(search, base))
     return told, told_in_words(search, told), search
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations import judge as judging
-from adaptive_flot.discovery.innovations.search import worth
+from adaptive_flot.discovery.innovations.search.explanation import worth
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.effects import Effect

@@ -5,7 +5,8 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.judge import judge
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
 from tests.discovery.innovations.box import DT, record
 
@@ -46,7 +47,7 @@ def test_a_store_that_the_model_leaves_out_is_found_with_its_time_constant() -> 
     search = Search(plain, data, (0,), noise_floor([data], (0,)), ("conductance", "capacity"))
     with np.errstate(all="ignore"):
         base = search.base(plain.parameter_values)
-        found = search.run(base)
+        found = best_explanations(search, base)
         told = judge(search, base, found)
     store = next(h for h in found[0].hypotheses if h.kind == "store")
     model = search.model_of(found[0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.innovations import telling_apart
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, worth
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, worth
 
 ROWS = 240
 

@@ -5,7 +5,8 @@ import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.search import Search, numbers_of
+from adaptive_flot.discovery.innovations.search.explanation import numbers_of
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from benchmarks.other_processes.plants.heat_exchanger import make_model as model
 from tests.discovery.innovations.exchanger import BEGINS, ENDS, FOULED, record

@@ -10,7 +10,8 @@ import pytest
 from adaptive_flot.discovery.hypotheses.families import Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.judge import Told
-from adaptive_flot.discovery.innovations.search import Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts import alternatives as asking
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.innovations.late_tank import LATE, model, record
@@ -113,7 +114,7 @@ def test_an_effect_of_a_free_run_is_fitted_as_one_that_was_searched() -> None:
     """Reduction: the same lag, given with its fitted size, comes to the same likelihood and size."""
     search = Search(model(), record(0, 300, 0.0), (0,), np.array([0.01]), ("time",))
     base = search.base(model().parameter_values)
-    found = next(e for e in search.run(base) if [h.label for h in e.hypotheses] == ["gauge lag"])
+    found = next(e for e in best_explanations(search, base) if [h.label for h in e.hypotheses] == ["gauge lag"])
     fitted = search.model_of(found)
     again = search.of_effects(fitted.fitted_effects(), fitted, ("time", *found.free))
     assert again is not None

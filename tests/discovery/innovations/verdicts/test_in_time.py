@@ -12,7 +12,9 @@ import pytest
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.in_time import or_in_time
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.model import FloatArray
@@ -57,7 +59,7 @@ def judged(factor: FloatArray, hall: FloatArray, seed: int) -> tuple[Search, Exp
     search = Search(reactor(), data, (0,), noise_floor([data], (0,)), ("rate",))
     with np.errstate(all="ignore"):
         base = search.base(search.model.parameter_values)
-        return search, base, judge(search, base, search.run(base))
+        return search, base, judge(search, base, best_explanations(search, base))
 
 
 SHARE = np.linspace(0.0, 1.0, ROWS)

@@ -18,7 +18,9 @@ from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
-from adaptive_flot.discovery.innovations.search import Explanation, Search
+from adaptive_flot.discovery.innovations.search.beam import best_explanations
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
@@ -75,7 +77,7 @@ def judged(data: Dataset) -> tuple[Search, Explanation, Told]:
     search = Search(model, data, (0,), noise_floor([data], (0,)), ("volume",))
     with np.errstate(all="ignore"):
         base = search.base(model.parameter_values)
-        return search, base, judge(search, base, search.run(base))
+        return search, base, judge(search, base, best_explanations(search, base))
 
 
 @pytest.mark.parametrize("seed", [2])

@@ -11,7 +11,8 @@ import numpy as np
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
-from adaptive_flot.discovery.innovations.search import LEAST_GAIN, Explanation, Search, worth
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, worth
+from adaptive_flot.discovery.innovations.search.search import Search
 
 SHORT = 0.15
 """Share of the shorter spell beside it below which a pause of an event is short. Of eight right events of several

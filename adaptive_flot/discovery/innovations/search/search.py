@@ -1,81 +1,30 @@
-"""Search for what a model lacks, in innovations form: a few effects, each found by regression and then refitted.
-
-A second effect is looked for beside each of the best first ones, not only beside the best: what is missing besides
-decides which of two names is right.
-"""
+"""A record in innovations form, and what is asked of it: fits of the model with effects, and regressions on them."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, SWITCHED, Hypothesis, Kind
+from adaptive_flot.discovery.hypotheses.families import SWITCHED, Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
-from adaptive_flot.discovery.innovations.refit import Refit, Refitter
+from adaptive_flot.discovery.innovations.filter.refit import Refitter
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
+from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, numbers_of
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray, Model
 
-REFITTED, SAME_SITE = 6, 2
-"""Suspects that are refitted, and of these at one site."""
-LAGS_ELSEWHERE = 3
-"""Lags that are refitted besides, one a site."""
-HALTS = 2
-"""Parts that are stuck for a time, which are refitted besides."""
-BEAM = 3
-"""Explanations that are carried on."""
-MOST_EFFECTS = 2
-LEAST_GAIN = 12.0
-"""Gain of the criterion that another effect must bring."""
 SLOW = ("lag", "store")
 """Kinds of effects that the fit of the model as it is hides in its constants: its stores have become larger."""
-CONSTANT = ("gain", "offset")
-"""Kinds of a constant change: a fit may start far from it, so that a regression on the model as it is overlooks it."""
 FURTHEST = 4.0
 """Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """Effects, and the model with them in innovations form, fitted.
-
-    Attributes
-    ----------
-    hypotheses
-        The effects, in the order in which they act; none for the model as it is.
-    fit
-        The fit.
-    numbers
-        How many numbers were fitted for the effects, times of switches too.
-    """
-
-    hypotheses: tuple[Hypothesis, ...]
-    fit: Refit
-    numbers: int
-
-    @property
-    def criterion(self) -> float:
-        """Half the Bayesian information criterion, its sign turned: log L - k / 2 log n."""
-        n = int(np.count_nonzero(self.fit.rows))
-        return self.fit.log_likelihood - self.numbers / 2 * float(np.log(n))
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Names of the fitted coefficients."""
-        return tuple(name for h in self.hypotheses for name in h.parameters)
-
-    @property
-    def names(self) -> frozenset[tuple[str, str, str]]:
-        """What tells it from another one: site, driver and kind of each effect."""
-        return frozenset((h.site, h.driver, h.kind) for h in self.hypotheses)
 
 
 @dataclass(frozen=True)
@@ -156,70 +105,6 @@ class Search:
         """Fits of a model with the constants and further parameters free."""
         return Refitter(model, self.record, self.columns, self.floor, (*self.free, *own), self.known)
 
-    def run(self, base: Explanation, progress: Callable[[str], None] = lambda stage: None) -> list[Explanation]:
-        """All explanations that were refitted, the best first; the model as it is among them."""
-        found, beam, best = [base], [base], base
-        for count in range(1, MOST_EFFECTS + 1):
-            if self.time_is_up:
-                break
-            progress(f"innovations form: explanations of {count} effect{'s' if count > 1 else ''}")
-            further = [e for start in beam for e in self._further(start)]
-            ranked = _distinct(further)
-            if count > 1:
-                best_few = parallel_map(self.settled, ranked[: 2 * BEAM], self.processes)
-                ranked = _distinct([*best_few, *ranked[2 * BEAM :]])
-                found += self.events_alone(ranked[:BEAM])
-            found += ranked
-            if not ranked or ranked[0].criterion < best.criterion + LEAST_GAIN:
-                break
-            beam, best = ranked[:BEAM], ranked[0]
-        return sorted(_distinct(found), key=lambda e: -worth(e))
-
-    def events_alone(self, pairs: Sequence[Explanation]) -> list[Explanation]:
-        """The event of each pair with one, without the other effect: its times may be better than those it had alone.
-
-        An event that starts while constants make up for it may rest at a wrong time. A partner of no size then lets it
-        go to the right one, and two effects would be told for one.
-        """
-        found = []
-        for pair in pairs:
-            others = [h for h in pair.hypotheses if h.kind not in EVENTS]
-            if len(pair.hypotheses) == 2 and len(others) == 1:
-                found.append(self.without(pair, others[0]))
-        return [e for e in found if np.isfinite(e.fit.log_likelihood)]
-
-    def _further(self, start: Explanation) -> list[Explanation]:
-        """The explanation with one more effect, for each that is worth its numbers."""
-        if self.time_is_up:
-            return []
-        screening, screened = self._screened(start)
-        refits = self.all_with(start, _spread(screened))
-        if self.since_reference and not start.hypotheses:
-            held = self._held(start)
-            _, beside = self._screened(held)
-            constant = [s for s in beside if s.suspect.hypothesis.kind in CONSTANT and s.gain >= LEAST_GAIN]
-            spread = [s for s in _spread(beside) if not any(s is c for c in constant)]
-            refits += self.all_with(start, [*spread, *constant], held)
-        switched = [e for e in refits if e.hypotheses[-1].kind in SWITCHED]
-        if switched:
-            switch = max(switched, key=lambda e: e.criterion).hypotheses[-1]
-            there = [s for site in self.model.sites for s in screening.at_times_of(switch, site)]
-            refits += self.all_with(start, there)
-        return refits
-
-    def _held(self, start: Explanation) -> Explanation:
-        """The model as it is with the constants of the reference, and the noise of a fit to this record."""
-        p, fit = self.model.parameter_values, start.fit
-        return replace(start, fit=replace(fit, p=p, filtered=self.fitter(self.model, ()).run(p, fit.noise)))
-
-    def _screened(self, start: Explanation) -> tuple[Screening, list[Screened]]:
-        """The regressions on an explanation, and what may be found by them, the best first."""
-        screening = self.screening(start, [s.name for s in self.model.sites])
-        # one course in time at most: a second one would draw whatever is left
-        events = all(h.driver != "time" for h in start.hypotheses) and self._may("switch")
-        screened = screening.all(events=events, ramps=events and self.since_reference)
-        return screening, [s for s in screened if self._may(s.suspect.hypothesis.kind)]
-
     def all_with(
         self, start: Explanation, chosen: Sequence[Screened], held: Explanation | None = None
     ) -> list[Explanation]:
@@ -235,7 +120,8 @@ class Search:
     def _modes(self) -> dict[str, Mode]:
         return {s.name: s.mode for s in self.model.sites}
 
-    def _may(self, kind: str) -> bool:
+    def may(self, kind: str) -> bool:
+        """Whether effects of a kind may be found."""
         return self.kinds is None or kind in self.kinds
 
     def screening(self, start: Explanation, sites: Sequence[str]) -> Screening:
@@ -357,54 +243,6 @@ class Search:
         return max(refits, key=lambda e: (bool(np.isfinite(e.fit.log_likelihood)), e.criterion))
 
 
-def worth(explanation: Explanation) -> float:
-    """The criterion, less what each effect must gain: two effects stand for one only where they explain so much more.
-
-    The criterion charges numbers. That two things are wrong at a time is less likely than that one is.
-    """
-    return explanation.criterion - LEAST_GAIN * len(explanation.hypotheses)
-
-
-def numbers_of(h: Hypothesis) -> int:
-    """How many numbers a hypothesis was fitted by, those taken from a grid and the times of a switch too."""
-    told = h.effect.coefficients.items() if h.kind in EVENTS else ()
-    times = [c for c, v in told if c.startswith(("on_", "for_", "onset", "duration")) and v < FOREVER]
-    return len(h.free) + len(times)
-
-
 def _is_lag(effect: Effect, free: Sequence[str]) -> bool:
     """Whether a free run has fitted what the search calls a lag: a time constant, and nothing else."""
     return effect.form == "lag" and len(free) == 1 and free == effect.names(CoefficientRole.TIME_CONSTANT)
-
-
-def _spread(ranked: Sequence[Screened]) -> list[Screened]:
-    """The best few, one of a kind and few at one site; the best store, which most models leave out; and what is hidden.
-
-    Process noise follows what a lag does, and the filter what a sensor shows that has stopped. A regression says little
-    of either.
-    """
-    chosen: list[Screened] = []
-    for s in ranked:
-        h = s.suspect.hypothesis
-        same = [c.suspect.hypothesis for c in chosen if c.suspect.hypothesis.site == h.site]
-        if s.gain > 0 and len(same) < SAME_SITE and all((c.kind, c.driver) != (h.kind, h.driver) for c in same):
-            chosen.append(s)
-        if len(chosen) == REFITTED:
-            break
-    stores = [s for s in ranked if s.suspect.hypothesis.kind == "store" and s.gain >= LEAST_GAIN]
-    further = [] if any(s in chosen for s in stores) else stores[:1]
-    halts = [s for s in ranked if s.suspect.hypothesis.kind == "stuck for a time" and s.gain >= LEAST_GAIN]
-    further += [s for s in halts[:HALTS] if s not in chosen]
-    by_site = {
-        s.suspect.hypothesis.site: s for s in reversed(ranked) if s.suspect.hypothesis.kind == "lag" and s.gain > 0
-    }
-    lags = sorted((s for s in by_site.values() if s not in chosen), key=lambda s: -s.gain)
-    return [*chosen, *further, *lags[:LAGS_ELSEWHERE]]
-
-
-def _distinct(found: Sequence[Explanation]) -> list[Explanation]:
-    """The best of each set of effects, the best first."""
-    kept: dict[frozenset[tuple[str, str, str]], Explanation] = {}
-    for e in sorted(found, key=lambda e: -e.criterion):
-        kept.setdefault(e.names, e)
-    return list(kept.values())

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adaptive_flot.discovery.innovations.switching import SHORTEST, IntArray
+from adaptive_flot.discovery.innovations.events.switching import SHORTEST, IntArray
 from adaptive_flot.greybox.model import FloatArray
 
 MOST_EDGES = 300

@@ -16,8 +16,8 @@ from scipy.stats import t as student_t
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, stores_at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
-from adaptive_flot.discovery.innovations.linear_response import LinearResponse, ResponseFunctions, weight_of
-from adaptive_flot.discovery.innovations.noise_fit import Costs, noise_of, search_noise
+from adaptive_flot.discovery.innovations.filter.linear_response import LinearResponse, ResponseFunctions, weight_of
+from adaptive_flot.discovery.innovations.filter.noise_fit import Costs, noise_of, search_noise
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel
 from adaptive_flot.greybox.filtering.likelihood import first_state
