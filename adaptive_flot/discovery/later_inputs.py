@@ -16,15 +16,15 @@ from adaptive_flot.discovery.record.moved_inputs import with_inputs_moved
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import State, Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import LATE, Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
 
 AS_GOOD = 1.05
 """Inputs are moved where that alone leaves at most so many times the error of what is told,"""
 BETTER = 0.7
 """and at most so many times the error of the model as it is: geometric means over the outputs."""
-LATE, MOST_ROWS = ("lag", "delay"), 2.0
-"""Drivers of what comes late, and rows from which it comes later than a row for sure."""
+MOST_ROWS = 2.0
+"""Rows from which what is late comes later than a row for sure."""
 
 
 def with_later_inputs(state: State, verdict: Verdict) -> Dataset | None:

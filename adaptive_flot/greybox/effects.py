@@ -19,7 +19,9 @@ from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole, Form,
 from adaptive_flot.greybox.quantities import Parameter, Quantity
 
 Mode = Literal["factor", "offset"]
-DYNAMIC_DRIVERS = ("lag", "delay", "saturation")
+LATE = ("lag", "delay")
+"""What makes the value at a site late."""
+DYNAMIC_DRIVERS = (*LATE, "saturation")
 """What acts on the value at a site itself: it is delayed, or limited."""
 STATELESS_DRIVERS = ("constant", "time", "own_value", *DYNAMIC_DRIVERS)
 

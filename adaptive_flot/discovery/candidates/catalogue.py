@@ -14,7 +14,7 @@ from adaptive_flot.discovery.candidates.spline import knots_of, spline_values, t
 from adaptive_flot.discovery.candidates.turns import turning, turns
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.record.screening import LEAST_OF_SCALE, LEAST_RANGE
-from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, STATELESS_DRIVERS, Effect
+from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS, LATE, STATELESS_DRIVERS, Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
@@ -79,7 +79,7 @@ def _is_absorbed(variant: Variant, site: Site, absorbed: frozenset[tuple[str, st
 
 
 def _makes_sense(site: Site, driver: str) -> bool:
-    if driver in ("lag", "delay"):
+    if driver in LATE:
         return site.role in ("sensor", "actuator", "feed") and site.passed == 1
     if driver == "saturation":  # a sensor at its limit shows in the data screening
         return site.role == "actuator" and site.passed == 1
@@ -132,7 +132,7 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
         yield Variant(Effect(site.name, driver, "shift"), (profile(ones),), ("amplitude",))
     elif driver == "time":
         yield from _in_time(site, time, offset)
-    elif driver in ("lag", "delay"):
+    elif driver in LATE:
         yield from late(site, driver, responses)
     elif driver == "saturation":
         yield from limited(site, responses)

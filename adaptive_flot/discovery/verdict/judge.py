@@ -11,13 +11,12 @@ from adaptive_flot.discovery.candidates.shapes.step_events import slow
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
-from adaptive_flot.greybox.effects import STATELESS_DRIVERS
+from adaptive_flot.greybox.effects import LATE, STATELESS_DRIVERS
 
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 MUCH = 0.1
 """Share of the error removed on fresh rows from which something is missing, though it may not be what was found."""
-LATE = ("lag", "delay")
 MOST_RIVALS = 5
 
 Name = tuple[str, str]

@@ -11,9 +11,8 @@ from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.search.halving.first_rungs import NEAR_FINALIST
 from adaptive_flot.discovery.search.halving.jobs import FittedJob, Job, best_of_each, near
 from adaptive_flot.discovery.search.halving.refits import Refit
+from adaptive_flot.greybox.effects import LATE
 from adaptive_flot.greybox.stepping.record import RecordSimulator
-
-LATE = ("lag", "delay")
 
 
 def held(refit: Refit, last: list[FittedJob]) -> list[FittedJob]:

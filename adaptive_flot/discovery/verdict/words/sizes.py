@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.wording import clock
 from adaptive_flot.discovery.results import Alternative, NamedEffect
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import LATE, Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, number
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.scope import Site
@@ -257,7 +257,7 @@ def _interval(site: Site, told: NamedEffect) -> str:
     has_one = effect.driver in ("constant", "lag", "delay") or effect.family.is_event or effect.family.memory
     if not has_one:
         return ""
-    level = effect.driver not in ("lag", "delay")
+    level = effect.driver not in LATE
     roles = (CoefficientRole.LEVEL,) if level else (CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME)
     known = [told.interval95[n] for n in effect.names(*roles) if n in told.interval95]
     if len(known) != 1 and (not known or effect.family.memory):  # of two levels, each has its own
