@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, STRUCTURE, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.events.switching import chance_of_edges
@@ -93,7 +93,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = _without_each(search, best) if len(best.hypotheses) > 1 else {best.hypotheses[0].label: base}
-        failed = _at_steps_of_an_input(search, best) or _overlapping(base, best, without)
+        failed = _at_steps_of_an_input(search, best) or _overlapping(search, base, best, without)
         failed = failed or _contradicted(search, best, without)
         if not failed:
             told = _told(search, base, found, without)
@@ -165,12 +165,15 @@ def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hyp
     return tuple(h for h in beside if h.kind in EVENTS and _follows_an_input(search, h))
 
 
-def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Explanation]) -> tuple[Hypothesis, ...]:
+def _overlapping(
+    search: Search, base: Explanation, best: Explanation, without: Mapping[str, Explanation]
+) -> tuple[Hypothesis, ...]:
     """An event beside another effect that explains much of the same: it draws what is left of a wrong model.
 
     Nothing else draws an event that is there. So without it most of the gain is lost (OWN). Not so beside a constant
     error at its site: that and the event are the level before and after. Nor is it given up where it explains most of
-    it (OWN) alone: it is the other effect, then, that draws what is left.
+    it (OWN) alone: it is the other effect, then, that draws what is left. Since a reference, what a plant has or has
+    not does not come between two records: it is then enough that the event explains more alone than that.
     """
     if len(best.hypotheses) < 2:
         return ()
@@ -179,8 +182,11 @@ def _overlapping(base: Explanation, best: Explanation, without: Mapping[str, Exp
     events = [h for h in best.hypotheses if h.kind in EVENTS and h.site not in levels]
 
     def is_needed(event: Hypothesis) -> bool:
-        alone = max(without[h.label].criterion for h in best.hypotheses if h is not event)
-        return best.criterion - without[event.label].criterion >= most or alone - base.criterion >= most
+        others = [h for h in best.hypotheses if h is not event]
+        alone, rest = max(without[h.label].criterion for h in others), without[event.label].criterion
+        structure = search.since_reference and all(h.kind in STRUCTURE for h in others)
+        leads = structure and alone - rest >= LEAST_GAIN
+        return leads or best.criterion - rest >= most or alone - base.criterion >= most
 
     return tuple(h for h in events if not is_needed(h))
 

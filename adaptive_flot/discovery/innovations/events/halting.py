@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.discovery.innovations.events.switching import SHORTEST, IntArray
 from adaptive_flot.greybox.model import FloatArray
 
@@ -25,6 +26,8 @@ SINGULAR = 1e-6
 """Least determinant of the two columns, as a share of the product of their squares: else v is a constant there."""
 STILL, MOVES = 1.5, 5.0
 """Spread of a sensor in its noise from row to row, up to which it is still, and from which it has moved otherwise."""
+NEAR, FEW, MOST = 4.0, 10, 0.8
+"""Distance from its level in its noise, and the share of a few rows that are so near: the others are outliers."""
 LONG = 0.03
 """Share of the rows for which a sensor is still at least."""
 
@@ -145,4 +148,21 @@ def still_stretch(shown: FloatArray, noise: float) -> tuple[int, int, float] | N
     a, b = best
     if b - a < least:
         return None
-    return int(there[a]), int(there[b - 1]) + 1, float(np.median(y[a:b]))
+    level = float(np.median(y[a:b]))
+    a, b = _over_outliers(np.abs(y - level) <= NEAR * noise, a, b)
+    return int(there[a]), int(there[b - 1]) + 1, level
+
+
+def _over_outliers(near: BoolArray, a: int, b: int) -> tuple[int, int]:
+    """The stretch, longer where most of the next few rows (FEW) on either side are near its level, too (n,)."""
+    while (k := _more(near[:a][::-1])) > 0:
+        a -= k
+    while (k := _more(near[b:])) > 0:
+        b += k
+    return a, b
+
+
+def _more(near: BoolArray) -> int:
+    """How many of the next few rows go on with it: up to the last of them that is near, where most before it are."""
+    share = np.cumsum(near[:FEW]) / np.arange(1, min(FEW, len(near)) + 1)
+    return int(max(np.flatnonzero(near[:FEW] & (share >= MOST)) + 1, default=0))

@@ -219,7 +219,7 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
     follows = competes(state) and follows_time(state) and not wanders
     asked = bool(against or follows) and not surely_worse(error, noise)
     over = _over_stretches(state, search, base, told.best) if asked else ()
-    stands = bool(over) and not contradiction(judgement, over, noise)
+    stands = bool(over) and not contradiction(judgement, over, noise) and _better_than_as_it_is(over, error)
     reached = outputs_in_reach(before.model, after.model)  # a sensor stands in for nothing elsewhere
     shown = tuple(c for c in (over if stands else error) if c.output in reached)
     if (against and not stands) or hardly_explained(shown) or _another_drift(state, told):
@@ -279,6 +279,16 @@ def _another_drift(state: State, told: Told) -> bool:
     if best is None or not (unexpected_drift(state) and surely_better(state)):
         return False
     return not {site for site, _ in best.names} <= {h.site for h in told.effects}
+
+
+def _better_than_as_it_is(over: tuple[OutputChange, ...], error: tuple[OutputChange, ...]) -> bool:
+    """Whether errors over stretches with what is told are below those of a free run of the model as it is.
+
+    By the geometric mean over the outputs. From the state of a filter, a model that errs by noise alone may predict
+    worse than without any: what is better then is no more than a filter that is less wrong.
+    """
+    plain = tuple(replace(c, after=c.before) for c in error)
+    return smaller(over, plain, 1.0)
 
 
 def _over_stretches(state: State, search: Search, base: Explanation, best: Explanation) -> tuple[OutputChange, ...]:

@@ -43,7 +43,8 @@ class Stand:
     """An input that is switched every 200 s."""
     processes = 1
 
-    def __init__(self, *known: Given) -> None:
+    def __init__(self, *known: Given, since_reference: bool = False) -> None:
+        self.since_reference = since_reference
         self.known = {tuple(h.site for h in e.hypotheses): e for e in known}
 
     def model_of(self, explanation: Given) -> Any:
@@ -83,9 +84,9 @@ def _given_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: best is not other)
 
 
-def told(*found: Given) -> judging.Told:
+def told(*found: Given, since_reference: bool = False) -> judging.Told:
     base = Given((), 0.0, 0.0)
-    search: Any = Stand(base, *found)
+    search: Any = Stand(base, *found, since_reference=since_reference)
     ranked: Any = sorted([base, *found], key=lambda e: -worth(e))
     return judging.judge(search, ranked[-1], ranked)
 
@@ -293,6 +294,15 @@ def test_an_event_that_explains_most_alone_is_not_given_up_for_what_another_effe
     law, fouls = replace(lag("transfer"), kind="depends", driver="flow"), event("condenser", (250.0, 1e7))
     said = told(Given((law, fouls), 500.0, 0.9), Given((law,), 150.0, 0.3), Given((fouls,), 450.0, 0.8))
     assert said.word == "named" and [h.site for h in said.certain] == ["condenser"]
+
+
+@pytest.mark.parametrize(("kind", "sites"), [("depends", ["law", "blower"]), ("gain", ["law"])])
+def test_since_a_reference_a_law_of_the_plant_takes_no_event_that_explains_more(kind: str, sites: list[str]) -> None:
+    """A blower that stays where it is for some hours, of which a law draws a fifth. A gain may well have changed."""
+    law, stays = replace(lag("law"), kind=kind, driver="feed"), event("blower", (250.0, 200.0))  # type: ignore[arg-type]
+    found = Given((law, stays), 500.0, 0.9), Given((law,), 105.0, 0.3), Given((stays,), 350.0, 0.8)
+    assert [h.site for h in told(*found, since_reference=True).certain] == sites
+    assert [h.site for h in told(*found).certain] == ["law"]
 
 
 @pytest.mark.parametrize(
