@@ -82,7 +82,7 @@ def test_a_curve_in_time_beside_what_is_told_is_no_other_cause(monkeypatch: pyte
 
 @pytest.mark.parametrize(("over", "stands"), [((0.15, 0.9), True), ((0.25, 0.99), False), ((0.21, 1.01), False)])
 def test_what_stretches_show_must_be_better_than_the_model_as_it_is(over: tuple[float, float], stands: bool) -> None:
-    """From the state of a filter both outputs of a healthy wall erred by more, with a cause, than the plain free run."""
+    """From the state of a filter both outputs of a healthy wall erred by more with a cause than in a free run."""
     free = tuple(OutputChange(n, "", b, b, b, UNSURE) for n, b in (("level", 0.2), ("flow", 1.0)))
     said = tuple(OutputChange(n, "", 9.0, a, 0.1, SURELY_LESS) for n, a in zip(("level", "flow"), over, strict=True))
     assert asking._better_than_as_it_is(said, free) == stands
