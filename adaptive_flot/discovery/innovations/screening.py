@@ -99,14 +99,19 @@ class Screening:
         """The best switch at a site; None where none is worth its times.
 
         What enters or leaves a balance may also change by an amount, whatever else it depends on: people who are not
-        counted, while nobody is. A model with a site for such amounts has that already.
+        counted, while nobody is. A model with a site for such amounts has that already. And a force, to which amounts
+        are added, may change by a factor: a spring that is half as stiff.
         """
         found = [self._switch(site, mode) for mode in self._modes_of_switch(site)]
         return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
 
     def _modes_of_switch(self, site: Site) -> tuple[Mode, ...]:
+        if site.role not in BALANCE:
+            return (site.mode,)
+        if site.mode == "offset":
+            return (site.mode, "factor")
         amounts = any(s.mode == "offset" for s in self.model.sites if s.role in BALANCE)
-        return (site.mode,) if site.role not in BALANCE or amounts else (site.mode, "offset")
+        return (site.mode,) if amounts else (site.mode, "offset")
 
     def at_times_of(self, switch: Hypothesis, site: Site) -> list[Screened]:
         """A switch at the times of another one, at a site, whatever it gains: by a factor, by an amount, or either.

@@ -23,7 +23,9 @@ def settled(changes: Sequence[OutputChange], noise: FloatArray) -> tuple[tuple[s
     """
     known = np.where(noise > 0, noise, [c.noise for c in changes])
     wrong = [(c, c.before > AT_NOISE * s, c.after > AT_NOISE * s) for c, s in zip(changes, known, strict=True)]
-    return tuple(c.output for c, was, is_ in wrong if was and not is_), tuple(c for c, _, is_ in wrong if is_)
+    repaired = tuple(c.output for c, was, is_ in wrong if was and not is_)
+    # what the fit takes for noise stands beside these words: what is no more than that is not called wrong
+    return repaired, tuple(c for c, _, is_ in wrong if is_ and c.after > AT_NOISE * c.noise)
 
 
 def common(judgement: Judgement) -> tuple[tuple[str, str], ...]:

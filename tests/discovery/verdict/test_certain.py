@@ -24,6 +24,13 @@ def _judged(draught: Discovery, *names: tuple[tuple[str, str], ...]) -> Judgemen
     return Judgement("abstain", found[0], (), tuple(found[1:]), 10.0)
 
 
+def test_what_is_no_more_than_the_noise_beside_it_is_not_called_wrong() -> None:
+    """From row to row there may be less noise than the fit takes for it, and the table shows that of the fit."""
+    changes = (OutputChange("core", "degC", 0.337, 0.0754, 0.088, (0.7, 0.8)),)
+    assert settled(changes, np.array([0.04])) == ((), ())
+    assert settled(changes, np.array([0.07])) == (("core",), ())
+
+
 def test_outputs_at_their_noise_are_told_apart_from_those_still_wrong() -> None:
     repaired, wrong = settled(CHANGES, NOISE)
     assert repaired == ("level",) and [c.output for c in wrong] == ["grade"]

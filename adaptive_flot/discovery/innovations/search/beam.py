@@ -13,6 +13,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import EVENTS, SWITCHED
+from adaptive_flot.discovery.innovations.events.turned_over import with_events_turned_over
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, distinct, worth
 from adaptive_flot.discovery.innovations.search.search import Search
@@ -39,11 +40,12 @@ def best_explanations(
         if search.time_is_up:
             break
         progress(f"innovations form: explanations of {count} effect{'s' if count > 1 else ''}")
-        further = [e for start in beam for e in _further(search, start)]
-        ranked = distinct(further)
+        further = distinct([e for start in beam for e in _further(search, start)])
         if count > 1:
-            best_few = parallel_map(search.settled, ranked[: 2 * BEAM], search.processes)
-            ranked = distinct([*best_few, *ranked[2 * BEAM :]])
+            best_few = parallel_map(search.settled, further[: 2 * BEAM], search.processes)
+            further = distinct([*best_few, *further[2 * BEAM :]])
+        ranked = distinct(with_events_turned_over(search, further))
+        if count > 1:
             found += events_alone(search, ranked[:BEAM])
         found += ranked
         if not ranked or ranked[0].criterion < best.criterion + LEAST_GAIN:

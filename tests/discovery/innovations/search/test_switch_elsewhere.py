@@ -16,6 +16,7 @@ from adaptive_flot.discovery.innovations.search.beam import best_explanations, e
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Dataset
 from benchmarks.other_processes.plants.room_air import DT, make_model
+from tests.discovery.innovations.box import model as box_model
 
 ROWS, BEGINS, LEFT, FINE = 700, 520, 0.45, 10
 FAN_AIR, LEAKS, BREATH, VOLUME = 380.0, 55.0, 0.019, 180.0
@@ -54,6 +55,20 @@ def search(left: float) -> Search:
 @pytest.fixture(scope="module")
 def halved() -> Search:
     return search(LEFT)
+
+
+def test_a_force_may_change_by_a_factor_and_a_flow_by_an_amount() -> None:
+    """A spring that is half as stiff; uncounted guests, where no site of the model is for amounts; and a sensor."""
+    room, box = search(LEFT), box_model()
+    with np.errstate(all="ignore"):
+        screening = room.screening(room.base(room.model.parameter_values), [])
+    modes = {s.name: screening._modes_of_switch(s) for s in room.model.sites}
+    flows = [s.name for s in room.model.sites if s.role in ("flow", "process") and s.mode == "factor"]
+    assert flows and all(modes[name] == ("factor", "offset") for name in flows)
+    force = next(s for s in box.sites if s.name == "other_heat")
+    assert screening._modes_of_switch(force) == ("offset", "factor")
+    sensor = next(s for s in room.model.sites if s.role == "sensor")
+    assert modes[sensor.name] == (sensor.mode,)
 
 
 def test_the_times_of_a_site_tried_there_give_what_the_site_found_itself(halved: Search) -> None:
