@@ -25,12 +25,12 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE, Hypot
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
-from adaptive_flot.discovery.innovations.events.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.filter.thinning import is_short_since_reference
 from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
+from adaptive_flot.discovery.innovations.search.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event

@@ -1,9 +1,7 @@
-"""When something happened.
+"""When something happened, by the response of the innovations.
 
 Map
 ---
-switching.py    When something was switched on and off.
-halting.py      When a part did not follow what it was asked.
-pauses.py       Events that stop for short pauses only.
-turned_over.py  Events that are there from the first row on.
+switching.py  When something was switched on and off.
+halting.py    When a part did not follow what it was asked.
 """

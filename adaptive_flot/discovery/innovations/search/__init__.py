@@ -5,4 +5,6 @@ Map
 explanation.py  Effects that explain a record together, and what they are worth.
 search.py       A record, and what is asked of it: fits and regressions.
 beam.py         The explanations, found effect by effect.
+turned_over.py  Events that are there from the first row on.
+pauses.py       Events that stop for short pauses only.
 """

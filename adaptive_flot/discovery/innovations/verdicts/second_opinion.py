@@ -19,13 +19,13 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
-from adaptive_flot.discovery.innovations.events.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives, beside_alternatives
 from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near, one_that_all_have

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.innovations.events.halting import best_halt, still_stretch
+from adaptive_flot.discovery.innovations.events.halting import Halt, best_halt, still_stretch
 
 N = 120
 EDGES = np.arange(1, N - 1)
