@@ -18,7 +18,9 @@ def _asked(seed: int) -> np.ndarray:
     return np.repeat(rng.uniform(0.0, 4.0, N // 5), 5)
 
 
-def _found(v: np.ndarray, what_it_does: np.ndarray, seed: int, limits: tuple[float, float] = (0.0, 4.0)):
+def _found(
+    v: np.ndarray, what_it_does: np.ndarray, seed: int, limits: tuple[float, float] = (0.0, 4.0)
+) -> tuple[Halt | None, np.ndarray]:
     innovations = what_it_does - v + 0.05 * np.random.default_rng(seed).normal(size=N)
     return best_halt((AFTER * v[:, None], AFTER), EDGES, innovations, N, N, limits), innovations
 
