@@ -19,7 +19,7 @@ from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.search.turned_over import with_events_turned_over
 
 REFITTED, SAME_SITE = 6, 2
-"""Suspects that are refitted, and of these at one site."""
+"""Suspects that are refitted, and of these at one site: causes of the whole record, and events."""
 LAGS_ELSEWHERE = 3
 """Lags that are refitted besides, one a site."""
 HALTS = 2
@@ -113,7 +113,8 @@ def _spread(ranked: Sequence[Screened]) -> list[Screened]:
     for s in ranked:
         h = s.suspect.hypothesis
         same = [c.suspect.hypothesis for c in chosen if c.suspect.hypothesis.site == h.site]
-        if s.gain > 0 and len(same) < SAME_SITE and all((c.kind, c.driver) != (h.kind, h.driver) for c in same):
+        alike = [c for c in same if (c.kind in EVENTS) == (h.kind in EVENTS)]  # an event takes no place of a cause
+        if s.gain > 0 and len(alike) < SAME_SITE and all((c.kind, c.driver) != (h.kind, h.driver) for c in same):
             chosen.append(s)
         if len(chosen) == REFITTED:
             break
