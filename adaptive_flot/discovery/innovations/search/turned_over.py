@@ -1,7 +1,8 @@
 """Events that are there from the first row on: as well none, and one at all other times.
 
 The constants take up which of both levels is the usual one, so that a regression beside them finds either. Where a
-reference knows the constants, the record may tell. Without one, what begins takes fewer times than what ends.
+reference knows the constants, the record may tell. Else what is there for longer is the usual level, and of two that
+are there for as long, the first.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, E
 from adaptive_flot.discovery.innovations.search.pauses import SHORT
 from adaptive_flot.discovery.innovations.search.search import Search
 
+ABOUT_HALF = 0.4
+"""Share of a record from which an event that is there at first may be the usual state. A shorter one must explain
+surely less than what begins after it."""
 ASKED = 12
 """The best explanations whose events are turned over."""
 
@@ -27,7 +31,10 @@ def with_events_turned_over(search: Search, found: Sequence[Explanation]) -> lis
 
 
 def turned_over(search: Search, explanation: Explanation) -> Explanation:
-    """The explanation, its event at all other times, or at the last of them, where that is better."""
+    """The explanation, its event at all other times, or at the last of them, where that is better.
+
+    Or about as good, and the event is there for about half of the record or more.
+    """
     event = next((h for h in explanation.hypotheses if h.kind == "switch" and _is_there_at_first(search, h)), None)
     others = other_times(event.pulses) if event is not None else []
     if event is None or not others or search.time_is_up:
@@ -41,9 +48,13 @@ def turned_over(search: Search, explanation: Explanation) -> Explanation:
         max(_with_times(search, rest, event, switch_at(site, mode, times, dt), size), key=lambda e: e.criterion)
         for times in (others, others[-1:])
     )
-    best = max(explanation, whole, key=lambda e: e.criterion)
     # a pause of the event is no event of its own where it gains little
-    return last if last.criterion > best.criterion - LEAST_GAIN else best
+    turned = last if last.criterion > whole.criterion - LEAST_GAIN else whole
+    begins = search.record.time[0]
+    there = sum(min(a + long, search.record.time[-1]) - a for a, long in event.pulses)
+    is_usual = there >= ABOUT_HALF * (search.record.time[-1] - begins)
+    least = explanation.criterion + (-LEAST_GAIN if is_usual else LEAST_GAIN)
+    return turned if turned.criterion > least else explanation
 
 
 def other_times(pulses: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

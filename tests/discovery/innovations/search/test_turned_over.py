@@ -48,6 +48,20 @@ def test_a_lid_that_opens_is_not_told_as_one_that_was_shut(begin: float) -> None
     assert by_name["loss_by_time.amplitude"] == pytest.approx(np.log(4.0), abs=0.3)
 
 
+def test_a_short_event_at_first_stays_one() -> None:
+    """A lid that is shut after a tenth of the record: what is there for longer is the usual state."""
+    shuts = 390.0
+    data, plain = record(lids=((0.0, shuts),)), model()
+    search = Search(plain, data, (0,), np.array([0.03]), ("conductance", "exchange", "capacity", "wall_capacity"))
+    loss = next(s for s in plain.sites if s.name == "loss")
+    with np.errstate(all="ignore"):
+        base = search.base(plain.parameter_values)
+        opened = switch_at(loss, "factor", [(0.0, shuts)], DT)
+        told = search.added(base, opened, model_with(search.model_of(base), opened).parameter_values)
+        (event,) = turned_over(search, told).hypotheses
+    assert event.pulses == ((0.0, shuts),)
+
+
 def test_an_event_that_begins_later_stays_as_it_is() -> None:
     data, plain = record(lids=((OPENS, 1e9),)), model()
     search = Search(plain, data, (0,), np.array([0.03]), ("conductance",))
