@@ -321,11 +321,16 @@ def _pulse(site: Site, record: Dataset, begin: int, end: int) -> tuple[float, fl
     return float(time[begin] + _late(site, record.dt)), FOREVER if lasts else float(time[end] - time[begin])
 
 
-def switch_at(site: Site, mode: Mode, pulses: Sequence[tuple[float, float]], dt: float) -> Hypothesis:
-    """A switch whose size is free, from its times and durations [s]."""
+def times_of_switch(pulses: Sequence[tuple[float, float]]) -> dict[str, float]:
+    """Coefficients of a switch of no size yet, from its times and durations [s]."""
     told = {"amplitude": 0.0}
     for k, (on, length) in enumerate(pulses, 1):
         told |= {f"on_{k}": on, f"for_{k}": length}
+    return told
+
+
+def switch_at(site: Site, mode: Mode, pulses: Sequence[tuple[float, float]], dt: float) -> Hypothesis:
+    """A switch whose size is free, from its times and durations [s]."""
     settings = {"count": float(len(pulses)), "width": EDGE * dt}
-    effect = Effect(site.name, "time", "switch", told, settings, mode=mode)
+    effect = Effect(site.name, "time", "switch", times_of_switch(pulses), settings, mode=mode)
     return Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))

@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
+from adaptive_flot.discovery.innovations.screening import times_of_switch
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, worth
 from adaptive_flot.discovery.innovations.search.search import Search
 
@@ -56,8 +57,6 @@ def _whole(parted: Hypothesis) -> Hypothesis:
             last[1] = begin + long - last[0]
         else:
             spells.append([begin, long])
-    told = {"amplitude": 0.0}
-    for k, (begin, long) in enumerate(spells, 1):
-        told |= {f"on_{k}": begin, f"for_{k}": min(long, FOREVER)}
+    told = times_of_switch([(begin, min(long, FOREVER)) for begin, long in spells])
     settings = {**parted.effect.settings, "count": float(len(spells))}
     return replace(parted, effect=replace(parted.effect, coefficients=told, settings=settings))
