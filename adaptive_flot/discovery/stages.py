@@ -50,6 +50,7 @@ from adaptive_flot.discovery.verdict.judge import (
     least_separation,
     undecided_rivals,
 )
+from adaptive_flot.greybox.effects import LATE
 from adaptive_flot.greybox.rescaled import factors_of, rescaled
 from adaptive_flot.greybox.steady.assumed_start import wrong_start
 
@@ -166,7 +167,7 @@ def search_one_by_one(state: State) -> State:
     nominal = rescaled(state.model, factors_of(base.model))
     found = search(problem, base, nominal, first=state.first, processes=state.processes, progress=state.progress)
     alone = [a for a in state.first.round.alternatives if len(a.names) == 1] if state.first else []
-    late = {site: -a.delta_bic for a in alone for site, driver in a.names if driver == "lag"}
+    late = {(site, driver): -a.delta_bic for a in alone for site, driver in a.names if driver in LATE}
     return replace(state, search=found, first=None, late=late)
 
 

@@ -79,7 +79,8 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.kind == "sign":
         return f"{name} does not see the sign: it shows the absolute value ({100 * first:.0f} % of the way)"
     if h.kind == "lag":
-        return f"{name} answers late, with a time constant of {first:.3g} s"
+        what = "dead time" if h.driver == "delay" else "time constant"
+        return f"{name} answers late, with a {what} of {first:.3g} s"
     if h.kind == "store":
         tau = values["time_constant"]
         return f"{name} lacks a second store behind {h.driver.replace('_', ' ')}, with a time constant of {tau:.3g} s"

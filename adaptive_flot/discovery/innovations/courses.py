@@ -36,7 +36,9 @@ FOLLOWS = 0.5
 LEVELS = np.linspace(0.0, 1.0, 11)
 """Levels at which a part may be stuck, leak or end, as shares of the range of its value."""
 LAGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-"""Time constants that are tried, in sampling intervals."""
+"""Time constants and dead times that are tried, in sampling intervals."""
+STAGES = 6
+"""Equal lags in a row that stand for a dead time in the filter: each is a state more of its covariance."""
 STORES = (10.0, 30.0, 100.0, 300.0, 1000.0)
 """Time constants of a hidden store, likewise."""
 LONGEST = 0.1
@@ -147,7 +149,7 @@ def _at_site(
 
 
 def _stuck_or_late(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
-    """What a sensor and an actuator have in common: one level for all that is asked, or a lag."""
+    """What a sensor and an actuator have in common: one level for all that is asked, a lag or a dead time."""
     for level in v.min() + LEVELS * np.ptp(v):
         told = {"amplitude": 1.0, "level": float(level)}
         yield _fixed(Effect(site, "own_value", "stuck", told), "stuck", "level", level - v, MATTERS * float(np.ptp(v)))
@@ -156,6 +158,12 @@ def _stuck_or_late(site: str, v: FloatArray, size: float, dt: float) -> Iterator
             told = {"amplitude": 1.0, "time_constant": tau}
             effect = Effect(site, "lag", "lag", told, {"scale": size or 1.0})
             yield _fixed(effect, "lag", "time_constant", _lagged(v, tau, dt) - v, tau)
+    for rows in map(int, LAGS):
+        if rows <= LONGEST * len(v):
+            told = {"amplitude": 1.0, "dead_time": rows * dt}
+            effect = Effect(site, "delay", "delay", told, {"scale": size or 1.0, "stages": float(STAGES)})
+            late = np.concatenate([np.full(rows, v[0]), v[:-rows]])
+            yield _fixed(effect, "lag", "dead_time", late - v, rows * dt)
 
 
 def _leaks_or_ends(site: str, v: FloatArray) -> Iterator[Suspect]:

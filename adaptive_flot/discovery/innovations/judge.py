@@ -27,6 +27,9 @@ OWN = 0.8
 """Share of the gain that is lost without an event beside another effect, at least."""
 SAME_LAG = 0.8
 """Share of the gain from which a lag at another place is not told apart."""
+SAME_DEAD_TIME = 0.4
+"""The same of a dead time. What wanders in a process is as likely before it as behind it, but the filter has a chain of
+lags for it, which smooths what wanders: a tank whose gauge is late keeps 56 % of the gain by its pump there."""
 TOO_LARGE = "what fits best would have to be larger than such a fault can be"
 FOLDS = 5
 BY_CHANCE = 1e-3
@@ -257,8 +260,9 @@ def _certain_alone(search: Search, base: Explanation, told: Told, without: Mappi
 
 
 def late_anywhere(search: Search, base: Explanation, told: Told) -> Told:
-    """A lag that is named, as a class with each other place where it explains about as much (see `late_where`)."""
-    least = SAME_LAG * (told.best.criterion - base.criterion)
+    """A lag or a dead time that is named, as a class with each other place where it explains about as much."""
+    dead_time = any(h.kind == "lag" and h.driver == "delay" for h in told.certain)
+    least = (SAME_DEAD_TIME if dead_time else SAME_LAG) * (told.best.criterion - base.criterion)
     return late_where(search, told, lambda e, _: e.criterion - base.criterion >= least)
 
 

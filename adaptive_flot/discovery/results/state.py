@@ -56,7 +56,7 @@ class State:
     first
         Single effects on top of that fit, until the search goes on from there.
     late
-        By how much BIC falls with a lag alone, at each site where one was fitted.
+        By how much BIC falls with a lag or a dead time alone, by site and driver, where one was fitted.
     detection
         What the residual of that fit shows.
     search, judgement
@@ -100,7 +100,7 @@ class State:
     responses: Responses | None = None
     scored: tuple[Scorer, tuple[str, ...]] | None = None
     first: FirstRound | None = None
-    late: Mapping[str, float] = field(default_factory=dict)
+    late: Mapping[tuple[str, str], float] = field(default_factory=dict)
     detection: Detection | None = None
     search: SearchResult | None = None
     judgement: Judgement | None = None

@@ -29,14 +29,19 @@ def model() -> Model:
     )
 
 
-def record(seed: int, rows: int, wander: float) -> Dataset:
-    """The tank with so much noise on its balance [1/s^0.5], and a gauge that is late; Euler, twenty steps a row."""
+def record(seed: int, rows: int, wander: float, dead_rows: int | None = None) -> Dataset:
+    """The tank with so much noise on its balance [1/s^0.5], and a gauge that is late; Euler, twenty steps a row.
+
+    The gauge is late by a lag, or shows what was there `dead_rows` rows earlier.
+    """
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], rows // 20), 20)
-    x, shown, y = 0.0, 0.0, []
+    x, shown, held, y = 0.0, 0.0, [], []
     for k in range(rows):
         for _ in range(20):
             x += DT / 20 * (u[k] - x) / TIME + wander * np.sqrt(DT / 20) * rng.standard_normal()
             shown += DT / 20 * (x - shown) / LATE
-        y.append(shown + 0.01 * rng.standard_normal())
+        held.append(x)
+        late = shown if dead_rows is None else held[max(len(held) - 1 - dead_rows, 0)]
+        y.append(late + 0.01 * rng.standard_normal())
     return Dataset("tank", DT * np.arange(1.0, rows + 1), DT, u[:, None], np.array(y)[:, None])

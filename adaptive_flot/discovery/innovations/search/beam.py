@@ -21,7 +21,7 @@ from adaptive_flot.discovery.innovations.search.turned_over import with_events_t
 REFITTED, SAME_SITE = 6, 2
 """Suspects that are refitted, and of these at one site: causes of the whole record, and events."""
 LAGS_ELSEWHERE = 3
-"""Lags that are refitted besides, one a site."""
+"""Sites whose lag or dead time is refitted besides."""
 HALTS = 2
 """Parts that are stuck for a time, which are refitted besides."""
 BEAM = 3
@@ -73,12 +73,13 @@ def _further(search: Search, start: Explanation) -> list[Explanation]:
     if search.time_is_up:
         return []
     screening, screened = screened_beside(search, start)
-    refits = search.all_with(start, _spread(screened))
-    if search.since_reference and not start.hypotheses:
+    first = not start.hypotheses
+    refits = search.all_with(start, _spread(screened, both_forms=first))
+    if search.since_reference and first:
         held = held_at_the_reference(search, start)
         _, beside = screened_beside(search, held)
         constant = [s for s in beside if s.suspect.hypothesis.kind in CONSTANT and s.gain >= LEAST_GAIN]
-        spread = [s for s in _spread(beside) if not any(s is c for c in constant)]
+        spread = [s for s in _spread(beside, first) if not any(s is c for c in constant)]
         refits += search.all_with(start, [*spread, *constant], held)
     switched = [e for e in refits if e.hypotheses[-1].kind in SWITCHED]
     if switched:
@@ -103,11 +104,11 @@ def screened_beside(search: Search, start: Explanation) -> tuple[Screening, list
     return screening, [s for s in screened if search.may(s.suspect.hypothesis.kind)]
 
 
-def _spread(ranked: Sequence[Screened]) -> list[Screened]:
+def _spread(ranked: Sequence[Screened], both_forms: bool) -> list[Screened]:
     """The best few, one of a kind and few at one site; the best store, which most models leave out; what is hidden.
 
     Process noise follows what a lag does, and the filter what a sensor shows that has stopped. A regression says little
-    of either.
+    of either. Nor does it tell a lag from a dead time: both are refitted where `both_forms`.
     """
     chosen: list[Screened] = []
     for s in ranked:
@@ -122,8 +123,16 @@ def _spread(ranked: Sequence[Screened]) -> list[Screened]:
     further = [] if any(s in chosen for s in stores) else stores[:1]
     halts = [s for s in ranked if s.suspect.hypothesis.kind == "stuck for a time" and s.gain >= LEAST_GAIN]
     further += [s for s in halts[:HALTS] if s not in chosen]
-    by_site = {
-        s.suspect.hypothesis.site: s for s in reversed(ranked) if s.suspect.hypothesis.kind == "lag" and s.gain > 0
-    }
-    lags = sorted((s for s in by_site.values() if s not in chosen), key=lambda s: -s.gain)
-    return [*chosen, *further, *lags[:LAGS_ELSEWHERE]]
+    return [*chosen, *further, *_late(ranked, chosen, both_forms)]
+
+
+def _late(ranked: Sequence[Screened], chosen: Sequence[Screened], both_forms: bool) -> list[Screened]:
+    """The best lag or dead time of each of a few sites, or both, that is not among what is refitted already."""
+    late: dict[tuple[str, str], Screened] = {}
+    for s in ranked:
+        h = s.suspect.hypothesis
+        if h.kind == "lag" and s.gain > 0:
+            late.setdefault((h.site, h.driver if both_forms else ""), s)
+    further = [s for s in late.values() if s not in chosen]
+    sites = list(dict.fromkeys(s.suspect.hypothesis.site for s in further))[:LAGS_ELSEWHERE]
+    return [s for s in further if s.suspect.hypothesis.site in sites]

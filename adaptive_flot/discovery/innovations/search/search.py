@@ -168,15 +168,19 @@ class Search:
         (coefficient,) = late.free
         fitted = self.model_of(explanation)
         tau = float(fitted.parameters[fitted.index("parameters", late.effect.parameter(coefficient))].value)
+        # constants as they are beside the lag: without it they have moved to make up for it
+        constants = explanation.fit.p[list(fitted.indices("parameters", self.free))]
         found = []
         for site in sites:
             size = ordinary_size(values[site])
             told = {"amplitude": 1.0, coefficient: tau}
-            effect = Effect(site, "lag", late.effect.form, told, {"scale": size or 1.0})
+            effect = Effect(site, late.driver, late.effect.form, told, {**late.effect.settings, "scale": size or 1.0})
             if effect.label in taken or not np.isfinite(size):
                 continue
-            moved = Hypothesis(site, "lag", late.kind, effect, late.free, ({},), {}, late.scales)
-            p = model_with(self.model_of(rest), moved).parameter_values
+            moved = Hypothesis(site, late.driver, late.kind, effect, late.free, ({},), {}, late.scales)
+            there = model_with(self.model_of(rest), moved)
+            p = there.parameter_values
+            p[list(there.indices("parameters", self.free))] = constants
             again = self._better_start(rest, moved, p)
             found += [again] if np.isfinite(again.fit.log_likelihood) else []
         return found

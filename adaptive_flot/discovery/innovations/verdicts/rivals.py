@@ -221,12 +221,13 @@ def _lasts(h: Hypothesis) -> bool:
 
 
 def late_as_well(state: State, told: Told, site: str) -> bool:
-    """Whether a lag at a site explains about as much in a free run as that which is told, each alone.
+    """Whether a lag or dead time at a site explains about as much in a free run as what is told, each alone.
 
     A free run has no process noise whose assumed way to wander would tell the order of lags (see `late_where`).
     """
-    named = [state.late[h.site] for h in told.certain if h.kind == "lag" and h.site in state.late]
-    return bool(named) and state.late.get(site, 0.0) >= (1 - NEAR) * named[0] > 0
+    named = next((h for h in told.certain if h.kind == "lag"), None)
+    gain = state.late.get((named.site, named.driver), 0.0) if named is not None else 0.0
+    return named is not None and state.late.get((site, named.driver), 0.0) >= (1 - NEAR) * gain > 0
 
 
 def surely_worse(changes: tuple[OutputChange, ...], noise: FloatArray) -> bool:

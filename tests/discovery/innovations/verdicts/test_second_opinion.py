@@ -218,9 +218,15 @@ def test_a_drift_that_helps_is_not_replaced_by_something_elsewhere(
         ({"doser": -5.0, "probe": -5.0}, False),
     ],
 )
-def test_a_free_run_tells_one_lag_from_another_only_by_enough(gains: dict[str, float], as_well: bool) -> None:
-    given: Any = SimpleNamespace(late=gains)
-    told: Any = SimpleNamespace(certain=(SimpleNamespace(kind="lag", site="doser"),))
+@pytest.mark.parametrize("driver", ["lag", "delay"])
+def test_a_free_run_tells_one_lag_from_another_only_by_enough(
+    gains: dict[str, float], as_well: bool, driver: str
+) -> None:
+    other = {"lag": "delay", "delay": "lag"}[driver]  # a lag says nothing about a dead time, nor the other way round
+    given: Any = SimpleNamespace(
+        late={(site, driver): gain for site, gain in gains.items()} | {("probe", other): 1000.0}
+    )
+    told: Any = SimpleNamespace(certain=(SimpleNamespace(kind="lag", driver=driver, site="doser"),))
     assert rivals.late_as_well(given, told, "probe") == as_well
 
 
