@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.calibration import excluded_by
-from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, test_on_stretches
+from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, refined, test_on_stretches
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import SIZES_OPEN, Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
@@ -110,6 +110,9 @@ def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
     constants = search.known or compared.calibration.constants
     first = fit_all_rows(search.model, compared.rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
-    fits = [fit_all_rows(search.model, compared.rows, search.started(e, h), constants, first.fit) for e, h in effects]
-    tested = [test_on_stretches(search.model, compared.rows, f, hold_constants=True) for f in fits if f is not None]
+    model, rows = search.model, compared.rows
+    fits = [fit_all_rows(model, rows, search.started(e, h), constants, first.fit) for e, h in effects]
+    tested = [
+        test_on_stretches(model, rows, refined(model, rows, f), hold_constants=True) for f in fits if f is not None
+    ]
     return tested if len(tested) == len(effects) else []

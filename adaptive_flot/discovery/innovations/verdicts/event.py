@@ -11,7 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.comparison import blocks_of, rms, worse_outputs
-from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, model_with, test_on_stretches
+from adaptive_flot.discovery.hypotheses.cross_validation import (
+    Tested,
+    fit_all_rows,
+    model_with,
+    refined,
+    test_on_stretches,
+)
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
@@ -40,9 +46,13 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     model, rows = search.model, compared.rows
     constants = search.known or compared.calibration.constants
 
-    def tested(hypothesis: Hypothesis | None) -> Tested | None:
-        fitted = fit_all_rows(model, rows, hypothesis, constants, None if hypothesis is None else null_fit)
-        return None if fitted is None else test_on_stretches(model, rows, fitted, hold_constants=True)
+    def tested(hypothesis: Hypothesis) -> Tested | None:
+        fitted = fit_all_rows(model, rows, hypothesis, constants, null_fit)
+        return (
+            None
+            if fitted is None
+            else test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
+        )
 
     first = fit_all_rows(model, rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
