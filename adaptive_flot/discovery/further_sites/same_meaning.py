@@ -16,6 +16,16 @@ POINTS, WIDE, SAME = 24, 1e6, 1e-9
 from which two differ."""
 
 
+def is_same_part(model: Model, place: str, site: str) -> bool:
+    """Whether a further site is the part of a site: an amount beside its factor, or what is asked of it alone.
+
+    A valve that gives a third less, and one that is opened by a tenth less than the record says, are one part.
+    """
+    return is_part(place, site) or (
+        place.startswith(READING) and passed_on(model).get(site) == place.removeprefix(READING)
+    )
+
+
 def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = False) -> bool:
     """Whether an effect says the same as a change at a further site; or does the same, whatever it says.
 
@@ -26,9 +36,7 @@ def is_meant(model: Model, effect: Effect, place: str, *, does_the_same: bool = 
     """
     site = _site(model, effect.site)
     mode = effect.mode or site.mode
-    if is_part(place, site.name):
-        return True
-    if place.startswith(READING) and passed_on(model).get(site.name) == place.removeprefix(READING):
+    if is_same_part(model, place, site.name):
         return True
     if site.role == "sensor":
         return False

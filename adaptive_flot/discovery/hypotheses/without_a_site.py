@@ -22,11 +22,10 @@ from adaptive_flot.discovery.further_sites.places import (
     ENDS,
     LOSS,
     further_sites,
-    is_part,
     is_possible,
     with_further_sites,
 )
-from adaptive_flot.discovery.further_sites.same_meaning import is_meant
+from adaptive_flot.discovery.further_sites.same_meaning import is_meant, is_same_part
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words, too_many
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, stands, tied
@@ -106,7 +105,7 @@ def unless_without_a_site(
         t
         for t in stand
         if all(is_possible(model, record, *change(t), seen[change(t)[0]]) for record in rows.records)
-        and not any(is_part(change(t)[0], site) for site in sites)
+        and not any(is_same_part(calibration.model, change(t)[0], site) for site in sites)
     )
     rivals = sorted(possible, key=lambda t: t.total)
     if not rivals:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,11 +39,12 @@ from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
+from adaptive_flot.discovery.since_reference.places import with_what_is_nearest, with_words_without_a_site
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
+    MUCH_LEFT,
     leaves_more,
-    sites_told,
     taken_back,
     unless_contradicted,
     unless_more_than_noise,
@@ -51,12 +52,37 @@ from adaptive_flot.discovery.since_reference.taken_back import (
 )
 from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model
 
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
 NOT_ASKED = "the budget ended before it could be compared with process noise, which may explain as much"
 LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What is known with process noise.
+
+    Attributes
+    ----------
+    search, base
+        The search in the new record, and the model as it is there.
+    told, sole
+        What was judged; and what is certain alone, of explanations of two effects.
+    before
+        The search in the reference, and the model as it is there.
+    single
+        Explanations of one effect that were found, told or not.
+    """
+
+    search: Search
+    base: Explanation
+    told: Told
+    sole: Told | None
+    before: tuple[Search, Explanation]
+    single: tuple[Explanation, ...]
 
 
 @one_thread()
@@ -137,13 +163,13 @@ def _row_by_row(
         known = _with_process_noise(compared, record, reference, processes, progress, ends)
         if known is None:
             return None
-        search, base, told, sole, before = known
+        search, base, told, sole, before = known.search, known.base, known.told, known.sole, known.before
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         on_sites = unless_without_a_site(search, base, told)
         if search.time_is_up:
             return None
         if on_sites.word != told.word and NO_SITE in on_sites.why:
-            compared = _with_words_without_a_site(compared, told, on_sites.why)
+            compared = with_words_without_a_site(compared, told, on_sites.why)
         told = unless_hardly_off(on_sites)
         with_it = compared
         if _has_event(told):
@@ -159,7 +185,8 @@ def _row_by_row(
             return with_it
         kept = unless_contradicted(compared, told)
         kept = kept if kept is not compared else unless_unsupported(compared, search, base, told)
-        return kept if kept is not compared else unless_alike(compared, told)
+        kept = kept if kept is not compared else unless_alike(compared, told)
+        return with_what_is_nearest(kept, search, base, [told.best, *known.single])
 
 
 def _is_structure(told: Told) -> bool:
@@ -169,21 +196,6 @@ def _is_structure(told: Told) -> bool:
     all the same, the search of other shapes finds it.
     """
     return bool(told.effects) and all(h.kind in STRUCTURE for h in told.effects)
-
-
-def _with_words_without_a_site(compared: Comparison, vetoed: Told, why: str) -> Comparison:
-    """The comparison with what acts where no site is: a note where another part is told, else first.
-
-    What free runs tell at a site of what is `vetoed` with process noise is taken back.
-    """
-    verdict = compared.verdict
-    elsewhere = sites_told(verdict) - {h.site for h in vetoed.effects}
-    if elsewhere or verdict.word not in ("abstain", *WITH_A_NAME):
-        return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, f"With process noise it is {why}.")))
-    alone = f"By single faults of the whole record: {verdict.reason}"
-    compared = taken_back(compared, why)
-    reason = f"Something differs from the reference, {why}."
-    return replace(compared, verdict=replace(compared.verdict, reason=reason, notes=(*verdict.notes, alone)))
 
 
 def unless_an_event(
@@ -233,7 +245,16 @@ def _of_another_shape(
 
     Dry friction is found at its place by a turn of a given width, which leaves fifteen times the noise of an encoder. A
     shape at another place is not taken: the search of a long record has no innovations form to contradict it.
+
+    Where nothing is told and an output is far off, an event is taken from any place. A level that only adds up its
+    flows wanders for free in the filter: what began at some time and moves it is followed there, and not seen.
     """
+    verdict = compared.verdict
+    if left > 0 and verdict.word == "abstain" and any(c.before > MUCH_LEFT * c.noise for c in verdict.error):
+        searched = with_searched_effect(compared, record, processes, progress, left)
+        events = all(e.effect.names(CoefficientRole.ONSET) for e in searched.verdict.effects)
+        usual = all(c.after <= ABOVE_USUAL * c.noise for c in searched.verdict.error)
+        return searched if usual and events and searched.verdict.effects else compared
     if left <= 0 or unless_much_is_left(compared) is compared:
         return compared
     nearest = {e.effect.site for e in compared.verdict.effects} | {site for site, _ in compared.verdict.members}
@@ -250,11 +271,8 @@ def _with_process_noise(
     processes: int,
     progress: Callable[[str], None],
     ends: float,
-) -> tuple[Search, Explanation, Told, Told | None, tuple[Search, Explanation]] | None:
-    """What has changed, by a model that has what the reference lacks; both searches with the model as it is.
-
-    Of explanations of two effects also what is certain alone. None where the time was up before.
-    """
+) -> _Known | None:
+    """What has changed, by a model that has what the reference lacks; None where the time was up before."""
     calibration, columns = compared.calibration, compared.rows.columns
     constants, model = calibration.constants, calibration.model
     floor = noise_floor([reference], columns)
@@ -279,7 +297,8 @@ def _with_process_noise(
     before = replace(before, model=extended)
     there = before.base(extended.parameter_values)
     told = _changed(judge(search, base, found), search, before, there)
-    return search, base, told, sole_cause(search, base, found, told), (before, there)
+    single = tuple(e for e in found if len(e.hypotheses) == 1)
+    return _Known(search, base, told, sole_cause(search, base, found, told), (before, there), single)
 
 
 def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.further_sites.places import AMOUNT, further_sites, is_part, is_possible, with_further_sites
-from adaptive_flot.discovery.further_sites.same_meaning import is_meant
+from adaptive_flot.discovery.further_sites.same_meaning import is_meant, is_same_part
 from adaptive_flot.discovery.further_sites.wording import change_in_words
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.greybox import Dataset, Effect, Model, Parameter, Quantity, Scope
@@ -82,6 +82,16 @@ def test_what_no_input_or_state_moves_has_no_such_place() -> None:
     """An amount beside a constant is a factor of it."""
     places = {s.name for s in further_sites(with_further_sites(valve())) if s.name.startswith(AMOUNT)}
     assert places == {"amount at opening"}
+
+
+def test_what_is_asked_of_an_actuator_is_the_same_part_and_what_others_read_is_not() -> None:
+    """A clogged strainer was told as a valve "0.104 less than the record says: the model has no site for that"."""
+    model = valve()
+    assert is_same_part(model, "reading of command", "positioner")
+    assert is_same_part(model, "amount at opening", "opening")
+    assert not is_same_part(model, "reading of difference", "positioner")
+    assert not is_same_part(model, "reading of command", "opening")  # a function of the state that the command moves
+    assert not is_same_part(model, "balance of stem", "positioner")
 
 
 def test_an_amount_is_part_of_its_site_and_of_no_other() -> None:

@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.further_sites.places import further_sites, is_part, is_possible, with_further_sites
-from adaptive_flot.discovery.further_sites.same_meaning import is_meant
+from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
+from adaptive_flot.discovery.further_sites.same_meaning import is_meant, is_same_part
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words, too_many
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
@@ -49,17 +49,19 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     further = replace(search, model=with_further_sites(search.model))
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, left_out)
     sites = {h.site for h in told.best.hypotheses}
-    places = [s for s in further_sites(further.model) if not any(is_part(s.name, site) for site in sites)]
+    places = [
+        s for s in further_sites(further.model) if not any(is_same_part(search.model, s.name, site) for site in sites)
+    ]
     screening = further.screening(rest, [s.name for s in places])
     found = further.all_with(rest, [s for site in places for s in _at(screening, site, event)])
-    changes = ((e, *_change(further, e)) for e in found)
+    changes = ((e, *change_at(further, e)) for e in found)
     possible = (e for e, at, by in changes if is_possible(search.model, search.record, at, by, screening.seen(at)))
     rivals = sorted(possible, key=lambda e: -e.criterion)
     if not rivals:
         return told
     if told_apart(further, base, rivals[0], told.best):
-        near = _best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
-        return replace(told, word="abstain", certain=(), open=(), why=as_if([_words(further, e) for e in near]))
+        near = best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
+        return replace(told, word="abstain", certain=(), open=(), why=as_if([words_at(further, e) for e in near]))
     # where a part rests, what it gives has no factor: an amount there is the part's own
     resting = [h for h in told.effects if _is_amount_beside_a_factor(further, h) and _rests(further, rest, h)]
     is_open = len({h.site for h in told.effects}) > 1  # what does the same as a member of a class adds nothing to it
@@ -75,10 +77,10 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     if not one_of_them or not others or told_apart(further, base, told.best, others[0]):
         return told
     if len(told.open) >= LARGEST_CLASS:
-        why = too_many(len(told.open), _words(further, others[0]))
+        why = too_many(len(told.open), words_at(further, others[0]))
         return replace(told, word="abstain", certain=(), open=(), why=why)
     beside = others[0].hypotheses[-1]
-    return replace(told, beside=WithoutSite(beside.site, beside.driver, _words(further, others[0])))
+    return replace(told, beside=WithoutSite(beside.site, beside.driver, words_at(further, others[0])))
 
 
 def _is_amount_beside_a_factor(further: Search, h: Hypothesis) -> bool:
@@ -92,7 +94,7 @@ def _rests(further: Search, rest: Explanation, h: Hypothesis) -> bool:
     return bool(inside.any() and np.median(value[inside]) <= AT_REST * value.max())
 
 
-def _best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
+def best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
     """The best explanation of each place, the best first."""
     kept: dict[str, Explanation] = {}
     for e in found:
@@ -110,15 +112,15 @@ def _at(screening: Screening, site: Site, event: Hypothesis | None) -> Sequence[
     return [*screening.at_times_of(event, site), *([own] if own is not None else [])]
 
 
-def _change(further: Search, explanation: Explanation) -> tuple[str, float]:
+def change_at(further: Search, explanation: Explanation) -> tuple[str, float]:
     """The place of an explanation, and its amount there."""
     h, model = explanation.hypotheses[-1], further.model_of(explanation)
     return h.site, float(model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value)
 
 
-def _words(further: Search, explanation: Explanation) -> str:
-    """What acts where and when; how much, where the constants are known by which a rate is measured."""
-    h, (place, amount) = explanation.hypotheses[-1], _change(further, explanation)
+def words_at(further: Search, explanation: Explanation) -> str:
+    """In words what acts where and when; how much, where the constants are known by which a rate is measured."""
+    h, (place, amount) = explanation.hypotheses[-1], change_at(further, explanation)
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
     measured = further.known is not None and not further.known.up_to_a_factor()
     return change_in_words(further.model, place, amount, when, measured)

@@ -124,18 +124,19 @@ def smaller(error: tuple[OutputChange, ...], than: tuple[OutputChange, ...], all
 def hardly_explained(changes: tuple[OutputChange, ...], above: float = FAR_ABOVE, share: float = EXPLAINED) -> bool:
     """Whether an output is far above its noise, and too little of what its squared error is above that is removed.
 
-    With the errors b before and a after, and its noise or usual error s::
+    Then something else is the matter, which any name may stand in for, see `explains_too_little`.
+    """
+    return any(explains_too_little(c.before, c.after, c.noise, above, share) for c in changes)
+
+
+def explains_too_little(before: float, after: float, usual: float, above: float, share: float = EXPLAINED) -> bool:
+    """Whether an error is far above what is usual, and too little of what its square is above that is removed.
+
+    With the errors b before and a after, and the noise or usual error s::
 
         b > above s    and    (a^2 - s^2) > (1 - share) (b^2 - s^2)
-
-    Then something else is the matter, which any name may stand in for.
     """
-
-    def hardly(c: OutputChange) -> bool:
-        before, after, usual = c.before**2, c.after**2, c.noise**2
-        return c.before > above * c.noise and after - usual > (1 - share) * (before - usual)
-
-    return any(map(hardly, changes))
+    return before > above * usual and after**2 - usual**2 > (1 - share) * (before**2 - usual**2)
 
 
 def not_two(told: Told) -> Told:
