@@ -43,7 +43,6 @@ from adaptive_flot.discovery.since_reference.places import with_what_is_nearest,
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
-    MUCH_LEFT,
     leaves_more,
     taken_back,
     unless_contradicted,
@@ -52,7 +51,6 @@ from adaptive_flot.discovery.since_reference.taken_back import (
 )
 from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model
 
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
@@ -245,16 +243,7 @@ def _of_another_shape(
 
     Dry friction is found at its place by a turn of a given width, which leaves fifteen times the noise of an encoder. A
     shape at another place is not taken: the search of a long record has no innovations form to contradict it.
-
-    Where nothing is told and an output is far off, an event is taken from any place. A level that only adds up its
-    flows wanders for free in the filter: what began at some time and moves it is followed there, and not seen.
     """
-    verdict = compared.verdict
-    if left > 0 and verdict.word == "abstain" and any(c.before > MUCH_LEFT * c.noise for c in verdict.error):
-        searched = with_searched_effect(compared, record, processes, progress, left)
-        events = all(e.effect.names(CoefficientRole.ONSET) for e in searched.verdict.effects)
-        usual = all(c.after <= ABOVE_USUAL * c.noise for c in searched.verdict.error)
-        return searched if usual and events and searched.verdict.effects else compared
     if left <= 0 or unless_much_is_left(compared) is compared:
         return compared
     nearest = {e.effect.site for e in compared.verdict.effects} | {site for site, _ in compared.verdict.members}

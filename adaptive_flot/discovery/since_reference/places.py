@@ -16,6 +16,7 @@ from adaptive_flot.discovery.further_sites.places import further_sites, is_possi
 from adaptive_flot.discovery.further_sites.wording import NO_SITE, as_if
 from adaptive_flot.discovery.hypotheses.comparison import rms
 from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows, refined, test_on_stretches
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
@@ -30,7 +31,7 @@ from adaptive_flot.discovery.since_reference.taken_back import sites_told, taken
 REFITTED = 12
 """Changes at further places that are refitted, the best by a regression."""
 MOST_PULSES = 3
-"""Times that such a change is there at most: one that comes and goes more often draws whatever is left."""
+"""Times that a change is there at most, here or at a site: one that comes and goes more often draws what is left."""
 
 
 def with_what_is_nearest(
@@ -95,15 +96,24 @@ def nearest_without_a_site(
     places = further_sites(further.model)
     screening = further.screening(base, [s.name for s in places])
     changes = [c for s in places for c in (screening.switch(s), screening.ramp(s), *screening.constant(s))]
-    few = [c for c in changes if c is not None and len(c.suspect.hypothesis.pulses) <= MOST_PULSES]
+    few = [c for c in changes if c is not None and _is_there_few_times(c.suspect.hypothesis)]
     changed = further.all_with(base, sorted(few, key=lambda c: -c.gain)[:REFITTED])
     moved = ((e, *change_at(further, e)) for e in changed)
     possible = (e for e, at, by in moved if is_possible(search.model, search.record, at, by, screening.seen(at)))
     rivals = best_of_each(sorted(possible, key=lambda e: -worth(e)))
-    if not rivals or worth(rivals[0]) <= max(map(worth, found)) or not _explains(compared, further, rivals[0]):
+    at_sites = (worth(e) for e in found if all(map(_is_there_few_times, e.hypotheses)))
+    if (
+        not rivals
+        or worth(rivals[0]) <= max(at_sites, default=worth(base))
+        or not _explains(compared, further, rivals[0])
+    ):
         return []
     near = [rivals[0], *(e for e in rivals[1:] if not told_apart(further, base, rivals[0], e))]
     return [words_at(further, e) for e in near]
+
+
+def _is_there_few_times(h: Hypothesis) -> bool:
+    return len(h.pulses) <= MOST_PULSES
 
 
 def _explains(compared: Comparison, further: Search, explanation: Explanation) -> bool:
