@@ -143,15 +143,15 @@ def not_two(told: Told) -> Told:
     """Nothing where two effects are needed, named or of a class, and neither is a store, which most models leave out.
 
     Two things that have gone wrong at a time are rarer than a model that is wrong in a third way, which two effects
-    stand in for. A store and a dependence are two such effects as well: both say how the process is. Of a class, one
-    explanation without a second effect is enough. A constant error and an event at one site are one thing: its level
-    before and after.
+    stand in for. A store and a dependence are two such effects as well, or two stores: both say how the process is. A
+    gauge that slips was told as two stores, at the inflow and at the outflow. Of a class, one explanation without a
+    second effect is enough. A constant error and an event at one site are one thing: its level before and after.
     """
     levels = {h.site for h in told.certain if h.driver == "constant"}
     kinds = [h.kind for h in told.certain if not (h.kind in EVENTS and h.site in levels)]
     if told.word == "class" and not told.certain and all(_of_two(e) for e in told.alike):
         said = f"one of {', '.join(h.label for h in told.effects)}, and a further one"
-    elif len(kinds) < 2 or ("store" in kinds and not {"depends", "turns"} & set(kinds)):
+    elif len(kinds) < 2 or (kinds.count("store") == 1 and not {"depends", "turns"} & set(kinds)):
         return told
     else:
         said = " and ".join(h.label for h in told.certain)

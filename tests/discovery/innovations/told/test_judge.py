@@ -221,6 +221,13 @@ def test_two_effects_by_name_are_rarer_than_a_third_thing_that_they_stand_in_for
     assert rivals.not_two(told(Given((first,), 500.0, 1.0))).word == "named"
 
 
+def test_two_stores_say_how_the_process_is_and_are_no_fault() -> None:
+    """A gauge that slips was named as a store behind the inflow, and another one behind the outflow."""
+    stores = [replace(lag(site), kind="store", driver="level") for site in ("inflow", "outflow")]
+    said = told(Given(tuple(stores), 500.0, 0.9), *(Given((s,), 300.0, 0.5) for s in stores))
+    assert said.word == "named" and rivals.not_two(said).word == "abstain"
+
+
 @pytest.mark.parametrize(("alone", "word"), [(False, "abstain"), (True, "class")])
 def test_a_class_of_events_that_all_need_a_second_effect_is_not_told(alone: bool, word: str) -> None:
     """A motor's dry friction was seven pulses of its voltage or its load, with an offset or a dead zone beside them."""

@@ -191,3 +191,44 @@ def test_nothing_comes_of_effects_of_the_free_run_that(
     others: Any, settings: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert among(monkeypatch, *others, **settings) is None
+
+
+def law_of_speed() -> Hypothesis:
+    effect = Effect("gains", "speed", "direction", {"turn": 1.0, "width": 0.1}, {"scale": 0.1}, mode="offset")
+    return Hypothesis("gains", "speed", "alternative", effect, (), ({},))
+
+
+@pytest.mark.parametrize(
+    ("word", "course", "law", "said"),
+    [
+        ("class", 80.0, 120.0, True),  # the law of a signal explains more than the free curve
+        ("class", 120.0, 80.0, False),
+        ("class", 115.0, 120.0, False),  # the curve explains about as much
+        ("abstain", 80.0, 120.0, True),
+    ],
+)
+def test_a_law_of_a_signal_may_stand_where_the_free_run_tells_a_free_curve_in_time(
+    monkeypatch: pytest.MonkeyPatch, word: str, course: float, law: float, said: bool
+) -> None:
+    """A free curve in time follows anything. Dry friction was taken back with it, though the search had both."""
+    in_time = Given(course, (Hypothesis("gains", "time", "alternative", CURVE, (), ({},)),))
+    by_speed = Given(law, (law_of_speed(),))
+
+    def judge(search: Any, base: Any, found: Any) -> Told:
+        return Told("named", found[0], found[0].hypotheses, (), tuple(e for e in found if law - e.criterion < 10), "")
+
+    monkeypatch.setattr(asking, "judge", judge)
+    named = [
+        SimpleNamespace(effects=k, names=(("gains", k),), fit=SimpleNamespace(model=None, names=()))
+        for k in ("time", "speed")
+    ]
+    state: Any = SimpleNamespace(
+        judged=SimpleNamespace(word=word, best=SimpleNamespace(effects=(CURVE,))),
+        contradiction="",
+        searched=(None, SimpleNamespace(alternatives=named)),
+    )
+    search: Any = Stand({"time": in_time, "speed": by_speed})
+    base: Any = Given(0.0, ())
+    found = asking.among_alternatives(state, search, base, [])
+    assert (found is not None) == said
+    assert found is None or [h.driver for h in found.effects] == ["speed"]
