@@ -29,7 +29,6 @@ import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
-from adaptive_flot.discovery.candidates.turns import turns_with
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.noise import Noise, with_rows_before
@@ -262,22 +261,6 @@ class Scorer:
         A = self._grams[columns.start]
         ridge = (1e-9 * np.trace(A) / len(A) + 1e-30) * np.eye(len(A))
         return cast(FloatArray, np.linalg.solve(A + ridge, self._along[columns]))
-
-    def of_dry_friction(self) -> list[Score]:
-        """Scores of what turns with the sign of a signal at a force that has its sign: dry friction beside a damper.
-
-        A damper takes up what it can of dry friction, to the end of its range. Along such a fit the turn scores low.
-        """
-        values = self._responses.site_values
-        turned = [
-            score
-            for c in self.candidates
-            if (c.site.role, c.site.mode) == ("process", "offset") and c.driver in self.drivers
-            and turns_with(values[c.site.name], self.drivers[c.driver])
-            for score in self.variant_scores(c)
-            if score.variant.effect.form == "direction"
-        ]  # fmt: skip
-        return _ranked(turned)
 
     def variant_scores(self, candidate: Candidate) -> list[Score]:
         """Scores of all variants of one candidate, best first."""

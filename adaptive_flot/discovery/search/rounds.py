@@ -76,9 +76,6 @@ def run_round(
                 # a further effect must have a name: a pair of curves without one would explain anything
                 wanted = [s for s in wanted if s.candidate.known]
                 wanted = with_each_output(scorer, wanted, still_wrong(problem, before.fit))
-            else:
-                names = {s.candidate.name for s in wanted}
-                wanted += [s for s in scorer.of_dry_friction() if s.candidate.name not in names]
             wanted = [s for s in wanted if s.penalised > threshold]
             linearisations.append(ScoredLinearisation(scorer, wanted))
         progress("fit")

@@ -12,9 +12,6 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.record.problem import make_problem
-from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.discovery.since_reference import searched_change
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
@@ -100,13 +97,3 @@ def test_dry_friction_that_came_since_a_reference_has_changed(monkeypatch: pytes
     assert (told.effect.site, told.effect.driver, told.effect.form) == ("friction", "speed", "direction")
     assert told.effect.coefficients["turn"] == pytest.approx(15.0, rel=0.05)
     assert "has changed since the reference" in verdict.reason
-
-
-def test_what_turns_at_a_force_that_has_the_sign_of_a_speed_is_always_tried() -> None:
-    """A cylinder's damper took dry friction up to the end of its range. Along that fit the truth scored 28th of 43."""
-    problem = make_problem(record(15.0), drive(), ("viscous", "mass"), burn_in=30, guard=5, cycles=20)
-    fit = Fitter(problem).fit(drive())
-    assert fit is not None
-    found = scorer_of(problem, fit)[0].of_dry_friction()
-    assert [s.candidate.name for s in found] == [("friction", "speed")]
-    assert {s.variant.effect.form for s in found} == {"direction"}

@@ -14,7 +14,6 @@ from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
-from adaptive_flot.discovery.innovations.verdicts.rivals import follows_time
 from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 
@@ -75,7 +74,7 @@ def among_alternatives(
     Parameters
     ----------
     state
-        Its judgement tells nothing, or a free curve in time.
+        Its judgement tells nothing.
     search, base, found
         The innovations form, and its own explanations.
 
@@ -87,8 +86,7 @@ def among_alternatives(
     """
     _, result = state.searched
     compared = result.alternatives[:COMPARED]
-    silent = state.judged.word == "abstain" and not state.contradiction
-    if not (silent or follows_time(state)) or any(len(a.names) > 1 for a in compared):
+    if state.judged.word != "abstain" or state.contradiction or any(len(a.names) > 1 for a in compared):
         return None
     fitted = [search.of_effects(a.effects, a.fit.model, a.fit.names) for a in compared]
     best_of = {_name(e): e for e in sorted([*found, *(e for e in fitted if e is not None)], key=lambda e: e.criterion)}
