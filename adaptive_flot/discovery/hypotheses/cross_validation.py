@@ -270,6 +270,17 @@ def refined(model: Model, rows: Rows, first: Fitted, refresh: int = REFRESH) -> 
     return replace(first, fit=fit) if fit.cost <= first.fit.cost else first
 
 
+def fitted_and_tested(
+    model: Model, rows: Rows, hypothesis: Hypothesis, constants: Constants, base: JointFit
+) -> Tested | None:
+    """A hypothesis since a reference, fitted with its own derivatives and judged on stretches; None if it has no run.
+
+    Arguments are those of `fit_all_rows`. Constants stay as they are on all rows, see `test_on_stretches`.
+    """
+    fitted = fit_all_rows(model, rows, hypothesis, constants, base)
+    return None if fitted is None else test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
+
+
 def with_effect_states(model: Model, x: FloatArray) -> FloatArray:
     """Initial state (nx,) with those of the effect behind: a lag starts where it follows, a store at rest."""
     return stores_at_rest(model, np.concatenate([x, np.ones(len(model.states) - len(x))]))

@@ -30,11 +30,8 @@ from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, stands, tied
 from adaptive_flot.discovery.hypotheses.cross_validation import (
-    REFRESH,
     Tested,
-    fit_all_rows,
-    refined,
-    test_on_stretches,
+    fitted_and_tested,
 )
 from adaptive_flot.discovery.hypotheses.families import MATTERS, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
@@ -87,10 +84,7 @@ def unless_without_a_site(
         if time.monotonic() > ends:
             return None
         with np.errstate(all="ignore"):
-            fitted = fit_all_rows(model, rows, h, constants, base, refresh=REFRESH)
-            if fitted is None:
-                return None
-            return test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
+            return fitted_and_tested(model, rows, h, constants, base)
 
     seen, _ = seen_values(model, base, rows.records)
     found = parallel_map(tested, _changes(model, seen), processes, lambda: None)

@@ -15,7 +15,7 @@ import numpy as np
 from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.wording import NO_SITE, as_if
 from adaptive_flot.discovery.hypotheses.comparison import rms
-from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows, refined, test_on_stretches
+from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows, fitted_and_tested
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
@@ -53,7 +53,7 @@ def with_what_is_nearest(
     if verdict.word != "abstain" or not far or NO_SITE in verdict.reason or search.time_is_up:
         return compared
     words = nearest_without_a_site(compared, search, base, found)
-    if not words:
+    if not words or search.time_is_up:  # what is cut short would say another place on another machine
         return compared
     reason = f"Something differs from the reference. It is not told what, but it is {as_if(words)}."
     said = f"By single faults of the whole record: {verdict.reason}"
@@ -122,10 +122,10 @@ def _explains(compared: Comparison, further: Search, explanation: Explanation) -
     model, usual = further.model, compared.calibration.usual.overall
     first = fit_all_rows(model, rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
-    fitted = fit_all_rows(model, rows, further.started(explanation, explanation.hypotheses[-1]), constants, first.fit)
-    if fitted is None:
+    hypothesis = further.started(explanation, explanation.hypotheses[-1])
+    tested = fitted_and_tested(model, rows, hypothesis, constants, first.fit)
+    if tested is None:
         return False
-    tested = test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
     before, after = rms(rows, first.fit.errors), rms(rows, tested.fresh)
     errors = zip(before, np.nan_to_num(after, nan=np.inf), usual, strict=True)
     return not any(explains_too_little(b, a, s, ABOVE_USUAL) for b, a, s in errors)

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.calibration import excluded_by
-from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, refined, test_on_stretches
+from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, fitted_and_tested
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import SIZES_OPEN, Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
@@ -111,8 +111,6 @@ def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
     first = fit_all_rows(search.model, compared.rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
     model, rows = search.model, compared.rows
-    fits = [fit_all_rows(model, rows, search.started(e, h), constants, first.fit) for e, h in effects]
-    tested = [
-        test_on_stretches(model, rows, refined(model, rows, f), hold_constants=True) for f in fits if f is not None
-    ]
+    fits = [fitted_and_tested(model, rows, search.started(e, h), constants, first.fit) for e, h in effects]
+    tested = [t for t in fits if t is not None]
     return tested if len(tested) == len(effects) else []

@@ -12,13 +12,11 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.comparison import blocks_of, rms, worse_outputs
 from adaptive_flot.discovery.hypotheses.cross_validation import (
-    Tested,
     fit_all_rows,
+    fitted_and_tested,
     model_with,
-    refined,
     test_on_stretches,
 )
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
@@ -46,20 +44,13 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     model, rows = search.model, compared.rows
     constants = search.known or compared.calibration.constants
 
-    def tested(hypothesis: Hypothesis) -> Tested | None:
-        fitted = fit_all_rows(model, rows, hypothesis, constants, null_fit)
-        return (
-            None
-            if fitted is None
-            else test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
-        )
-
     first = fit_all_rows(model, rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
-    null_fit = first.fit
     null = test_on_stretches(model, rows, first, hold_constants=True)
     events = [(told.best, h) for h in told.certain] or list(told.open)
-    found = [t for e, h in events if (t := tested(search.started(e, h))) is not None]
+    hypotheses = (search.started(e, h) for e, h in events)
+    tested = (fitted_and_tested(model, rows, h, constants, first.fit) for h in hypotheses)
+    found = [t for t in tested if t is not None]
     if not found or not np.nanmean(rms(rows, found[0].fresh) / rms(rows, null.fresh)) < 1:
         return compared
     word = "class" if told.word == "class" and len(found) > 1 else "named"
