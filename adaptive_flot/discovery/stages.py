@@ -27,6 +27,7 @@ from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
+from adaptive_flot.discovery.record.even_steps import steps_evenly
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.discovery.record.screening import screen
@@ -94,7 +95,8 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
         return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
     responses = Responses(problem, base)
-    problem = replace(problem, site_sizes=responses.sizes, absorbed=responses.absorbed_constants())
+    evenly = frozenset(j for j, values in enumerate(problem.measured.T) if steps_evenly(values))
+    problem = replace(problem, site_sizes=responses.sizes, absorbed=responses.absorbed_constants(), evenly_moved=evenly)
     noise = noise_by_differences(problem.measured)
     start = base.initial_state, parameters_of(base)
     said = steps_words(state.model, model)

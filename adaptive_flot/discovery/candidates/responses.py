@@ -187,6 +187,14 @@ class Responses:
             part[:, :, at_once] = self._direct[part_of][:, :, where[at_once]] * profiles[part_of][:, None, at_once]
         return responses
 
+    def output_of(self, site: str) -> tuple[int, float] | None:
+        """Index of the measured output that shows a site most, and its usual response to it; None where none does."""
+        answers = self.of([TimeProfile(site, np.ones(len(self.site_values[site])), True)])[:, :, 0]
+        strength = np.nanmedian(np.abs(answers) / self.problem.weights, axis=0)
+        j = int(np.argmax(strength))
+        own = float(np.median(answers[:, j]))
+        return (j, own) if strength[j] > 0 and own else None
+
     def of(self, profiles: list[TimeProfile], rows: BoolArray | None = None) -> FloatArray:
         """Responses (N, m, r) of the measured outputs to r profiles; only of the true rows (N,), if given."""
         source = [self._q + self.sites.index(c.site) for c in profiles]

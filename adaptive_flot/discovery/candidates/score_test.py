@@ -126,6 +126,10 @@ class Scorer:
         """Every variant of every candidate, with its columns."""
         return chain.from_iterable(self._variants.values())
 
+    def output_of(self, site: str) -> tuple[int, float] | None:
+        """Index of the measured output that shows a site most, and its usual response to it; None where none does."""
+        return self._responses.output_of(site)
+
     def in_mode(self, site: str, mode: str | None, wanted: str | None) -> float:
         """Factor that turns a small change at a site, given in one mode (None: the site's own), into another mode."""
         own = next(s.mode for s in self.fit.model.sites if s.name == site)

@@ -14,6 +14,7 @@ from adaptive_flot.discovery.record.noise import proportional
 from adaptive_flot.discovery.record.problem import CYCLES, Problem, make_problem, split_names
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 BURN_IN_ROWS = 30
 GUARD_ROWS = 5
@@ -62,6 +63,9 @@ def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
     placed = placements(problem.record, model)
     problem = with_nodes(problem, start, placed)
     first = Fitter(problem).fit(model, like=start, rounds=1)
+    if first is not None and not _runs_at_every_row(problem, first):
+        problem = replace(problem, nodes=None)  # long steps led the search to where the model itself does not run
+        first = Fitter(problem).fit(model, like=start, rounds=1)
     if first is None:
         return None
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
@@ -71,3 +75,9 @@ def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
     if base is None:
         return None
     return problem, fitter.settled(base)
+
+
+def _runs_at_every_row(problem: Problem, fit: Fit) -> bool:
+    """Whether the model runs with what the fit came to when it is simulated at every row."""
+    run = RecordSimulator(fit.model, problem.record.dt)
+    return bool(np.isfinite(run.outputs(problem.record, fit.initial_state, fit.model.parameter_values)).all())

@@ -5,6 +5,7 @@ Map
 screening.py          What in a record can not be used, said before anything is fitted.
 problem.py            Rows in splits, measured outputs, unknowns that are no effect.
 moved_inputs.py       Inputs that act one row later than the record says.
+even_steps.py         Outputs that move at even times only: an analyser that is kept in between.
 noise.py              What the noise of each output looks like.
 robust.py             Spread without outliers, noise without a model, spikes.
 effective_samples.py  How many rows of a correlated series count as one sample.

@@ -53,6 +53,8 @@ class Problem:
     absorbed
         Sites, each with a mode, whose constant change the adapted parameters take up along the model as it is. None is
         offered beside an effect either: there it would only put right what the shape of that one lacks.
+    evenly_moved
+        Measured outputs, as indices into `columns`, that move at even times only: see `record.even_steps`.
     deadline
         When searches and fits are to end, by `time.monotonic` [s]: they keep what they have come to.
     nodes
@@ -72,6 +74,7 @@ class Problem:
     background: Background | None = None
     site_sizes: Mapping[str, float] = field(default_factory=dict)
     absorbed: frozenset[tuple[str, str]] = frozenset()
+    evenly_moved: frozenset[int] = frozenset()
     deadline: float = float("inf")
 
     @property

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
+from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
@@ -109,12 +109,10 @@ def held_score(responses: Responses, plain: Fit, score: Score) -> Score | None:
     """
     problem, site = responses.problem, score.candidate.site.name
     value = responses.site_values[site]
-    answers = responses.of([TimeProfile(site, np.ones(len(value)), True)])[:, :, 0]
-    strength = np.nanmedian(np.abs(answers) / problem.weights, axis=0)
-    j = int(np.argmax(strength))
-    own = float(np.median(answers[:, j]))
-    if not strength[j] > 0 or not own:
+    output = responses.output_of(site)
+    if output is None:
         return None
+    j, own = output
     residual = without_spikes(plain.residual(problem) / problem.weights)[:, j]
     counted = np.isfinite(residual) & problem.rows("estimate")
     shown = value + np.nan_to_num(residual) * problem.weights[:, j] / own

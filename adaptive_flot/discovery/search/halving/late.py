@@ -1,4 +1,4 @@
-"""Sensors that are read at intervals: only one that is late may be."""
+"""Sensors that are read at intervals: one that is late may be, and so may one that moves at even times only."""
 
 from __future__ import annotations
 
@@ -16,12 +16,33 @@ from adaptive_flot.greybox.stepping.record import RecordSimulator
 
 
 def held(refit: Refit, last: list[FittedJob]) -> list[FittedJob]:
-    """Sensors near the best that are late, as ones that are read at even intervals."""
+    """Sensors as ones that are read at even intervals: those near the best that are late, and those that look so."""
     late: dict[str, FittedJob] = {}
     for fitted in best_of_each(near(last, share=NEAR_FINALIST)):
         if fitted.alternative.effects[-1].driver in LATE and fitted.score.candidate.site.role == "sensor":
             late.setdefault(fitted.alternative.effects[-1].site, fitted)
+    for fitted in _moved_evenly(refit, set(late)):
+        late.setdefault(fitted.alternative.effects[-1].site, fitted)
     return refit.run([job for fitted in late.values() for job in _held(refit, fitted)])
+
+
+def _moved_evenly(refit: Refit, known: set[str]) -> list[FittedJob]:
+    """Sensors beside the known ones whose output moves at even times only, each with a dead time.
+
+    A dead time explains their steps badly, and may be far from the best.
+    """
+    evenly = refit.fitter.problem.evenly_moved
+    if not evenly:
+        return []
+    scorer = refit.linearisations[0].scorer
+    jobs = []
+    for score in scorer.scores():
+        site, driver = score.candidate.name
+        if driver == "delay" and score.candidate.site.role == "sensor" and site not in known:
+            output = scorer.output_of(site)
+            if output is not None and output[0] in evenly:
+                jobs.append(Job(0, score))
+    return refit.run(jobs)
 
 
 def _held(refit: Refit, fitted: FittedJob) -> list[Job]:
