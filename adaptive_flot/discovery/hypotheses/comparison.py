@@ -11,6 +11,7 @@ from scipy.stats import bootstrap
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
+from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.greybox.model import FloatArray
 
 SHORTEST_BLOCK = 10
@@ -27,6 +28,10 @@ EXPLAINED = 0.5
 """Share of what is above the usual level of the errors that must go; else something else is the matter."""
 WORSE, MUCH_WORSE = 0.02, 0.1
 """Shares by which the error of an output may grow: surely, and at all."""
+FEW_VALUES = 10.0
+"""Independent values of an error below which its size on one record says little of that on another."""
+FAR = 3.0
+"""Errors count up to so many of their usual sizes where their memory is looked at."""
 AT_USUAL = 1.25
 """An error of at most so many times that of the reference is usual: it contradicts nothing, whatever it was before."""
 
@@ -145,11 +150,29 @@ def worse_outputs(
 
 
 def stands(rows: Rows, blocks: Blocks, null: Tested, tested: Tested, usual: FloatArray | None = None) -> bool:
-    """Whether a hypothesis gains surely, with substance, and makes no output worse; see `worse_outputs` for `usual`."""
+    """Whether a hypothesis gains surely, with substance, and makes no output worse; see `worse_outputs` for `usual`.
+
+    Nor may it rest on few values of an error alone, see `rests_on_few_values`.
+    """
     before, after = rms(rows, null.fresh), rms(rows, tested.fresh)
     substance = bool(np.nanmax(1 - after / np.maximum(before, 1e-300)) >= SUBSTANCE)
     gain = mean_difference(blocks, null, tested)
-    return gain.low > 0 and substance and not worse_outputs(rows, blocks, null, tested, usual)
+    stood = gain.low > 0 and substance and not worse_outputs(rows, blocks, null, tested, usual)
+    return stood and not rests_on_few_values(rows, blocks, null, tested)
+
+
+def rests_on_few_values(rows: Rows, blocks: Blocks, null: Tested, tested: Tested) -> bool:
+    """Whether all that gets better is one long wander or two, while an output that says much more gets surely worse.
+
+    An output that integrates what comes in, such as the speed of a machine or a level, drifts by what the model lacks
+    anyhow. One record has few independent values of such an error: its rows over their correlation time.
+    """
+    times = [correlation_times(np.clip(rows.scaled(i, e), -FAR, FAR)) for i, e in enumerate(null.fresh)]
+    values = np.sum([c.sum() / np.maximum(t, 1.0) for c, t in zip(rows.counted, times, strict=True)], axis=0)
+    moved = [reduction(blocks, j, null.fresh, tested.fresh) for j in range(len(rows.columns))]
+    better = [n for n, share in zip(values, moved, strict=True) if share.low > 0]
+    worse = [n for n, share in zip(values, moved, strict=True) if share.high < 0]
+    return bool(better and worse and max(better) < FEW_VALUES <= max(worse))
 
 
 def tied(blocks: Blocks, null: Tested, best: Tested, others: Sequence[Tested], adequate: bool) -> tuple[Tested, ...]:

@@ -135,7 +135,7 @@ def hypotheses(
         Values at each site and of each driver (N,), see `seen.py`. They are those of all records, so that a part
         that does not move in one of them has the range of the others.
     dt, duration
-        Sampling interval and length of the shortest record [s].
+        Sampling interval and length of the longest record [s].
     """
     there = {e.label for e in model.effects}
     amounts = [h for site in model.sites if (h := _amount(model, site, seen)) is not None]

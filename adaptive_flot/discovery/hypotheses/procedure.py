@@ -203,7 +203,7 @@ def _candidates(calibration: Calibration, base: JointFit, rows: Rows, reference:
         seen = {k: np.concatenate([v, new[k]]) for k, v in seen.items()}
         drivers = {k: np.concatenate([v, moved[k]]) for k, v in drivers.items()}
     dt = rows.records[0].dt
-    found = hypotheses(calibration.model, seen, drivers, dt, dt * min(map(len, rows.records)))
+    found = hypotheses(calibration.model, seen, drivers, dt, dt * max(map(len, rows.records)))
     return tuple(h for h in found if not (reference and h.kind in STRUCTURE))
 
 

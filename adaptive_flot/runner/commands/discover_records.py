@@ -17,6 +17,9 @@ from adaptive_flot.processes.registry import read_measurements
 from adaptive_flot.records.importing import is_record
 from adaptive_flot.records.tag_map import TagMap
 
+MOST_ROWS = 0.5
+"""Share of the rows from which the longest stretch stands for a record."""
+
 
 def discover_records(
     sources: Sequence[Source | Dataset],
@@ -52,7 +55,8 @@ def discover_records(
     DataError, RangeError, ModelError
         A table or the model can not be used.
     """
-    new, old = ([r for s in group for r in _read(s, model, tag_map)] for group in (sources, references))
+    alone = bool(references)  # events in time take one record, and a short stretch adds little but a start of its own
+    new, old = ([r for s in group for r in _read(s, model, tag_map, alone)] for group in (sources, references))
     return find_changes(model, new, old, processes=processes, progress=progress, budget=budget)
 
 
@@ -68,13 +72,17 @@ def save_extended(
     return True
 
 
-def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None) -> list[Dataset]:
-    """A record, or each of its stretches: nothing is fitted across a gap."""
+def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None, alone: bool) -> list[Dataset]:
+    """A record, or each of its stretches: nothing is fitted across a gap.
+
+    Where it may stand `alone`, the longest stretch is the record if it has most of the rows; a note of it says so.
+    """
     if isinstance(source, Dataset):
         return [source]
     if tag_map is None or is_record(source, model):
         parts = every_stretch(read_table(source), TIME_COLUMN, named(source))
-        if len(parts) > 1:
+        most = max(map(len, parts)) >= MOST_ROWS * sum(map(len, parts))
+        if len(parts) > 1 and not (alone and most):
             stem = named(source).stem
             read = [read_measurements(part, model).record for part in parts]
             parted = f"{stem} has {len(parts)} stretches with gaps between them, and each is taken as a record"
