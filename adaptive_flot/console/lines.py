@@ -169,10 +169,12 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
 
 
 def print_comparison(tables: Sequence[Content], sentences: Sequence[str]) -> None:
-    """Print the tables of a comparison and what follows from them."""
+    """Print the tables of a comparison; what follows from them stands below the first, which has the answer."""
     console = standard_output()
-    for content in tables:
+    for content in tables[:1]:
         print_table(console, content)
     for sentence in sentences:
         console.print(f"- {sentence}", highlight=False)
+    for content in tables[1:]:
+        print_table(console, content)
     console.file.flush()
