@@ -62,6 +62,30 @@ def terminable() -> Iterator[None]:
 
 
 @contextmanager
+def undisturbed() -> Iterator[None]:
+    """Let signals that ask for the end, and Ctrl-C, wait until a block has run: it writes files that belong together.
+
+    A signal mask would not do: another thread of this process would take the signal. Outside the main thread, where
+    Python takes no signals, the block runs as it is.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    former = {number: signal.getsignal(number) for number in (*ENDING, signal.SIGINT)}
+    taken = {number: handler for number, handler in former.items() if handler not in (signal.SIG_IGN, None)}
+    for number in taken:
+        signal.signal(number, lambda number, frame: came.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in taken.items():
+            signal.signal(number, handler)
+    if came:
+        signal.raise_signal(came[0])
+
+
+@contextmanager
 def forking() -> Iterator[None]:
     """Hold back signals while this process forks: a child would take them as its parent does, until it is set up."""
     former = signal.pthread_sigmask(signal.SIG_BLOCK, {*ENDING, signal.SIGINT})

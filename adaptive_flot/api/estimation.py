@@ -12,7 +12,7 @@ import pandas as pd
 
 from adaptive_flot.api.models import AnyModel, Origin, read_model
 from adaptive_flot.api.plugins import Choices, plugins
-from adaptive_flot.api.progress import counted
+from adaptive_flot.api.progress import staged
 from adaptive_flot.api.records import AnyMap, AnyRecord, read_map, record_files, record_name
 from adaptive_flot.api.shown import check_kind, html_of, text_of
 from adaptive_flot.errors import ModelError
@@ -169,7 +169,7 @@ class Estimation:
     @property
     def _title(self) -> str:
         blocks = self.result.blocks
-        rows = f"{len(blocks.fit)} rows to fit on, {len(blocks.test)} to test on"
+        rows = f"{len(blocks.fit)} rows to fit on, {blocks.tested} to test on"
         return f"{blocks.name}: {rows}; errors on the test block"
 
     @property
@@ -218,7 +218,7 @@ def estimate(
     compiled
         Run step and estimators as machine code, by the C compiler of this system.
     progress
-        Show a bar in a terminal.
+        Show the stages in a terminal.
 
     Returns
     -------
@@ -254,7 +254,7 @@ def estimate(
         blocks = cut(data, fit_share, data.name)
     else:
         blocks = read_blocks(data, made, fit_share, read_map(tag_map))
-    with counted(progress, record_name(data), 1 + len(chosen)) as advance:
+    with staged(progress, record_name(data)) as advance:
         result = estimate_record(
             blocks, made, estimators=chosen, fit=parameters, outputs=outputs, folder=Path.cwd(),
             innovations=innovations, progress=advance,

@@ -46,8 +46,8 @@ def compare(
         write_text(markdown, "\n".join(compare_tables.markdown(t) for ts in (overview, *tables) for t in ts))
     if out is not None:
         write_compare_report(found, out / "comparison.html", command=command_line())
+    print_comparison(overview, [])
     for one, shown in zip(found, tables, strict=True):
         print_comparison(shown, findings(one))
-    print_comparison(overview, [])
     if out is not None:
         typer.echo(f"Report: {out / 'comparison.html'}")

@@ -51,9 +51,11 @@ def discover(
 
     With a reference, or with several records, it tells what has changed, or what the model lacks in all of them.
     """
+    from adaptive_flot.child_processes import undisturbed
     from adaptive_flot.console.lines import print_verdict, stage_bar
     from adaptive_flot.discovery.fitting.parallel import available_processes
     from adaptive_flot.errors import ModelError
+    from adaptive_flot.files import write_text
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.discover import check_model_path, discover_file, read_limits, save_discovered
@@ -85,24 +87,31 @@ def discover(
                 first, made, limits=limits, tag_map=tag_map, processes=workers, budget=budget, progress=progress
             )
             verdict = searched.verdict
-    for target in filter(None, (folder / "verdict.json", json)):
-        write_json(target, verdict.as_dict())
     print_verdict(verdict, "usual" if references else "noise")
-    if save_model is not None:
-        if several:
-            saved = save_extended(compared, name, save_model, base=model, cell=cell, folder=first.parent)
-        else:
-            saved = save_discovered(searched, first, save_model, base=model, cell=cell, folder=first.parent)
-        typer.echo(f"Model: {save_model}" if saved else f"Model: {save_model} not written, nothing was fitted")
-    if not report:
-        page.unlink(missing_ok=True)  # that of an earlier verdict
-        return
-    from adaptive_flot.report.discovery.page import write_discovery_report
-    from adaptive_flot.report.discovery.records import write_records_report
+    drawn = None
+    if report:
+        from adaptive_flot.report.discovery.page import discovery_report
+        from adaptive_flot.report.discovery.records import records_report
 
-    read = [*data, *references, *([map_] if map_ is not None else [])]
-    if several:
-        write_records_report(compared, name, page, command=command_line(), read=read)
-    else:
-        write_discovery_report(searched, name, page, command=command_line(), read=read)
-    typer.echo(f"Report: {page}")
+        read = [*data, *references, *([map_] if map_ is not None else [])]
+        drawn = (
+            records_report(compared, name, command_line(), read)
+            if several
+            else discovery_report(searched, name, command_line(), read)
+        )
+    with undisturbed():  # no verdict without its page
+        for target in filter(None, (folder / "verdict.json", json)):
+            write_json(target, verdict.as_dict())
+        if drawn is None:
+            page.unlink(missing_ok=True)  # that of an earlier verdict
+        else:
+            write_text(page, drawn)
+        if save_model is not None:
+            if several:
+                saved = save_extended(compared, name, save_model, base=model, cell=cell, folder=first.parent)
+            else:
+                saved = save_discovered(searched, first, save_model, base=model, cell=cell, folder=first.parent)
+    if save_model is not None:
+        typer.echo(f"Model: {save_model}" if saved else f"Model: {save_model} not written, nothing was fitted")
+    if drawn is not None:
+        typer.echo(f"Report: {page}")

@@ -50,7 +50,7 @@ def estimate(
     compile_: Compile = False,
 ) -> None:
     """Replay a measured record through fixed, recursive and batch estimation."""
-    from adaptive_flot.console.lines import print_estimate, progress_bar
+    from adaptive_flot.console.lines import print_estimate, stage_bar
     from adaptive_flot.errors import CellError
     from adaptive_flot.processes.registry import find_cell, make_model
     from adaptive_flot.records.tag_map import load_tag_map
@@ -77,7 +77,7 @@ def estimate(
     )
     made = replace(make_model(model, cell=cell, folder=data.parent), compiled=can_compile(compile_))
     blocks = read_blocks(data, made, fit_share, None if map_ is None else load_tag_map(map_))
-    with progress_bar(data.stem, 1 + len(names)) as advance:
+    with stage_bar(data.stem) as advance:
         result = estimate_record(
             blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent,
             innovations=innovations, progress=advance,

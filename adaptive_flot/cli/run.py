@@ -59,8 +59,8 @@ def run(
     summary = run_summary(loaded, runs)
     for target in filter(None, (folder / "summary.json", json)):
         write_json(target, summary)
-    print_fits([(loaded, runs)])
     print_closed_loop(loaded, runs)
+    print_fits([(loaded, runs)])
     from adaptive_flot.report.run.page import write_run_report
 
     write_run_report([(loaded, runs)], folder / "report.html", command=command_line())

@@ -123,7 +123,8 @@ def _fit_cell(values: Sequence[float], published: float | None) -> str:
 
 
 def print_estimate(result: RecordEstimate) -> None:
-    """Print the errors of each estimator on the fit and the test block, and what the record identifies."""
+    """Print what the record identifies, then the errors of each estimator on the fit and the test block."""
+    from adaptive_flot.report.estimate.answer import title
     from adaptive_flot.report.estimate.innovations import innovations_sentences
 
     rows = [
@@ -141,15 +142,16 @@ def print_estimate(result: RecordEstimate) -> None:
     ]
     header = ("estimator", "block", "output", "unit", "one step", "free run", "Ljung-Box p")
     console = standard_output()
-    for note in result.blocks.fit.notes:
-        console.print(f"- {note}", highlight=False)
-    title = f"{result.blocks.name}: root mean square errors"
-    print_table(console, Content("", header, tuple(rows), words=4), title)
+    console.print(title(result), style="bold", highlight=False)
     for estimate in result.batch.estimates:
         console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
     console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
     if result.batch.agreement:
         console.print(f"Starts: {result.batch.agreement}", highlight=False)
+    for note in result.blocks.fit.notes:
+        console.print(f"- {note}", highlight=False)
+    heading = f"{result.blocks.name}: root mean square errors"
+    print_table(console, Content("", header, tuple(rows), words=4), heading)
     for said in innovations_sentences(result):
         console.print(said, highlight=False)
 
@@ -167,10 +169,12 @@ def print_closed_loop(scenario: Scenario, runs: Sequence[Run]) -> None:
 
 
 def print_comparison(tables: Sequence[Content], sentences: Sequence[str]) -> None:
-    """Print the tables of a comparison and what follows from them."""
+    """Print the tables of a comparison; what follows from them stands below the first, which has the answer."""
     console = standard_output()
-    for content in tables:
+    for content in tables[:1]:
         print_table(console, content)
     for sentence in sentences:
         console.print(f"- {sentence}", highlight=False)
+    for content in tables[1:]:
+        print_table(console, content)
     console.file.flush()

@@ -54,10 +54,10 @@ def test_record_is_refused_before_it_is_fitted(model: Model, inputs: FloatArray)
     n = 40
     level = np.full((n, len(model.outputs)), 0.5)
     record = Dataset("hourly", 3600.0 * np.arange(n, dtype=float), 3600.0, np.repeat(inputs, n // 2, axis=0), level)
-    called: list[None] = []
+    called: list[str] = []
     blocks = Blocks("hourly", record, record, continues=False)
     with pytest.raises(ModelError, match="hourly: a sampling interval of 3600 s"):
-        estimate_record(blocks, model, progress=lambda: called.append(None))
+        estimate_record(blocks, model, progress=called.append)
     assert not called
 
 

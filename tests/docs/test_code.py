@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import sys
 import warnings
@@ -12,8 +13,11 @@ import pytest
 from sybil import Sybil
 from sybil.parsers.markdown import PythonCodeBlockParser
 
+from adaptive_flot import cli
 from tests.docs.pages import DOCS, PAGES, fences, name_of
 
+FROM_FIRST_TO_LAST = (DOCS / "tutorials" / "own_record.md",)
+"""Pages whose commands use what their code wrote."""
 WITH_CODE = [page for page in PAGES if fences(page, "python")]
 
 
@@ -32,3 +36,16 @@ def test_the_code_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest
     with warnings.catch_warnings(action="error"):
         for example in examples:
             example.evaluate()
+    if page in FROM_FIRST_TO_LAST:
+        _run_commands(page, monkeypatch)
+
+
+def _run_commands(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shell lines of a page, in their order, in the folder where its code wrote its files."""
+    lines = [line for fence in fences(page, "sh") for line in fence.splitlines()]
+    assert lines
+    for line in lines:
+        monkeypatch.setattr(sys, "argv", shlex.split(line))
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        assert not ended.value.code, line

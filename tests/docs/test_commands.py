@@ -62,6 +62,14 @@ def test_every_command_of_a_page_exists(page: Path) -> None:
     assert [f"{line}: {p}" for line in commands(page) if (p := problem(line))] == []
 
 
+@pytest.mark.parametrize("name", sorted(CLI.commands))
+def test_a_page_names_every_option_of_a_command(name: str) -> None:
+    """Of a switch one of its two names will do."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    spelled = [(*p.opts, *p.secondary_opts) for p in CLI.commands[name].params if p.opts[0].startswith("-")]
+    assert [s[0] for s in spelled if not any(re.search(rf"{o}(?![\w-])", text) for o in s)] == []
+
+
 @pytest.mark.parametrize(
     "line",
     [

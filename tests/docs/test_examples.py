@@ -10,12 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import adaptive_flot as af
 from adaptive_flot.discovery.results import Word
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.keys import EconomicsPart
+from benchmarks.plant_like.score import TOLD
 from tests.discovery.heated import Truth, tank_record
-from tests.docs.pages import DOCS, fences
+from tests.docs.pages import DOCS, ROOT, fences
 
+PUBLISHED = ROOT / "benchmarks" / "other_processes" / "published"
 ECONOMICS = DOCS / "guides" / "economics.md"
 
 
@@ -52,3 +55,30 @@ def test_the_record_of_the_example_is_that_of_the_tank_apart() -> None:
 def test_every_word_of_a_verdict_is_explained() -> None:
     text = (DOCS / "discovery" / "verdicts.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `(\w+)` \| ", text, re.MULTILINE)) >= set(get_args(Word))
+
+
+def test_the_sum_over_fresh_sets_of_other_processes_is_that_of_the_published_verdicts() -> None:
+    """All sets that were fresh when they were judged count, and none is left out."""
+    sets = [pd.read_csv(file).fillna("") for file in PUBLISHED.glob("discover_seed_*.csv")]
+    found = pd.concat(sets)
+    effects = found[found.truth != ""]
+    told = int(effects.outcome.isin(TOLD).sum())
+    wrong = int((found.outcome.isin(("wrong_name", "false_alarm")) & (found.verdict == "named")).sum())
+    page = (DOCS / "results" / "other_processes.md").read_text(encoding="utf-8")
+    assert len(sets) == 20 and f"{told} of {len(effects)} told" in page
+    assert f"{wrong} of {len(found)} names wrong" in page
+    assert f"{wrong} of {len(found)} names were wrong" in (ROOT / "README.md").read_text(encoding="utf-8")
+    words = (DOCS / "discovery" / "verdicts.md").read_text(encoding="utf-8")
+    assert f"{wrong} names of {len(found)} records were wrong" in words
+
+
+@pytest.mark.slow
+def test_what_a_shorter_memory_does_is_what_the_tutorial_says() -> None:
+    """Fits of n, C and grade on seed 1, with the paper's forgetting factor and with 0.98."""
+    options = {"paper": "rpem", "shorter": ("rpem", {"forgetting": 0.98})}
+    found = af.run("paper_scenario_1", estimators=options, seeds=[1]).summary.set_index("estimator")
+    before, after = (found.loc[name, ["n", "C", "concentrate_grade"]] for name in options)
+    text = " ".join((DOCS / "tutorials" / "the_paper.md").read_text(encoding="utf-8").split())
+    change = after - before
+    grades = f"from {before.concentrate_grade:.1f} to {after.concentrate_grade:.1f} %"
+    assert f"{grades}. C gains {change.C:.1f} points, to {after.C:.1f} %, and n loses {-change.n:.1f}." in text

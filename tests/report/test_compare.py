@@ -60,7 +60,7 @@ def column(table: Table, heading: str) -> list[str]:
 
 
 def test_tables_hold_medians_and_ranges_in_the_units_of_their_headings() -> None:
-    outcome, value, statuses, times, fits = compare_tables(comparison())
+    outcome, value, fits, statuses, times = compare_tables(comparison())
     assert column(outcome, "Value [cu/h]")[0] == "11.520\n11.510 – 11.530"
     assert column(outcome, "Share of oracle's gain [%]") == ["75.0", "0.0", "100.0", "–"]
     assert column(outcome, "Below limit [% of time]") == ["0.0", "0.0", "0.0", "30.0"]

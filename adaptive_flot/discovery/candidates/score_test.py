@@ -29,6 +29,7 @@ import numpy as np
 
 from adaptive_flot.discovery.candidates.catalogue import Candidate
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
+from adaptive_flot.discovery.candidates.ridge import ridge
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.noise import Noise, with_rows_before
@@ -179,7 +180,7 @@ class Scorer:
 
             b = (X'X + I)^-1 X'y,   left = y - X b
 
-        Hoerl & Kennard, *Technometrics* 12 (1970) 55. Values of y that stand out (CLIP) do not count.
+        Values of y that stand out (CLIP) do not count.
         """
         wanted: list[int] = []
         for variant, columns in self._all_variants():
@@ -199,8 +200,7 @@ class Scorer:
         X -= base @ (base.T @ X)
         y = y - base @ (base.T @ y)
         keep = np.abs(y) <= max(CLIP * 1.4826 * np.median(np.abs(y)), CLIP)
-        beta = np.linalg.solve(X[keep].T @ X[keep] + np.eye(X.shape[1]), X[keep].T @ y[keep])
-        left = y - X @ beta
+        left = y - X @ ridge(X[keep], y[keep])
         full = np.full(residual.shape, np.nan)
         table = np.full(r.shape, np.nan)
         table[present] = left

@@ -85,12 +85,13 @@ def _numbers(table: pd.DataFrame, time: str, file: Path) -> tuple[FloatArray, tu
         return number, why
     begins = np.concatenate([[False], ~twice[1:] & twice[:-1]])
     pairs = np.column_stack([number, np.cumsum(begins)])
-    renumbered = 1.0 + np.unique(pairs, axis=0, return_inverse=True)[1].ravel().astype(float)
+    renumbered = np.full(len(table), np.nan)
+    renumbered[~twice] = 1.0 + np.unique(pairs[~twice], axis=0, return_inverse=True)[1].ravel()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], twice.astype(int), [0]])))
     spans = [f"{line(table, a)} to {line(table, b - 1)}" for a, b in zip(edges[::2], edges[1::2], strict=True)]
     more = f" and {len(spans) - MOST_TOLD} more" if len(spans) > MOST_TOLD else ""
     said = f"lines {', '.join(spans[:MOST_TOLD])}{more} repeat earlier rows: left out, and the record is split there"
-    return np.where(twice, np.nan, renumbered), (*why, said)
+    return renumbered, (*why, said)
 
 
 def _by_time(table: pd.DataFrame, time: str, file: Path) -> tuple[FloatArray, tuple[str, ...]]:

@@ -89,7 +89,7 @@ def sections(comparison: Comparison, i: int, several: bool, album: Album, distri
     return [
         *([Section("paired", "Paired differences", "with interval, and wins per seed", [paired])] if paired else []),
         Section("spread", "Distribution over the seeds", "", _pictures(comparison, album, distribution)),
-        Section("tables", "All tables", "outcome, terms, statuses, times, fits", compare_tables(comparison)),
+        Section("tables", "All tables", "outcome, terms, fits, statuses, times", compare_tables(comparison)),
         Section("runs", "Who ran", "options, version and commit", [made_table(comparison)]),
     ]
 

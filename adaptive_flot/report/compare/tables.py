@@ -179,8 +179,8 @@ def spread_text(comparison: Comparison) -> str:
 
 
 def compare_tables(comparison: Comparison) -> list[Table]:
-    """All tables of a comparison that hold something."""
-    makers = (outcome_table, value_table, status_table, time_table, fits_table, quantile_table)
+    """All tables of a comparison that hold something, those with the answer first."""
+    makers = (outcome_table, value_table, fits_table, status_table, time_table, quantile_table)
     return [table for make in makers if (table := make(comparison)) is not None]
 
 

@@ -17,12 +17,19 @@ from adaptive_flot.runner.results.replay_table import ReplayErrors
 MOST_FACTS = 5
 ABOUT = 0.5
 """Points of fit within which estimators are said to predict about equally well."""
+WORSE = -10.0
+"""Fit [%] below which an output is predicted worse than by a constant: noise alone may give a little less than 0."""
+ROUNDING = 1e-7
+"""Error over the scale of an output below which nothing is worse."""
 NOT_WHITE = 0.05
 """p value below which innovations are called not white."""
 
 
 def title(result: RecordEstimate) -> str:
-    """Who predicts the test block best, or who all do so about equally well."""
+    """What is wrong with the fit; else who predicts the test block best, or who all do so about equally well."""
+    wrong = troubles(result)
+    if wrong:
+        return capital("; ".join(wrong))
     outputs = series.measured_outputs(result)
     fits = {
         r.estimator: [_fit(result, q, _error(result, r.estimator, q).free_run) for q in outputs] for r in result.replays
@@ -35,6 +42,22 @@ def title(result: RecordEstimate) -> str:
     best = max(dict.fromkeys(winners), key=winners.count)
     won = [spaced(q.name) for q, w in zip(outputs, winners, strict=True) if w == best]
     return f"{best} predicts {'every output' if len(won) == len(outputs) > 1 else joined(won)} best"
+
+
+def troubles(result: RecordEstimate) -> list[str]:
+    """Why the fit is not to be used: parameters that the record does not tell, outputs that no estimator predicts."""
+    judged = result.batch.identifiability.parameters
+    unknown, bound = ([label for label, _, word in judged if word == w] for w in ("not identified", "on a bound"))
+    best = [(q, _best(result, q)[1].free_run) for q in series.measured_outputs(result)]
+    worse = [spaced(q.name) for q, e in best if _fit(result, q, e) < WORSE and e > ROUNDING * q.scale]
+    said = []
+    if unknown:
+        said.append(f"the record does not identify {joined(unknown)}")
+    if bound:
+        said.append(f"{joined(bound)} {'ends on a bound' if len(bound) == 1 else 'end on bounds'}")
+    if worse:
+        said.append(f"the fit of {joined(worse)} is worse than a constant")
+    return said
 
 
 def sentences(result: RecordEstimate) -> list[str]:

@@ -96,7 +96,7 @@ def _lead(result: RecordEstimate) -> str:
     how = "goes on where the fit block ends" if blocks.continues else "starts from the same initial state"
     driving = ", ".join(name.replace("_", " ") for name in result.setup.outputs)
     return (
-        f"Record {blocks.name}: {len(blocks.fit)} rows to fit on, {len(blocks.test)} to test on, one every "
+        f"Record {blocks.name}: {len(blocks.fit)} rows to fit on, {blocks.tested} to test on, one every "
         f"{blocks.fit.dt:g} s; the test block {how}. Parameters and initial state come from the fit block only. "
         f"Driving outputs: {driving}."
     )

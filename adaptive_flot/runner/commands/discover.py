@@ -49,9 +49,11 @@ def discover_file(
     Raises
     ------
     DataError, RangeError, ModelError
-        The table or the model can not be used.
+        The table or the model can not be used; no output in it.
     """
     measured = read_measurements(path, model, tag_map=tag_map)
+    if not measured.record.measured(model):  # refused as `estimate` does, where no output has a column at all
+        measured = read_measurements(path, model, required_outputs=(model.outputs[0].name,), tag_map=tag_map)
     return discover(
         model,
         measured.record,

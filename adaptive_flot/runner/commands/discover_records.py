@@ -8,12 +8,14 @@ from pathlib import Path
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.since_reference.changes import find_changes
+from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
 from adaptive_flot.greybox.data.stretches import every_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.processes.model_writer import save_model
 from adaptive_flot.processes.registry import read_measurements
+from adaptive_flot.provenance import values_hash
 from adaptive_flot.records.importing import is_record
 from adaptive_flot.records.tag_map import TagMap
 
@@ -53,10 +55,12 @@ def discover_records(
     Raises
     ------
     DataError, RangeError, ModelError
-        A table or the model can not be used.
+        A table or the model can not be used, or a record is given twice.
     """
     alone = bool(references)  # events in time take one record, and a short stretch adds little but a start of its own
-    new, old = ([r for s in group for r in _read(s, model, tag_map, alone)] for group in (sources, references))
+    groups = [[(_called(s), _read(s, model, tag_map, alone)) for s in group] for group in (sources, references)]
+    _check_once([record for group in groups for record in group])
+    new, old = ([part for _, parts in group for part in parts] for group in groups)
     return find_changes(model, new, old, processes=processes, progress=progress, budget=budget)
 
 
@@ -70,6 +74,26 @@ def save_extended(
     note = f"discovered in {name}: {comparison.verdict.word}"
     save_model(comparison.model, path, base=base, cell=cell, folder=folder, note=note)
     return True
+
+
+def _called(source: Source | Dataset) -> str:
+    return source.name if isinstance(source, Dataset) else str(named(source))
+
+
+def _check_once(records: Sequence[tuple[str, Sequence[Dataset]]]) -> None:
+    """Refuse a record that is given twice, under whatever name: its rows would count as evidence of two.
+
+    Raises
+    ------
+    DataError
+        Two of them hold the same values.
+    """
+    seen: dict[str, str] = {}
+    for name, parts in records:
+        values = values_hash(array for r in parts for array in (r.time, r.inputs, r.outputs))
+        if values in seen:
+            raise DataError(f"{name}: the same record as {seen[values]}; give each once")
+        seen[values] = name
 
 
 def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None, alone: bool) -> list[Dataset]:

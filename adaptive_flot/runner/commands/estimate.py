@@ -57,7 +57,7 @@ def estimate_record(
     outputs: Sequence[str] = (),
     folder: Path | None = None,
     innovations: bool | None = None,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[str], None] = lambda stage: None,
 ) -> RecordEstimate:
     """Fit the fit block, then replay both blocks through each estimator.
 
@@ -81,7 +81,7 @@ def estimate_record(
     innovations
         Whether to estimate in innovations form as well, with process noise; None where the record asks for it.
     progress
-        Called after the batch fit and after each estimator.
+        Called with a word before the batch fit, before each estimator, and before the fit with process noise.
 
     Raises
     ------
@@ -107,19 +107,22 @@ def estimate_record(
     with located(blocks.name):
         check_interval(model, blocks.fit.dt)
     setup = Setup(model, blocks.fit.dt, names, driving)
+    progress("batch fit")
     factory = load("pem", BATCH_ESTIMATORS, "batch estimator")
     batch: BatchFit = construct(factory, "pem", "batch estimator", setup, **BATCH_OPTIONS).fit(blocks.fit)
-    progress()
     columns, noise = model.indices("outputs", driving), batch.noise_std
     said = wrong_start(model, blocks.fit, batch.initial_state, batch.parameters, columns, noise)
     blocks = replace(blocks, fit=replace(blocks.fit, notes=blocks.fit.notes + said))
     replays = []
     for name, plugin in plugins.items():
+        progress(f"replay through {name}")
         replays.append(replay(name, plugin, setup, blocks, batch, folder))
-        progress()
     if innovations is None:
         innovations = asks_for_process_noise(model, blocks.fit, driving, batch)
-    form = estimate_in_innovations_form(setup, blocks, batch) if innovations and batch.evaluations else None
+    form = None
+    if innovations and batch.evaluations:
+        progress("fit with process noise")
+        form = estimate_in_innovations_form(setup, blocks, batch)
     return RecordEstimate(blocks, setup, batch, tuple(replays), form)
 
 

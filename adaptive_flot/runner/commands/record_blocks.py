@@ -26,9 +26,14 @@ class Blocks(Described):
     test: Dataset
     continues: bool
 
+    @property
+    def tested(self) -> int:
+        """Rows of the test block that fitted nothing; where it continues, its first row is the last one to fit."""
+        return len(self.test) - int(self.continues)
+
     def described(self) -> dict[str, object]:
         """The record and its cut; see `Described`."""
-        return {"record": self.name, "rows to fit": len(self.fit), "rows to test": len(self.test)}
+        return {"record": self.name, "rows to fit": len(self.fit), "rows to test": self.tested}
 
 
 def read_blocks(path: Source, model: Model, fit_share: float, tag_map: TagMap | None = None) -> Blocks:

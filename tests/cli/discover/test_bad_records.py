@@ -60,3 +60,18 @@ def test_discover_says_it_too_and_still_names_what_is_there(call: Call, tmp_path
     page = (tmp_path / "results" / "tank" / "discover" / "report.html").read_text()
     for text in (" ".join(result.out.split()), page):
         assert "lines 302 to 341 repeat earlier rows" in text
+
+
+@pytest.mark.parametrize("command", ["discover", "estimate"])
+def test_a_record_without_an_output_is_refused_in_the_same_words(call: Call, tmp_path: Path, command: str) -> None:
+    write_tank(tmp_path).drop(columns="temperature_K").to_csv(tmp_path / "tank.csv", index=False)
+    result = call(command, "tank.csv", "--model", "heated:make_model", "--out", "r")
+    assert result.code == 2 and len(result.err.splitlines()) == 1
+    assert "tank.csv: column 'temperature_K' is missing; add it (known: " in result.err
+    assert not (tmp_path / "r").exists()
+
+
+def test_an_output_whose_column_is_empty_is_a_verdict(call: Call, tmp_path: Path) -> None:
+    write_tank(tmp_path).assign(temperature_K=np.nan).to_csv(tmp_path / "tank.csv", index=False)
+    result = call("discover", "tank.csv", "--model", "heated:make_model", "--out", "r")
+    assert result.code == 0 and "no output has a usable measurement" in " ".join(result.out.split())

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adaptive_flot.report.discovery import page as discovery_page
+from adaptive_flot.runner.commands.runs import run_files
 from tests.cli.conftest import Call, WriteTable
 from tests.discovery.heated import tank_record
 
@@ -174,7 +178,7 @@ def _range(t: pd.DataFrame) -> pd.DataFrame:
         (_uneven, 2, "not uniform"),
         (_range, 2, "power"),
         (_still, 0, "insufficient: "),
-        (_no_output, 0, "no output"),
+        (_no_output, 2, "temperature_K"),
     ],
 )
 def test_a_bad_record_gets_an_error_or_a_verdict_that_names_the_reason(
@@ -184,3 +188,26 @@ def test_a_bad_record_gets_an_error_or_a_verdict_that_names_the_reason(
     result = call("discover", "tank.csv", "--model", "heated:make_model", "--processes", "1")
     assert result.code == code and says in " ".join((result.out if code == 0 else result.err).split())
     assert (tmp_path / "results").exists() == (code == 0)
+
+
+@pytest.mark.parametrize("end", ["SIGINT", "SIGTERM"])
+def test_who_ends_it_while_the_page_is_drawn_gets_no_verdict_without_its_page(
+    call: Call, table: WriteTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    monkeypatch.setattr(discovery_page, "discovery_report", lambda *_: os.kill(os.getpid(), signal.Signals[end]))
+    assert call("discover", table(), "--out", "r").code == {"SIGINT": 130, "SIGTERM": 143}[end]
+    assert not (tmp_path / "r").exists()
+
+
+def test_who_ends_it_while_files_are_written_gets_them_all(
+    call: Call, table: WriteTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = run_files.write_json
+
+    def interrupted(path: Path, content: object) -> None:
+        write(path, content)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(run_files, "write_json", interrupted)
+    assert call("discover", table(), "--out", "r").code == 143
+    assert {f.name for f in (tmp_path / "r").iterdir()} == {"verdict.json", "report.html"}

@@ -57,6 +57,21 @@ def test_a_mistake_is_one_line_and_writes_nothing(
     assert not (tmp_path / "r").exists()
 
 
+@pytest.mark.parametrize(
+    "given",
+    [["new.csv", "new.csv"], ["new.csv", "copy.csv"], ["new.csv", "--reference", "copy.csv"]],
+    ids=["twice", "a copy", "its own reference"],
+)
+def test_the_same_record_given_twice_is_refused(
+    call: Call, records: tuple[Path, Path], tmp_path: Path, given: list[str]
+) -> None:
+    (tmp_path / "copy.csv").write_bytes(records[0].read_bytes())
+    result = call("discover", *given, "--model", MODEL, "--out", "r")
+    assert result.code == 2 and len(result.err.splitlines()) == 1
+    assert f"{given[-1]}: the same record as new.csv; give each once" in result.err
+    assert not (tmp_path / "r").exists()
+
+
 def test_a_hole_splits_a_record_and_nothing_is_fitted_across_it(
     call: Call, records: tuple[Path, Path], tmp_path: Path
 ) -> None:

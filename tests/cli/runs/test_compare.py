@@ -25,7 +25,9 @@ def test_what_run_wrote_is_compared(call: Call, scenario: WriteScenario, tmp_pat
         assert contender["seeds"] == [1, 2]
         assert contender["metrics"]["fit_C"]["median"] == pytest.approx(sum(fits) / 2)
     assert (tmp_path / "c" / "comparison.html").read_text().lstrip().lower().startswith("<!doctype html")
-    assert "| Controller |" in (tmp_path / "c" / "c.md").read_text()
+    written = (tmp_path / "c" / "c.md").read_text()
+    assert "| Controller |" in written and "fit of the estimates" in written.splitlines()[0]
+    assert result.out.index("C [%]") < result.out.index("Estimates"), "the fits come first, then how the runs went"
 
 
 def test_closed_loops_of_several_results(call: Call, tmp_path: Path) -> None:

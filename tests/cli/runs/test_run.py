@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
+from adaptive_flot.resources import scenario_folder
 from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.scenario.loading import load_scenario
 from tests.cli.conftest import Call, WriteScenario
@@ -101,3 +103,12 @@ def test_an_own_estimator_beside_the_scenario(
     assert (tmp_path / "r" / "cli_own_estimator-Mine_schedule_seed1.csv").is_file()
     runs = json.loads((tmp_path / "r" / "summary.json").read_text())["runs"]
     assert [r["estimator"] for r in runs] == ["cli_own_estimator:Mine", "rpem"]
+
+
+def test_what_a_closed_loop_earns_stands_before_the_fits(call: Call, tmp_path: Path) -> None:
+    given = yaml.safe_load((scenario_folder() / "closed_loop_drift.yaml").read_text())
+    short = {**given, "duration_s": 420, "parameters": {}}
+    (tmp_path / "loop.yaml").write_text(yaml.safe_dump(short))
+    result = call("run", "loop.yaml", "--controller", "pi", "--out", "r")
+    assert result.code == 0, result.err
+    assert result.out.index("Value") < result.out.index("Fit in percent")

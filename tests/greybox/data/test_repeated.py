@@ -83,3 +83,12 @@ def test_a_clock_that_jumps_back_splits_the_record(back: float) -> None:
     table["time_s"] -= np.where(np.arange(300) >= 120, back, 0.0)
     read = read_dataset(table, TANK)
     assert len(read) == 180 and "the clock jumps back in line 122" in read.notes[0]
+
+
+def test_a_pasted_part_is_no_stretch_of_those_that_are_counted() -> None:
+    """Two are left, and the longest is the second: it was called the third."""
+    table = record()
+    pasted = pd.concat([table[:120], table[50:100], table[120:]], ignore_index=True)
+    read = read_dataset(pasted, TANK)
+    assert len(read) == 180
+    assert "the record has 2 stretches with gaps between them: stretch 2 is used" in read.notes[-1]

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from adaptive_flot.contracts import full_parameters
+from adaptive_flot.contracts.batch import Identifiability
 from adaptive_flot.errors import DataError, ModelError, PluginError
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -19,6 +20,8 @@ from adaptive_flot.plugins import DEFAULT_ESTIMATOR, OF_A_RECORD
 from adaptive_flot.processes.flotation import make_model as make_cell
 from adaptive_flot.processes.flotation import read_cell
 from adaptive_flot.processes.registry import make_model
+from adaptive_flot.report.estimate.answer import title
+from adaptive_flot.report.estimate.page import estimate_report
 from adaptive_flot.resources import cell_file
 from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record
 from adaptive_flot.runner.commands.estimate_files import estimate_summary, save_fitted_cell, write_replays
@@ -235,3 +238,30 @@ def test_tanks_of_the_public_benchmark_are_fitted(shared_file: Any) -> None:
     file = shared_file("data/cascaded-tanks/dataBenchmark.csv")
     found = errors(estimate_record(read_blocks(file, model, 0.6), model, estimators=["pem", "fixed"]))
     assert found["pem", "test", "level"].free_run < 0.9 < found["fixed", "test", "level"].free_run
+
+
+def test_the_rows_of_both_blocks_add_up(model: Model, plant: PlantRecord, result: RecordEstimate) -> None:
+    """The test block begins at the last row of the fit block: that row is not counted twice."""
+    rows = len(plant.blocks(CUT).fit) + plant.blocks(CUT).tested
+    assert rows == len(result.replays[0].table)
+    assert f"{CUT} rows to fit on, {rows - CUT} to test on" in estimate_report(result)
+
+
+def test_the_title_says_first_that_a_fit_is_not_to_be_used(result: RecordEstimate) -> None:
+    assert "predict" in title(result)
+    judged = (("n", 0.9, "not identified"), ("C", 0.01, "on a bound"))
+    unsure = replace(result, batch=replace(result.batch, identifiability=Identifiability(judged, (), "")))
+    assert title(unsure) == "The record does not identify n; C ends on a bound"
+
+
+def test_the_title_says_first_that_a_fit_is_worse_than_a_constant(result: RecordEstimate) -> None:
+    """An error of a hundred times the noise, in every replay."""
+    off = [tuple(replace(e, free_run=100 * e.free_run + 1e-3) for e in r.errors) for r in result.replays]
+    bad = replace(result, replays=tuple(replace(r, errors=e) for r, e in zip(result.replays, off, strict=True)))
+    assert title(bad).startswith("The fit of concentrate grade") and title(bad).endswith("is worse than a constant")
+
+
+def test_stages_are_told_before_they_begin(model: Model, plant: PlantRecord) -> None:
+    told: list[str] = []
+    estimate_record(plant.blocks(CUT), model, estimators=["fixed"], innovations=False, progress=told.append)
+    assert told == ["batch fit", "replay through fixed"]
