@@ -308,5 +308,16 @@ def test_an_unclear_or_broken_export_is_refused_with_the_right_words(name: str, 
     assert "export." in message.split(":")[0] and len(message.splitlines()) == 1 and len(message) < 600
 
 
+@pytest.mark.parametrize("mark", [";", "\t", "|"])
+def test_a_decimal_comma_in_every_cell_is_no_separator(mark: str, tmp_path: Path, model: Model) -> None:
+    """Commas cut such lines as evenly as the separator, into one cell more."""
+    truth = PLANT.truth()
+    table = truth.reset_index(drop=True).assign(time_s=np.arange(len(truth)) * 10.0)
+    file = tmp_path / "export.csv"
+    table.to_csv(file, index=False, sep=mark, decimal=",", float_format="%.7f")
+    found = import_table(file, model, TagMap())
+    np.testing.assert_allclose(found.table()[truth.columns], truth, rtol=1e-5)
+
+
 def test_there_are_thirty_of_them() -> None:
     assert len(SOUND) >= 30 and len(REFUSED) >= 30
