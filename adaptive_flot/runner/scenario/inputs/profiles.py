@@ -12,6 +12,10 @@ from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generato
 from adaptive_flot.runner.scenario.inputs.recorded import Recorded
 
 
+LARGEST_CHANGE = 9.0
+"""A larger share was meant as percent: no physical parameter drifts to more than ten times its value."""
+
+
 class _Profile(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
 
@@ -98,6 +102,11 @@ class Change(_Profile):
     def _order(self) -> Change:
         if self.to_s <= self.from_s:
             raise ValueError("to_s must lie after from_s")
+        if abs(self.change) > LARGEST_CHANGE:
+            raise ValueError(
+                f"change is a share, and {self.change:g} makes the value {1 + self.change:g} times as large; write "
+                f"{self.change / 100:g} for {self.change:g} %, or give 'profile: factors'"
+            )
         return self
 
     def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
