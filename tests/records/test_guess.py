@@ -186,6 +186,6 @@ def test_a_tag_whose_name_has_a_unit_is_told_which_one_fits(model: Model) -> Non
     said = str(caught.value)
     assert "'concentrate_grade' is a fraction by its name" in said and "in % it would be 0.23" in said
     assert "concentrate_grade: {tag: concentrate_grade, unit: '%'}" in said
-    with pytest.raises(DataError, match="'concentrate_flow_m3_s' is in m3/s by its name.* fits none") as caught:
+    with pytest.raises(DataError, match=r"'concentrate_flow_m3_s' is in m3/s by its name.* fits none") as caught:
         tags(model, concentrate_flow_m3_s=("", 1e3))
     assert "unit: m3/s" not in str(caught.value)
