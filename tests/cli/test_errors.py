@@ -54,6 +54,10 @@ TABLES: Mapping[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], list[str]]] =
         lambda t: t.rename(columns={"feed_flow_m3_s": "fed_flow_m3_s"}),
         ["'feed_flow_m3_s' is missing", "did you mean 'fed_flow_m3_s'"],
     ),
+    "renamed input": (
+        lambda t: t.rename(columns={"air_flow_m3_s": "airflow"}),
+        ["'air_flow_m3_s' is missing", "did you mean 'airflow'? Known: airflow)"],
+    ),
     "time not increasing": (_set("time_s", 5, 2.0), ["time does not increase in line 7", "sort the rows"]),
     "time not uniform": (_set("time_s", 20, 20.4), ["not uniform", "line 22"]),
     "time missing": (_set("time_s", 5, None), ["'time_s' is empty in line 7"]),
