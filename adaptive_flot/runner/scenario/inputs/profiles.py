@@ -11,7 +11,6 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.inputs.recorded import Recorded
 
-
 LARGEST_CHANGE = 9.0
 """A larger share was meant as percent: no physical parameter drifts to more than ten times its value."""
 
