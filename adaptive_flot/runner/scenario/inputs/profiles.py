@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generator
@@ -187,4 +187,18 @@ class FeedWalk(_Profile):
 
 
 InputProfile = Annotated[Constant | Staircase | Random | Steps | Recorded, Field(discriminator="profile")]
-ParameterProfile = Change | Factors | RandomWalk
+
+
+def profile(given: object) -> str:
+    """Kind of a parameter's profile, by which pydantic chooses; one that says none is a ramp."""
+    kind = given.get("profile", "ramp") if isinstance(given, dict) else getattr(given, "profile", "ramp")
+    return str(kind)
+
+
+ParameterProfile = Annotated[
+    Annotated[Change, Tag("ramp")]
+    | Annotated[Change, Tag("step")]
+    | Annotated[Factors, Tag("factors")]
+    | Annotated[RandomWalk, Tag("random_walk")],
+    Discriminator(profile),
+]
