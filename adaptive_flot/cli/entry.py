@@ -7,16 +7,22 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
+
+import typer
+from pydantic import ValidationError
 
 from adaptive_flot.child_processes import Terminated, asked_to_end, terminable
 from adaptive_flot.cli.commands import app
 from adaptive_flot.errors import AdaptiveFlotError
 from adaptive_flot.plugins import plugin_failure
+from adaptive_flot.yaml_files.problems import in_words
 
 DEFECT = 1
 USER_ERROR = 2
 DEBUG = "--debug"
+UsageError: Any = typer.BadParameter.__mro__[1]
+"""Of the library that typer has in it, which gives it no public name."""
 OWN = ("adaptive_flot", "estimators", "controllers")
 """Packages of this program."""
 
@@ -30,7 +36,13 @@ def main() -> None:
     arguments, debug = _debug_first(sys.argv[1:])
     with terminable():
         try:
-            app(arguments)
+            sys.exit(app(arguments, standalone_mode=False) or 0)
+        except UsageError as error:
+            _end_usage(error, debug)
+        except typer.Abort as error:  # at a question
+            _end_by(error, asked_to_end() or signal.SIGINT, debug)
+        except KeyboardInterrupt as error:
+            _end_by(error, signal.SIGINT, debug)
         except Terminated as end:
             _end_by(end, end.number, debug)
         except AdaptiveFlotError as error:
@@ -48,6 +60,23 @@ def main() -> None:
                 raise
             hint = "report it" if debug else f"run it again with {DEBUG} and report what it prints"
             _end(error, f"a defect of this program ({_place(error)}): {_described(error)}; {hint}", DEFECT, debug)
+
+
+def _end_usage(error: Any, debug: bool) -> NoReturn:
+    """What the options and arguments have wrong, as one line; a command that was given nothing shows its help."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        sys.exit(USER_ERROR)
+    command = error.ctx.info_name if error.ctx is not None and error.ctx.parent is not None else ""
+    text = " ".join(error.format_message().split()).rstrip(".")
+    if isinstance(error.__cause__, ValidationError):
+        problem = error.__cause__.errors()[0]
+        text = text.replace(error.message, f"{in_words(problem)}, got {problem['input']!r}").replace(
+            ": Input", ": input"
+        )
+    where = f"{command}: " if command else ""
+    shown = f"adaptive-flot {command}".strip()
+    _end(error, f"{where}{text[:1].lower()}{text[1:]}; see '{shown} --help'", USER_ERROR, debug)
 
 
 def _debug_first(given: Sequence[str]) -> tuple[list[str], bool]:
