@@ -11,7 +11,7 @@ import pytest
 
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady.steady_state import steady_state
-from tests.cli.conftest import Call
+from tests.cli.conftest import Call, WriteTable
 from tests.runner.records import PlantRecord
 
 # shared/model/README.md, "Data columns"
