@@ -221,11 +221,12 @@ def test_a_wrong_scenario(
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["short.yaml", "--estimator", "rpm"], ["short.yaml", "'rpm'", "did you mean 'rpem'"]),
         (["short.yaml", "--estimator", "nowhere:Mine"], ["no module 'nowhere'"]),
         (["paper_scenaro_1"], ["paper_scenaro_1", "did you mean 'paper_scenario_1'"]),
         (["data/paper_scenario_1.yaml"], ["data/paper_scenario_1.yaml", "no such scenario file"]),
         (["."], ["no such scenario file"]),
+        (["short.yaml", "--estimator", "rpm"], [": --estimator: unknown estimator 'rpm'; did you mean 'rpem'?"]),
+        (["short.yaml", "--controller", "hld"], [": --controller: unknown controller 'hld'; did you mean 'hold'?"]),
     ],
     ids=lambda v: " ".join(v),
 )
