@@ -1,4 +1,4 @@
-"""Processes that this program starts end with it, however it ends."""
+"""Signals end this program, whatever it is at, and the processes that it started end with it, however it ends."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import NoReturn
 
 PARENT_CHECK_S = 1.0
 """How often a process looks whether the one that started it is still there [s]."""
@@ -33,32 +34,63 @@ class Terminated(BaseException):
         return 128 + self.number
 
 
+_asked: list[int] = []
+"""The signal that asked this program to end, once one has. Compiled libraries call handlers too, and lose what they
+raise or turn it into an error of theirs. So what was asked for is kept here also."""
+
+
+def asked_to_end() -> signal.Signals | None:
+    """The signal that asked this program to end in the block of `terminable`; None before one has."""
+    return signal.Signals(_asked[0]) if _asked else None
+
+
+def heed_signals() -> None:
+    """End the work if a signal asked for it and a library lost that. It costs next to nothing, so loops call it.
+
+    Raises
+    ------
+    KeyboardInterrupt, Terminated
+        As the handlers of `terminable` do. In the main thread only, as they do.
+    """
+    if _asked and threading.current_thread() is threading.main_thread():
+        _raise(_asked[0])
+
+
+def _raise(number: int) -> NoReturn:
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise Terminated(number)
+
+
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Raise `Terminated` in the block when a signal asks for the end, so that what it started is ended first.
+    """Raise in the block when a signal asks for the end, so that what it started is ended first.
 
-    A second signal ends the program at once. Signals that are ignored (`nohup`) stay ignored. Outside the main thread,
-    where Python takes no signals, the block runs as it is.
+    Ctrl-C raises `KeyboardInterrupt` as ever, other signals raise `Terminated`. A second signal ends the program at
+    once. Signals that are ignored (`nohup`) stay ignored. Outside the main thread, where Python takes no signals, the
+    block runs as it is.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    former = {number: signal.getsignal(number) for number in ENDING}
-    taken = [number for number, handler in former.items() if handler is signal.SIG_DFL]
+    usual = {**dict.fromkeys(ENDING, signal.SIG_DFL), signal.SIGINT: signal.default_int_handler}
+    taken = {number: handler for number, handler in usual.items() if signal.getsignal(number) is handler}
 
     def end(number: int, frame: object) -> None:
         del frame
         for one in taken:
             signal.signal(one, signal.SIG_DFL)
-        raise Terminated(number)
+        _asked.append(number)
+        _raise(number)
 
     for number in taken:
         signal.signal(number, end)
     try:
         yield
     finally:
-        for number in taken:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in taken.items():
+            signal.signal(number, handler)
+        _asked.clear()
 
 
 @contextmanager

@@ -66,8 +66,8 @@ def located(where: object) -> Iterator[None]:
         raise type(error)(f"{where}: {text}") from error
 
 
-def near_match(name: str, known: Iterable[str]) -> str:
-    """Return the hint that ends a message on an unknown name.
+def near_match(name: str, known: Iterable[str], what: str = "known") -> str:
+    """Return the hint that ends a message on an unknown name; `what` says which names are listed.
 
     >>> near_match("rpm", ["rpem", "fixed"])
     "did you mean 'rpem'? Known: fixed, rpem"
@@ -76,5 +76,5 @@ def near_match(name: str, known: Iterable[str]) -> str:
     """
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1)
-    listing = ", ".join(names)
-    return f"did you mean '{close[0]}'? Known: {listing}" if close else f"known: {listing}"
+    listing = f"{what}: {', '.join(names)}"
+    return f"did you mean '{close[0]}'? {listing[:1].upper()}{listing[1:]}" if close else listing

@@ -50,6 +50,18 @@ def check_targets(inputs: Iterable[Path | None], targets: Iterable[tuple[str, Pa
         taken[identity] = option
 
 
+def check_new(path: Path, option: str, text: str) -> None:
+    """Check that a file which a person edits is not there yet, unless it holds what would be written.
+
+    Raises
+    ------
+    OutputError
+        It is there, and holds something else.
+    """
+    if path.is_file() and path.read_bytes() != text.encode():
+        raise OutputError(f"{option}: {path} is there already; give another path, or remove it yourself")
+
+
 def _identity(path: Path) -> Identity:
     """The same for all paths to one file: links, also hard ones, and other spellings."""
     if not path.exists():

@@ -37,7 +37,7 @@ def import_(
     read = [export, map_, *model_inputs(model, cell, export.parent)]
     check_targets(read, [("--out", out)])
     check_table_path(out)
-    page, new_map = out.with_suffix(".quality.html"), _free(out.with_suffix(".map.yaml"))
+    page, new_map = _free(out.with_suffix(".quality.html")), _free(out.with_suffix(".map.yaml"))
     check_targets(read, [("--out", out), ("--out", page if report else None), ("--out", new_map)])
     given = TagMap() if map_ is None else load_tag_map(map_)
     terminal = sys.stdin.isatty() and sys.stdout.isatty()
@@ -64,10 +64,10 @@ def import_(
 
 
 def _free(path: Path) -> Path:
-    """A name that no file has: a map that somebody wrote is never lost."""
+    """A name that no file has: a map or a page that somebody changed is never lost."""
     number = 2
     found = path
     while found.exists():
-        found = path.with_name(f"{path.name.removesuffix('.yaml')}-{number}.yaml")
+        found = path.with_name(f"{path.stem}-{number}{path.suffix}")
         number += 1
     return found

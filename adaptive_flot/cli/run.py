@@ -37,6 +37,7 @@ def run(
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.runs.run import run_scenario
     from adaptive_flot.runner.commands.runs.run_files import run_summary, write_json, write_runs
+    from adaptive_flot.runner.loop.prepared import check_named
     from adaptive_flot.runner.scenario.loading import load_scenario
     from adaptive_flot.runner.scenario.recorded_inputs import on_record
 
@@ -49,6 +50,7 @@ def run(
         loaded = on_record(loaded, measured, record, map_)
     loaded = loaded.compiled() if can_compile(compile_) else loaded
     who = once(estimator), once(controller)
+    check_named(loaded, *who)
     folder = results_folder(out, loaded.name, "run")
     check_targets(scenario_inputs(loaded, *who), [*in_folder(folder, "summary.json", "report.html"), ("--json", json)])
     print_sentences(dict.fromkeys(f"Inputs of {played.said}" for played in loaded.recorded.values()))

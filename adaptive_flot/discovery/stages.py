@@ -54,6 +54,7 @@ from adaptive_flot.discovery.verdict.judge import (
 from adaptive_flot.greybox.effects import LATE
 from adaptive_flot.greybox.rescaled import factors_of, rescaled
 from adaptive_flot.greybox.steady.assumed_start import wrong_start
+from adaptive_flot.greybox.steady.likely_unit import off_by_a_unit
 
 FINAL_SHARE, TEST_SHARE = 0.6, 0.5
 """How long the last fits, and the proposed test, take: about so many times what the fit of the model as it is took."""
@@ -99,7 +100,8 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     problem = replace(problem, site_sizes=responses.sizes, absorbed=responses.absorbed_constants(), evenly_moved=evenly)
     noise = noise_by_differences(problem.measured)
     start = base.initial_state, parameters_of(base)
-    said = steps_words(state.model, model)
+    said = off_by_a_unit(state.model, problem.record.inputs, problem.record.outputs)
+    said += steps_words(state.model, model)
     said += wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
     if not state.adapted:
         said += (NONE_FITTED,)

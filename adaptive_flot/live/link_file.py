@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from adaptive_flot.errors import DataError, LinkError, near_match
+from adaptive_flot.errors import DataError, LinkError, located, near_match
 from adaptive_flot.greybox.quantities import Parameter, Quantity
 from adaptive_flot.live.link_keys import (
     MODES,
@@ -103,7 +103,8 @@ def load_link(path: Path) -> Link:
     except ValidationError as error:
         raise LinkError(f"{path}: {first_problem(error, LinkFile)}") from error
     beside = path.parent / file.scenario
-    scenario = load_scenario(file.scenario if file.scenario in shipped_scenarios() else beside)
+    with located(f"{path}: scenario"):
+        scenario = load_scenario(file.scenario if file.scenario in shipped_scenarios() else beside)
     if file.estimator == DEFAULT_ESTIMATOR:
         scenario = _with_default_estimator(scenario)
     _check(path, file, scenario)
@@ -151,10 +152,10 @@ def _check(path: Path, file: LinkFile, scenario: Scenario) -> None:
 
 
 def _check_who(where: str, scenario: Scenario, estimator: str, controller: str | None) -> None:
-    if estimator not in scenario.file.estimators or controller not in (None, *scenario.file.controllers):
-        raise LinkError(
-            f"{where}: scenario {scenario.name!r} has estimators {', '.join(scenario.file.estimators)} and controllers "
-            f"{', '.join(scenario.file.controllers)}; name one of each"
-        )
+    of_scenario = {"estimator": scenario.file.estimators, "controller": scenario.file.controllers}
+    for what, name in (("estimator", estimator), ("controller", controller)):
+        if name is not None and name not in of_scenario[what]:
+            hint = near_match(name, of_scenario[what])
+            raise LinkError(f"{where}: scenario {scenario.name!r} has no {what} {name!r}; {hint}")
     if scenario.file.estimators[estimator].needs_truth(scenario.path.parent):
         raise LinkError(f"{where}: estimator {estimator!r} needs the true parameters, which no plant tells")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+from adaptive_flot.errors import located
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.loop import quiet_libraries, settle, until_stopped
 from adaptive_flot.live.page.server import PageServer
@@ -36,7 +37,9 @@ def live(link: Link, say: Callable[[str], None] = print, cycles: int | None = No
     quiet_libraries()
     inbox, speaker = Inbox(), Speaker(say)
     page = None if link.file.page is None else PageServer(link, inbox)
-    memory = Memory(open_database(link.file.database, link.path.parent), link)
+    with located(link.path):
+        database = open_database(link.file.database, link.path.parent)
+    memory = Memory(database, link)
     try:
         for words in (_started(link, memory), *kept(link, memory)):
             say(words)

@@ -51,6 +51,8 @@ def make_model(name: str = "flotation", *, cell: str | None = None, folder: Path
     if name not in PROCESSES and ":" not in name:
         if name.endswith(".py"):
             raise PluginError(f"model {name!r}: which function of that file makes it? Write {name}:make_model")
+        if name in _shipped_cells():
+            raise PluginError(f"{name!r} is a cell of the model 'flotation', and no model; give it by --cell {name}")
         known = near_match(name, PROCESSES)
         raise PluginError(f"unknown model {name!r}; {known}, or a model file, or your own as my_file:make_model")
     if cell is not None:
@@ -131,5 +133,8 @@ def find_cell(cell: str | None, folder: Path | None = None) -> Path:
     for place in (Path(cell), *([folder / cell] if folder else []), cell_file(cell)):
         if place.is_file():
             return place
-    shipped = [f.stem for f in cell_file().parent.glob("*.yaml")]
-    raise CellError(f"{cell}: no such cell file; {near_match(cell, shipped)}")
+    raise CellError(f"{cell}: no such cell file; {near_match(cell, _shipped_cells(), 'shipped')}")
+
+
+def _shipped_cells() -> list[str]:
+    return [f.stem for f in cell_file().parent.glob("*.yaml")]

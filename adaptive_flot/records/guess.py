@@ -13,11 +13,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from adaptive_flot.errors import DataError, located, near_match
-from adaptive_flot.greybox.data.wrong_unit import other_units
+from adaptive_flot.greybox.data.wrong_unit import other_units, units_that_fit
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import Quantity
 from adaptive_flot.records.reading.export import Export, Signal
-from adaptive_flot.records.reading.raw import UnclearError
+from adaptive_flot.records.reading.raw import UnclearError, map_line
 from adaptive_flot.records.tag_map import TagKeys, TagMap
 from adaptive_flot.records.units import convert, fits, is_unit, read_unit
 
@@ -234,6 +234,25 @@ def _nothing_found(q: Quantity, export: Export) -> str:
     )
 
 
+def _no_unit(q: Quantity, tag: str, middle: float) -> str:
+    """What is wrong with a tag whose values fit no unit that it could be in, and the line of a map that puts it right.
+
+    A tag with the name of a record's column says its unit by that name; its values may be in another one all the same.
+    """
+    said = "names no unit"
+    if tag == q.column:
+        said = "is a fraction by its name" if q.unit == "-" else f"is in {q.unit} by its name"
+    fitting = units_that_fit(q, middle)
+    inside = [f"in {unit} it would be {value:.4g} {q.unit}".removesuffix(" -") for unit, value in fitting.items()]
+    low, high = q.usual or (q.lower, q.upper)
+    found = "; ".join(inside) or f"fits none (usual are {low:.3g} to {high:.3g} {q.unit})".replace(" -)", ")")
+    line = map_line(q.name, {"tag": tag, "unit": next(iter(fitting))}) if fitting else f"{q.name}: {{unit: ...}}"
+    advice = (
+        f"{'if so,' if fitting else 'correct it, or'} give {'it' if fitting else 'its unit'} in a map (--map): {line}"
+    )
+    return f"tag {tag!r} {said}, and its median {middle:g} {'does not fit: ' if fitting else ''}{found}; {advice}"
+
+
 def _one_unit(q: Quantity, keys: TagKeys, export: Export) -> str:
     signal = export.signals[keys.tag]
     if signal.unit:
@@ -246,7 +265,5 @@ def _one_unit(q: Quantity, keys: TagKeys, export: Export) -> str:
         return units[0]
     where = f"{export.file}: {q.name}: tag {keys.tag!r} names no unit, and its median {middle:g}"
     if not units:
-        raise DataError(
-            f"{where} fits none; give it in a map (--map), as '{q.name}: {{tag: {keys.tag}, unit: {q.unit}}}'"
-        )
+        raise DataError(f"{export.file}: {q.name}: {_no_unit(q, keys.tag, middle)}")
     raise UnclearError(f"{where} fits several", q.name, [{"tag": keys.tag, "unit": u} for u in units])

@@ -109,8 +109,11 @@ def import_table(source: Source, model: Model, given: TagMap, *, outputs: bool |
         The export can not be used.
     """
     export = read_export(source, given)
-    if export.time_keys.column == TIME_COLUMN and all(q.column in export.signals for q in model.inputs):
+    missing = [q.column for q in model.inputs if q.column not in export.signals]
+    if export.time_keys.column == TIME_COLUMN and not missing:
         export = acting_from_the_row_before(export, model.inputs)
+    else:
+        export = replace(export, found=(*export.found, _acting_from_its_stamp(export, missing)))
     whole = all(given.names(q.name) for q in model.inputs)
     full = given.model_copy(update={"file": export.file_keys, "time": export.time_keys})
     full = guess_tags(export, model, full, outputs=not whole if outputs is None else outputs)
@@ -133,6 +136,14 @@ def import_table(source: Source, model: Model, given: TagMap, *, outputs: bool |
         export.file,
     )
     return Imported(export, model, full, _guessed(given, full), cleaned, rows)
+
+
+def _acting_from_its_stamp(export: Export, missing: Sequence[str]) -> str:
+    """The rule for the times of inputs, and what makes a table look like a record that it is not."""
+    rule = "an input acts from its stamp on, so it stands in the row after"
+    if export.time_keys.column != TIME_COLUMN:
+        return rule
+    return f"no record yet, as it has no column {missing[0]!r}: {rule}; name it so if inputs act up to their row"
 
 
 def acting_from_the_row_before(export: Export, inputs: Sequence[Quantity]) -> Export:

@@ -128,7 +128,7 @@ def _find(name: str) -> Path:
     shipped = shipped_studies()
     if name in (path.stem, f"{path.stem}.yaml") and path.stem in shipped:
         return shipped[path.stem]
-    raise StudyError(f"{name}: no such study file; shipped: {near_match(path.stem, shipped)}")
+    raise StudyError(f"{name}: no such study file; {near_match(path.stem, shipped, 'shipped')}")
 
 
 def _scenario(name: str, folder: Path) -> Scenario:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -30,14 +31,29 @@ def first_problem(error: ValidationError, schema: type[BaseModel]) -> str:
     if first["type"] == "union_tag_invalid":
         context = first["ctx"]
         known = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
-        key = context["discriminator"].strip("'")
+        key = context["discriminator"].strip("'()")  # a key, or a function of its name
         return f"{place}: unknown {key} {context['tag']!r}; {near_match(context['tag'], known)}"
     if first["type"] == "union_tag_not_found":
         key = first["ctx"]["discriminator"].strip("'")
         return f"{place}: key {key!r} is missing; it says what kind of entry this is"
     got = first.get("input")
     shown = f", got {_shortened(got)}" if not isinstance(got, dict) else ""
-    return f"{place}: {first['msg'].removeprefix('Value error, ')}{shown}; correct it"
+    return f"{place}: {in_words(first)}{shown}; correct it"
+
+
+def in_words(problem: Mapping[str, Any]) -> str:
+    """What one of pydantic's problems says of a value, without the names of classes and of its own steps."""
+    kind, context = str(problem["type"]), problem.get("ctx", {})
+    if kind == "too_short":
+        least = context["min_length"]
+        return f"needs at least {least} {'entry' if least == 1 else 'entries'}"
+    if kind == "too_long":
+        return f"takes at most {context['max_length']} entries"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return "Input should be keys with their values"
+    if kind.startswith(("datetime_", "date_")):
+        return "Input should be a date with a time, as 2026-11-29T13:00"
+    return str(problem["msg"]).removeprefix("Value error, ").split(", unable to parse")[0]
 
 
 def _shortened(value: object) -> str:

@@ -190,3 +190,17 @@ def test_every_output_option_is_in_these_tables() -> None:
                 outputs.add((name, f"--{parameter.rstrip('_').replace('_', '-')}"))
     tried = {(command[0], option) for command, option, _ in CASES} | {(command[0], "--out") for command, _ in FOLDERS}
     assert {o for o in outputs if o[1] not in INPUT_OPTIONS} - READS_NOTHING == tried
+
+
+def test_a_link_file_that_somebody_edited_is_kept(call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The same command again finds its own file, and goes on."""
+    served: list[object] = []
+    monkeypatch.setattr("adaptive_flot.live.plant.serve.serve", lambda *given, **options: served.append(given))
+    command = ["serve-plant", "closed_loop_drift", "--write-link", "link.yaml"]
+    for times in (1, 2):
+        assert call(*command).code == 0 and len(served) == times
+    (tmp_path / "link.yaml").write_text("mine: all\n")
+    result = call(*command)
+    assert result.code == 2 and result.out == "" and result.err.count("\n") == 1 and len(served) == 2
+    assert "--write-link: link.yaml is there already" in result.err
+    assert (tmp_path / "link.yaml").read_text() == "mine: all\n"

@@ -54,6 +54,10 @@ TABLES: Mapping[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], list[str]]] =
         lambda t: t.rename(columns={"feed_flow_m3_s": "fed_flow_m3_s"}),
         ["'feed_flow_m3_s' is missing", "did you mean 'fed_flow_m3_s'"],
     ),
+    "renamed input": (
+        lambda t: t.rename(columns={"air_flow_m3_s": "airflow"}),
+        ["'air_flow_m3_s' is missing", "did you mean 'airflow'? Known: airflow)"],
+    ),
     "time not increasing": (_set("time_s", 5, 2.0), ["time does not increase in line 7", "sort the rows"]),
     "time not uniform": (_set("time_s", 20, 20.4), ["not uniform", "line 22"]),
     "time missing": (_set("time_s", 5, None), ["'time_s' is empty in line 7"]),
@@ -217,11 +221,12 @@ def test_a_wrong_scenario(
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["short.yaml", "--estimator", "rpm"], ["short.yaml", "'rpm'", "did you mean 'rpem'"]),
         (["short.yaml", "--estimator", "nowhere:Mine"], ["no module 'nowhere'"]),
         (["paper_scenaro_1"], ["paper_scenaro_1", "did you mean 'paper_scenario_1'"]),
         (["data/paper_scenario_1.yaml"], ["data/paper_scenario_1.yaml", "no such scenario file"]),
         (["."], ["no such scenario file"]),
+        (["short.yaml", "--estimator", "rpm"], [": --estimator: unknown estimator 'rpm'; did you mean 'rpem'?"]),
+        (["short.yaml", "--controller", "hld"], [": --controller: unknown controller 'hld'; did you mean 'hold'?"]),
     ],
     ids=lambda v: " ".join(v),
 )

@@ -51,6 +51,19 @@ def test_scenarios_lists_each_shipped_one_with_its_description(call: Call) -> No
 def test_wrong_usage_exits_with_2(call: Call, arguments: list[str]) -> None:
     result = call(*arguments)
     assert result.code == 2 and "Traceback" not in result.err and result.out == ""
+    assert result.err.count("\n") == 1 and result.err.startswith("adaptive-flot: ") and "--help'" in result.err
+
+
+def test_an_option_that_is_wrong_is_named_in_one_line(call: Call) -> None:
+    said = "adaptive-flot: run: invalid value for '--seed': input should be a valid integer, got 'x'; see"
+    result = call("run", "paper_scenario_1", "--seed", "x")
+    assert result.code == 2 and result.err.startswith(said) and result.err.count("\n") == 1
+    assert result.err.endswith("; see 'adaptive-flot run --help'\n")
+
+
+def test_nothing_at_all_shows_the_help(call: Call) -> None:
+    result = call()
+    assert result.code == 2 and all(command in result.out + result.err for command in COMMANDS)
 
 
 @pytest.mark.parametrize("arguments", [["run", "short.yaml", "--seed", "-1"], ["run", "short.yaml", "--seed", "one"]])

@@ -177,3 +177,15 @@ def test_a_hole_does_not_change_the_step() -> None:
 
 def test_a_step_signal_and_noise_are_no_held_analyser() -> None:
     assert not holds_its_value(noisy()) and not holds_its_value(np.full(100, 3.0))
+
+
+def test_a_tag_whose_name_has_a_unit_is_told_which_one_fits(model: Model) -> None:
+    """The name of a record's column says its unit; the values say another one."""
+    with pytest.raises(DataError) as caught:
+        tags(model, concentrate_grade=("", 23.0))
+    said = str(caught.value)
+    assert "'concentrate_grade' is a fraction by its name" in said and "in % it would be 0.23" in said
+    assert "concentrate_grade: {tag: concentrate_grade, unit: '%'}" in said
+    with pytest.raises(DataError, match=r"'concentrate_flow_m3_s' is in m3/s by its name.* fits none") as caught:
+        tags(model, concentrate_flow_m3_s=("", 1e3))
+    assert "unit: m3/s" not in str(caught.value)

@@ -308,5 +308,38 @@ def test_an_unclear_or_broken_export_is_refused_with_the_right_words(name: str, 
     assert "export." in message.split(":")[0] and len(message.splitlines()) == 1 and len(message) < 600
 
 
+@pytest.mark.parametrize("mark", [";", "\t", "|"])
+def test_a_decimal_comma_in_every_cell_is_no_separator(mark: str, tmp_path: Path, model: Model) -> None:
+    """Commas cut such lines as evenly as the separator, into one cell more."""
+    truth = PLANT.truth()
+    table = truth.reset_index(drop=True).assign(time_s=np.arange(len(truth)) * 10.0)
+    file = tmp_path / "export.csv"
+    table.to_csv(file, index=False, sep=mark, decimal=",", float_format="%.7f")
+    found = import_table(file, model, TagMap())
+    np.testing.assert_allclose(found.table()[truth.columns], truth, rtol=1e-5)
+
+
+def test_what_is_done_with_the_times_is_said(tmp_path: Path, model: Model) -> None:
+    """Inputs of a record act up to their row, those of an export from their stamp on; neither goes without a word."""
+    truth = PLANT.truth().reset_index(drop=True)
+    record = truth.assign(time_s=np.arange(len(truth)) * 10.0)
+    renamed = record.rename(columns={"air_flow_m3_s": "airflow"})
+    says = {
+        "a record already: an input acts up to its row": (record, len(record)),
+        "no record yet, as it has no column 'air_flow_m3_s': an input acts from its stamp on": (
+            renamed,
+            len(record) - 1,
+        ),
+        "rows that were not in the order of time: sorted": (record[::-1], len(record)),
+        "an input acts from its stamp on": (PLANT.columns(), len(record)),
+    }
+    for said, (table, rows) in says.items():
+        table.to_csv(tmp_path / "export.csv", index=False)
+        found = import_table(tmp_path / "export.csv", model, TagMap())
+        assert sum(words.startswith(said) for words in found.export.found) == 1, found.export.found
+        assert len(found.table()) == rows, said
+        assert sum("order of time" in words for words in found.export.found) == ("sorted" in said)
+
+
 def test_there_are_thirty_of_them() -> None:
     assert len(SOUND) >= 30 and len(REFUSED) >= 30

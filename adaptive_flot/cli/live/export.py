@@ -21,7 +21,7 @@ def export(
     session: Annotated[int | None, typer.Option(min=1, help="Session to replay or compare; default the last.")] = None,
 ) -> None:
     """Write what a live link has stored as a record for `discover`, `estimate` and `run`."""
-    from adaptive_flot.errors import LinkError
+    from adaptive_flot.errors import LinkError, located
     from adaptive_flot.greybox.data.tables import check_table_path, write_table
     from adaptive_flot.live.link_file import load_link
     from adaptive_flot.live.store.memory import open_database
@@ -33,7 +33,8 @@ def export(
     if out is not None:
         check_targets([link, loaded.scenario.path], [("--out", out)])
         check_table_path(out)
-    engine = open_database(loaded.file.database, link.parent)
+    with located(link):
+        engine = open_database(loaded.file.database, link.parent)
     if out is not None:
         first, last = (None if t is None else t.replace(tzinfo=UTC).timestamp() for t in (begin, end))
         known = stretches(engine, loaded)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from adaptive_flot.targets import check_targets
+from adaptive_flot.targets import check_new, check_targets
 
 
 def serve_plant(
@@ -40,7 +40,9 @@ def serve_plant(
     place = ServerPlace(certificates.absolute(), host, port)
     if write_link is not None:
         check_targets([loaded.path], [("--write-link", write_link)])
-        write_text(write_link, link_text(loaded, place.url, certificates.absolute(), speed=speed, page=page))
+        text = link_text(loaded, place.url, certificates.absolute(), speed=speed, page=page)
+        check_new(write_link, "--write-link", text)
+        write_text(write_link, text)
         typer.echo(f"Link file: {write_link}")
     serve(
         loaded,

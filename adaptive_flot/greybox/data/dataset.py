@@ -5,7 +5,7 @@ Row k holds the inputs held during the interval that ends at `time[k]` and the o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -103,11 +103,12 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     file = named(path)
     table, notes = longest_stretch(read_table(path), TIME_COLUMN, file)
     columns = [str(c) for c in table.columns]
-    time = time_column(table, _find(columns, "time", TIME_COLUMN, "s", file), file)
+    taken = {TIME_COLUMN, *(q.column for q in (*model.inputs, *model.outputs, *model.states))}
+    time = time_column(table, _find(columns, "time", TIME_COLUMN, "s", file, taken), file)
     dt = _interval(table, time, file)
     _check_steps(model, dt, len(time), file)
 
-    inputs = np.column_stack([_input(table, columns, q, file) for q in model.inputs])
+    inputs = np.column_stack([_input(table, columns, q, file, taken) for q in model.inputs])
     model.check_inputs(inputs, time, where=str(file))
     outputs = np.full((len(table), len(model.outputs)), np.nan)
     for j, q in enumerate(model.outputs):
@@ -115,7 +116,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
             outputs[:, j] = numeric_column(table, q.column, file)
             check_unit(_with_range(q, model), outputs[:, j], str(file))
         elif q.name in required_outputs or _other_unit(columns, q.name, q.column) is not None:
-            _find(columns, q.name, q.column, q.unit, file)
+            _find(columns, q.name, q.column, q.unit, file, taken)
 
     parameters = {
         p.name: numeric_column(table, label, file)
@@ -160,7 +161,8 @@ def check_record(record: Dataset, model: Model, table: pd.DataFrame, file: Path)
     return record
 
 
-def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path) -> str:
+def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path, taken: Collection[str] = ()) -> str:
+    """The column of a quantity; `taken` are those of all quantities, which are right as they are."""
     if column in columns:
         return column
     other = _other_unit(columns, name, column)
@@ -171,7 +173,9 @@ def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path)
     if f"{column}_measured" in columns:
         raise DataError(f"{file}: column {column!r} is missing; of a time series of `run`, rename '{column}_measured'")
     hint = ", or make a record of an export with 'adaptive-flot import'" if column == TIME_COLUMN else ""
-    raise DataError(f"{file}: column {column!r} is missing; add it ({near_match(column, columns)}){hint}")
+    free = [c for c in columns if c not in taken]
+    meant = near_match(column, free) if free else "the file has no other columns"
+    raise DataError(f"{file}: column {column!r} is missing; add it ({meant}){hint}")
 
 
 def _other_unit(columns: Sequence[str], name: str, column: str) -> str | None:
@@ -185,8 +189,8 @@ def _looks_like_unit(suffix: str) -> bool:
     return bool(suffix) and all(part in units for part in suffix.split("_"))
 
 
-def _input(table: pd.DataFrame, columns: Sequence[str], q: Quantity, file: Path) -> FloatArray:
-    values = numeric_column(table, _find(columns, q.name, q.column, q.unit, file), file)
+def _input(table: pd.DataFrame, columns: Sequence[str], q: Quantity, file: Path, taken: Collection[str]) -> FloatArray:
+    values = numeric_column(table, _find(columns, q.name, q.column, q.unit, file, taken), file)
     _check_input(table, q.column, values, file)
     check_unit(q, values, str(file))
     return values

@@ -16,6 +16,7 @@ from adaptive_flot.files import replace_file
 from adaptive_flot.greybox.model import Parameter
 from adaptive_flot.processes.flotation.parameters import OPERATION_UNITS, PARAMETERS, Cell, Spec
 from adaptive_flot.resources import cell_file
+from adaptive_flot.yaml_files.problems import in_words
 from adaptive_flot.yaml_files.read import read_yaml
 
 HIGHEST_GAS_VELOCITY = 0.03
@@ -150,7 +151,7 @@ def _entry(file: Path, given: Mapping[str, Any], section: str, key: str, unit: s
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(p) for p in first["loc"][:1])
-        raise CellError(f"{where}.{place}: {first['msg']}, got {first.get('input')!r}; correct it") from error
+        raise CellError(f"{where}.{place}: {in_words(first)}, got {first.get('input')!r}; correct it") from error
     if entry.unit != unit:
         raise CellError(f"{where} is given in {entry.unit!r}; convert the value and write unit: {unit}")
     return entry

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from adaptive_flot.greybox.steady.likely_unit import off_by_a_unit
 from adaptive_flot.records.importing import Imported
 from adaptive_flot.records.quality.excitation import Excitation, excitation
 from adaptive_flot.records.quality.relations import Correlation, Feedback, block_means, correlation, feedback
@@ -38,6 +39,8 @@ class Quality:
         Inputs with outputs, and inputs with inputs, over the longest stretch.
     feedbacks
         Each input with each output, over the longest stretch.
+    units
+        Outputs that are off from the model as if they were in another unit, in words.
     """
 
     rows: int
@@ -47,10 +50,11 @@ class Quality:
     excitations: tuple[Excitation, ...]
     correlations: tuple[Correlation, ...]
     feedbacks: tuple[Feedback, ...]
+    units: tuple[str, ...] = ()
 
     def sentences(self) -> list[str]:
         """What follows, the most important first."""
-        said = [_amount(self)]
+        said = [_amount(self), *(f"{words}." for words in self.units)]
         said += _what_moves(self.excitations)
         said += [
             f"{c.one} and {c.other} move together (correlation {c.r:.2f}): their effects can not be told apart."
@@ -85,7 +89,18 @@ def judge(imported: Imported) -> Quality:
         tuple(excitation(name, values[name]) for name in inputs),
         tuple(replace(c, lag=c.lag * size) for c in found if c is not None),
         tuple(f for f in loops if f is not None),
+        _units(imported),
     )
+
+
+def _units(imported: Imported) -> tuple[str, ...]:
+    model, rows = imported.model, imported.rows
+    known = np.all([np.isfinite(rows.values[name]) for name in model.names("inputs")], axis=0)
+    inputs = np.column_stack([rows.values[name][known] for name in model.names("inputs")])
+    missing = np.full(int(known.sum()), np.nan)
+    names = [name if name in rows.values else None for name in model.names("outputs")]
+    outputs = [missing if name is None else rows.values[name][known] for name in names]
+    return off_by_a_unit(model, inputs, np.column_stack(outputs)) if known.any() else ()
 
 
 def _amount(quality: Quality) -> str:

@@ -78,6 +78,8 @@ def read_export(source: Source, tag_map: TagMap) -> Export:
         good=keys.good,
     )
     odd = [f"left out: {jumped} rows with a time far from all others"] if jumped else []
+    if any((np.diff(s.lines) < 0).any() for s in signals.values()):
+        odd.append("rows that were not in the order of time: sorted")
     found = (
         *raw.found,
         shape,

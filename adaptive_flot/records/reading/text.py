@@ -6,6 +6,7 @@ import codecs
 import csv
 import gzip
 import io
+import re
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -24,7 +25,8 @@ MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 """Byte order marks; that of UTF-16 begins that of UTF-32."""
-SEPARATORS = (";", "\t", ",", "|")
+SEPARATORS = (";", "\t", "|", ",")
+_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 LOOKED_AT = 200
 """Lines from which the separator is judged."""
 MOST_BYTES = 2_000_000_000
@@ -91,10 +93,13 @@ def _decoded(content: bytes, file: Path) -> tuple[str, str]:
 
 
 def _separator(lines: list[str], file: Path) -> str:
-    """The separator with which most lines have the same, largest number of cells."""
+    """The separator with which most lines have the same, largest number of cells; a decimal comma is none."""
     best: tuple[float, str] = (0.0, "")
+    filled = [line for line in lines if line.strip()]
     for mark in SEPARATORS:
-        counts = Counter(len(row) for row in csv.reader((line for line in lines if line.strip()), delimiter=mark))
+        if mark == "," and best[1] and _commas_are_decimal(filled, best[1]):
+            continue
+        counts = Counter(len(row) for row in csv.reader(filled, delimiter=mark))
         width, times = max(counts.items(), key=lambda item: (item[1], item[0]))
         if width > 1:
             best = max(best, (times / counts.total() + 0.01 * min(width, 40), mark))
@@ -104,6 +109,12 @@ def _separator(lines: list[str], file: Path) -> str:
             "'file: {separator: \"~\"}', or export it as CSV"
         )
     return best[1]
+
+
+def _commas_are_decimal(lines: list[str], mark: str) -> bool:
+    """Whether nearly all cells with a comma are numbers with one, once another separator has cut the lines."""
+    with_comma = [cell.strip() for row in csv.reader(lines, delimiter=mark) for cell in row if "," in cell]
+    return sum(_DECIMAL.fullmatch(cell) is not None for cell in with_comma) > 0.9 * len(with_comma)
 
 
 def _cells(text: str, mark: str, start: int, width: int, file: Path) -> pd.DataFrame:

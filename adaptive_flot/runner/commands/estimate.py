@@ -15,6 +15,7 @@ from adaptive_flot.described import Described
 from adaptive_flot.errors import DataError, ModelError, PluginError, located, near_match
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady.assumed_start import wrong_start
+from adaptive_flot.greybox.steady.likely_unit import off_by_a_unit
 from adaptive_flot.greybox.stepping.step_functions import check_interval
 from adaptive_flot.plugins import BATCH_ESTIMATORS, ESTIMATORS, OF_A_RECORD, construct, load
 from adaptive_flot.runner.commands.innovations.estimate import (
@@ -111,7 +112,8 @@ def estimate_record(
     factory = load("pem", BATCH_ESTIMATORS, "batch estimator")
     batch: BatchFit = construct(factory, "pem", "batch estimator", setup, **BATCH_OPTIONS).fit(blocks.fit)
     columns, noise = model.indices("outputs", driving), batch.noise_std
-    said = wrong_start(model, blocks.fit, batch.initial_state, batch.parameters, columns, noise)
+    said = off_by_a_unit(model, blocks.fit.inputs, blocks.fit.outputs)
+    said += wrong_start(model, blocks.fit, batch.initial_state, batch.parameters, columns, noise)
     blocks = replace(blocks, fit=replace(blocks.fit, notes=blocks.fit.notes + said))
     replays = []
     for name, plugin in plugins.items():

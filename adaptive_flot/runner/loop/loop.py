@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from adaptive_flot.child_processes import heed_signals
 from adaptive_flot.contracts import (
     AnyController,
     AnyEstimator,
@@ -131,6 +132,7 @@ def run_loop(
         sample, now = record.sample, replace(now, controller_state=controller_state)
         if k >= initial_intervals:
             now = now.estimated(sample, lambda: make_prior(steps))
+        heed_signals()  # what an estimator or a controller calls may have lost one
         steps.append(Step(decision, record, now.estimate))
         now = supervise(now, steps)
     return steps

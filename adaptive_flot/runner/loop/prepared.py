@@ -10,7 +10,7 @@ from adaptive_flot.contracts import AnyController, AnyEstimator, ControllerSetup
 from adaptive_flot.contracts.batch import BatchEstimator
 from adaptive_flot.contracts.delayed_measurements import taking_delayed_values
 from adaptive_flot.described import Described
-from adaptive_flot.errors import ScenarioError, near_match
+from adaptive_flot.errors import ScenarioError, located, near_match
 from adaptive_flot.greybox.ensemble.ensemble import Ensemble
 from adaptive_flot.greybox.ensemble.steady_states import SteadyStates
 from adaptive_flot.plugins import BATCH_ESTIMATORS, CONTROLLERS, ESTIMATORS, construct, load
@@ -134,6 +134,23 @@ def controller_plugin(scenario: Scenario, name: str) -> Plugin:
         None of these; the message holds the nearest name.
     """
     return _plugin(name, "controller", scenario.file.controllers, CONTROLLERS)
+
+
+def check_named(scenario: Scenario, estimators: Sequence[str], controllers: Sequence[str]) -> None:
+    """Check the names that options gave, so that a message blames the option and not the scenario's file.
+
+    Raises
+    ------
+    ScenarioError, PluginError
+        None of the scenario, no shipped one, and nothing that can be loaded.
+    """
+    folder = scenario.path.parent
+    with located("--estimator"):
+        for name in estimators:
+            load(estimator_plugin(scenario, name).use, ESTIMATORS, "estimator", folder)
+    with located("--controller"):
+        for name in controllers:
+            load(controller_plugin(scenario, name).use, CONTROLLERS, "controller", folder)
 
 
 def _plugin(name: str, what: str, own: Mapping[str, Plugin], shipped: Mapping[str, str]) -> Plugin:

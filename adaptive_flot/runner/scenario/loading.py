@@ -39,7 +39,7 @@ def find_scenario(name: str) -> Path:
     shipped = shipped_scenarios()
     if name in (path.stem, f"{path.stem}.yaml") and path.stem in shipped:
         return shipped[path.stem]
-    raise ScenarioError(f"{name}: no such scenario file; shipped: {near_match(path.stem, shipped)}")
+    raise ScenarioError(f"{name}: no such scenario file; {near_match(path.stem, shipped, 'shipped')}")
 
 
 def load_scenario(name: Path | str) -> Scenario:

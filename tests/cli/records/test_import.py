@@ -69,6 +69,17 @@ def test_it_writes_record_map_and_page_and_says_what_it_did(call: Call, export: 
     assert load_tag_map(tmp_path / "record.map.yaml").quantities["air_flow"].unit == "L/min"
 
 
+def test_map_and_page_of_before_are_kept(call: Call, export: WriteExport, tmp_path: Path) -> None:
+    export()
+    for name in ("record.map.yaml", "record.quality.html"):
+        (tmp_path / name).write_text("mine")
+    result = call("import", "export.csv", "--out", "record.csv", "--yes")
+    assert result.code == 0 and "record.quality-2.html" in result.out
+    kept = {"record.map.yaml", "record.quality.html"}
+    assert {(tmp_path / name).read_text() for name in kept} == {"mine"}
+    assert files(tmp_path) == {"export.csv", "record.csv", "record.map-2.yaml", "record.quality-2.html", *kept}
+
+
 def test_the_map_that_it_wrote_gives_the_same_record_without_a_question(
     call: Call, export: WriteExport, tmp_path: Path
 ) -> None:

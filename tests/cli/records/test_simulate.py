@@ -11,7 +11,7 @@ import pytest
 
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady.steady_state import steady_state
-from tests.cli.conftest import Call
+from tests.cli.conftest import Call, WriteTable
 from tests.runner.records import PlantRecord
 
 # shared/model/README.md, "Data columns"
@@ -100,3 +100,11 @@ def test_another_cell_gives_another_simulation(
     call("simulate", "truth.csv", "--out", "better.csv", "--cell", cell)
     plain, better = (pd.read_csv(tmp_path / f"{n}.csv")["recovery"].iloc[-1] for n in ("plain", "better"))
     assert better > 1.02 * plain
+
+
+def test_a_cell_given_as_model_is_told_where_it_goes(call: Call, table: WriteTable, tmp_path: Path) -> None:
+    """From Python a model may be named by its cell; in the shell cells have an option of their own."""
+    table()
+    result = call("simulate", "record.csv", "--model", "lab_87l", "--out", "out.csv")
+    assert result.code == 2 and result.err.count("\n") == 1 and "give it by --cell lab_87l" in result.err
+    assert not (tmp_path / "out.csv").exists()

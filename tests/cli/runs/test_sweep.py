@@ -36,7 +36,7 @@ def test_a_study_prints_its_distributions_and_goes_on_from_what_is_there(call: C
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["nowhere.yaml"], ["nowhere.yaml", "shipped: ", "paper_1000"]),
+        (["nowhere.yaml"], ["nowhere.yaml", "; shipped: ", "paper_1000"]),
         (["two.yaml", "--scheduler", "nonsense://x"], ["--scheduler nonsense://x", "leave the option out"]),
         (["two.yaml", "--out", "two.yaml"], ["--out: two.yaml", "is a file", "give another path"]),
     ],

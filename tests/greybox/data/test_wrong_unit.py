@@ -12,6 +12,7 @@ from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import read_dataset
 from adaptive_flot.greybox.data.wrong_unit import check_unit
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.steady.likely_unit import off_by_a_unit
 from tests.discovery.heated import heated_tank
 
 VALUES = {
@@ -86,3 +87,20 @@ def test_where_several_units_would_fit_all_are_named(model: Model) -> None:
         check_unit(wide, np.full(9, 50.0), "file.csv")
     said = str(caught.value)
     assert all(f"in {unit} that would be" in said for unit in ("L/min", "m3/h", "L/s")) and "3 units would fit" in said
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "said"),
+    [("concentrate_grade", 0.01, "1/100"), ("concentrate_flow_m3_s", 1e-3, "1/1000"), ("recovery", 0.01, "1/100")],
+)
+def test_an_output_that_is_far_too_small_gets_a_word(model: Model, column: str, factor: float, said: str) -> None:
+    """A grade of 0.002 is possible, so it is no error: of all that the cell could be it is an unlikely one."""
+    read = read_dataset(record(**{column: factor}), model)
+    (words,) = off_by_a_unit(model, read.inputs, read.outputs)
+    assert column.startswith(words.split(":")[0]) and f"about {said} of the" in words
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.3, 3.0])
+def test_a_plant_that_is_merely_unlike_its_model_gets_none(model: Model, factor: float) -> None:
+    read = read_dataset(record(concentrate_grade=factor, concentrate_flow_m3_s=factor), model)
+    assert off_by_a_unit(model, read.inputs, read.outputs) == ()

@@ -13,6 +13,7 @@ from adaptive_flot.live.link.cycle import Cycle
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.link_keys import LiveTag, Scale
 from adaptive_flot.live.plant.link_text import link_text
+from adaptive_flot.live.program import live
 from adaptive_flot.plugins import DEFAULT_ESTIMATOR
 from adaptive_flot.runner.scenario.keys import Plugin
 from adaptive_flot.runner.scenario.loading import load_scenario
@@ -114,3 +115,26 @@ def test_a_map_that_does_not_do_for_a_link_is_one_line(
     with pytest.raises(AdaptiveFlotError, match=said) as caught:
         write_link(scenario, {"map": str(tmp_path / "plant.map.yaml"), "tags": {}})
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"estimator": "rpm"}, "has no estimator 'rpm'; did you mean 'rpem'?"),
+        ({"controller": "hld"}, "has no controller 'hld'; did you mean 'hold'?"),
+        ({"scenario": "nowhere"}, "scenario: .*nowhere: no such scenario file"),
+    ],
+)
+def test_what_a_link_file_names_wrongly_is_told_with_the_file(
+    write_link: Callable[..., Link], scenario: Scenario, changes: dict[str, str], said: str
+) -> None:
+    with pytest.raises(AdaptiveFlotError, match=rf"link\.yaml: .*{said}"):
+        write_link(scenario, changes)
+
+
+def test_a_database_that_can_not_be_used_is_told_with_the_link_file(
+    write_link: Callable[..., Link], scenario: Scenario
+) -> None:
+    bad = write_link(scenario, {"database": "no database", "controller": "pi"})
+    with pytest.raises(AdaptiveFlotError, match=r"link\.yaml: database: can not be used"):
+        live(bad, cycles=1)

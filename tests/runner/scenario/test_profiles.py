@@ -103,6 +103,8 @@ def test_step_factor_jumps_at_the_start_of_the_ramp() -> None:
 def test_a_change_needs_its_end_after_its_start() -> None:
     with pytest.raises(ValidationError, match="to_s must lie after from_s"):
         Change(change=0.1, from_s=10, to_s=10)
+    with pytest.raises(ValidationError, match=r"20 makes the value 21 times as large; write 0.2 for 20 %"):
+        Change(change=20, from_s=10, to_s=20)
 
 
 def test_a_random_walk_has_the_std_asked_for_after_an_hour_and_rests_before_its_start() -> None:

@@ -123,10 +123,38 @@ def test_what_is_no_scenario_at_all_is_said_so(tmp_path: Path, content: bytes, s
     assert str(file) in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            {"parameters": {"C": {"profile": "factor"}}},
+            "parameters.C: unknown profile 'factor'; did you mean 'factors'?",
+        ),
+        (
+            {"parameters": {"C": {"profile": "factors", "at_s": [0.0], "factors": []}}},
+            "parameters.C.factors: at_s must",
+        ),
+        ({"parameters": {"C": {"chnge": 0.1, "from_s": 1, "to_s": 2}}}, "did you mean 'change'?"),
+        ({"parameters": {"C": 3}}, "parameters.C.ramp: Input should be keys with their values, got 3"),
+        ({"seeds": []}, "seeds: needs at least 1 entry, got []"),
+        ({"duration_s": "x"}, "duration_s: Input should be a valid number, got 'x'"),
+    ],
+)
+def test_no_name_of_a_class_or_a_function_is_told(
+    changes: dict[str, Any], says: str, write_scenario: WriteScenario
+) -> None:
+    """What pydantic calls its steps, and our classes, is nothing that a file holds."""
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write_scenario(changes))
+    said = str(caught.value)
+    assert says in said
+    assert not any(word in said for word in ("function", "Change", "after validation", "instance of", "unable to"))
+
+
 @pytest.mark.parametrize("name", ["paper_scenaro_1", "nowhere/mine.yaml", "nowhere/paper_scenario_1.yaml", "."])
 def test_an_unknown_scenario_names_the_shipped_ones(name: str) -> None:
     """Also where only the last part of a path is that of a shipped one: the file asked for is not there."""
-    with pytest.raises(ScenarioError, match=r"no such scenario file; .*paper_scenario_1"):
+    with pytest.raises(ScenarioError, match=r"file; (did you mean '\w+'\? S|s)hipped: \w+, .*paper_scenario_1"):
         load_scenario(name)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from adaptive_flot.child_processes import heed_signals
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.compiling.compiled import compiled
@@ -77,6 +78,7 @@ class FastCall:
             self._evaluate()
         else:
             self._evaluate_quietly()
+        heed_signals()  # CasADi calls their handlers, and may lose what these raise
         return tuple([result.copy() for result in self._results])
 
     def stats(self) -> dict[str, Any]:

@@ -143,7 +143,8 @@ def _read_summary(file: Path, path: Path) -> pd.DataFrame:
     try:
         return pd.DataFrame([row for summary in summaries for row in run_rows(summary)])
     except (KeyError, TypeError, AttributeError) as error:
-        raise ResultError(f"{path}: not a summary of runs ({error!r}); give what `adaptive-flot run` wrote") from error
+        lacks = f"no {error.args[0]!r} in it" if isinstance(error, KeyError) else "its entries are of another kind"
+        raise ResultError(f"{path}: not a summary of runs ({lacks}); give what `adaptive-flot run` wrote") from error
 
 
 def _read_parts(folder: Path, path: Path) -> pd.DataFrame:

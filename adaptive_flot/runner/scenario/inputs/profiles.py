@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.runner.scenario.inputs.random_streams import Stream, generator
 from adaptive_flot.runner.scenario.inputs.recorded import Recorded
+
+LARGEST_CHANGE = 9.0
+"""A larger share was meant as percent: no physical parameter drifts to more than ten times its value."""
 
 
 class _Profile(BaseModel):
@@ -98,6 +101,11 @@ class Change(_Profile):
     def _order(self) -> Change:
         if self.to_s <= self.from_s:
             raise ValueError("to_s must lie after from_s")
+        if abs(self.change) > LARGEST_CHANGE:
+            raise ValueError(
+                f"change is a share, and {self.change:g} makes the value {1 + self.change:g} times as large; write "
+                f"{self.change / 100:g} for {self.change:g} %, or give 'profile: factors'"
+            )
         return self
 
     def factor(self, time: FloatArray, seed: int = 0, name: str = "") -> FloatArray:
@@ -179,4 +187,18 @@ class FeedWalk(_Profile):
 
 
 InputProfile = Annotated[Constant | Staircase | Random | Steps | Recorded, Field(discriminator="profile")]
-ParameterProfile = Change | Factors | RandomWalk
+
+
+def profile(given: object) -> str:
+    """Kind of a parameter's profile, by which pydantic chooses; one that says none is a ramp."""
+    kind = given.get("profile", "ramp") if isinstance(given, dict) else getattr(given, "profile", "ramp")
+    return str(kind)
+
+
+ParameterProfile = Annotated[
+    Annotated[Change, Tag("ramp")]
+    | Annotated[Change, Tag("step")]
+    | Annotated[Factors, Tag("factors")]
+    | Annotated[RandomWalk, Tag("random_walk")],
+    Discriminator(profile),
+]
