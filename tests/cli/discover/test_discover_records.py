@@ -72,14 +72,28 @@ def test_the_same_record_given_twice_is_refused(
     assert not (tmp_path / "r").exists()
 
 
+def judged_with_holes(call: Call, records: tuple[Path, Path], tmp_path: Path, *kept: slice) -> str:
+    """The page on the new record with some rows lost, in which the draught is named all the same."""
+    new, old = records
+    table = pd.read_csv(new)
+    pd.concat([table[rows] for rows in kept]).to_csv(tmp_path / "holed.csv", index=False)
+    result = call("discover", "holed.csv", "--reference", old, "--model", MODEL, "--out", "r")
+    assert result.code == 0 and result.out.startswith("named: Heat loss is 6"), result.out + result.err
+    return (tmp_path / "r" / "report.html").read_text()
+
+
 def test_a_hole_splits_a_record_and_nothing_is_fitted_across_it(
     call: Call, records: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    """100 rows are lost, the clock goes on: the draught is named all the same, from both stretches."""
-    new, old = records
-    table = pd.read_csv(new)
-    pd.concat([table[:200], table[300:]]).to_csv(tmp_path / "holed.csv", index=False)
-    result = call("discover", "holed.csv", "--reference", old, "--model", MODEL, "--out", "r")
-    assert result.code == 0 and result.out.startswith("named: Heat loss is 65 % larger."), result.out + result.err
-    page = (tmp_path / "r" / "report.html").read_text()
-    assert "holed, stretch 1" in page and "holed, stretch 2" in page
+    """The clock goes on over two holes. No stretch has half of the rows, and each is taken as a record."""
+    page = judged_with_holes(call, records, tmp_path, slice(0, 180), slice(200, 380), slice(420, None))
+    assert "holed, stretch 1" in page and "holed, stretch 3" in page
+
+
+def test_the_longest_stretch_stands_for_a_record_of_which_it_has_half(
+    call: Call, records: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Events in time take one record: a hole of a few rows near its end must not cost them."""
+    page = judged_with_holes(call, records, tmp_path, slice(0, 350), slice(358, None))
+    assert "stretch 1 is used, the longest, with 350 of 492 rows" in page
+    assert "Events in time were not looked for" not in page
