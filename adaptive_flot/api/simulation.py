@@ -120,8 +120,9 @@ class Simulation:
 def simulate(model: AnyModel, inputs: AnyRecord, *, accurate: bool = False) -> Simulation:
     """Simulate a table of inputs: every state, output and signal comes out.
 
-    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs. Each
-    further row holds the inputs during the interval that ends at its time.
+    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
+    the `initial_guess` of a model that does not start steady. Each further row holds the inputs during the interval
+    that ends at its time.
 
     Parameters
     ----------

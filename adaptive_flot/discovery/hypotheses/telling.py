@@ -112,7 +112,7 @@ def _stopped(model: Model, rows: Rows) -> tuple[str, ...]:
 
 
 def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
-    """Constants that the new records want elsewhere, within what the reference leaves open."""
+    """Constants with which the new records are fitted, and which are far from those of the reference."""
     constants, model = calibration.constants, calibration.model
     std = np.sqrt(np.sum(constants.root**2, axis=1))
     label = {p.name: p.label for p in model.parameters}
@@ -123,7 +123,7 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
     ]
     if not moved:
         return ()
-    return (f"The new records want other constants, which the reference leaves open: {', '.join(moved)}.",)
+    return (f"The new records are fitted with other constants than the reference: {', '.join(moved)}.",)
 
 
 def _by_a_factor(calibration: Calibration, model: Model, judged: Judged) -> tuple[str, ...]:

@@ -150,6 +150,8 @@ def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -
         rest = f"is {_factor(size)}"
     if lasting:
         return f"{rest} from {clock(on[0])} s on"
+    if count == 1:  # it may as well have wandered there
+        return f"{rest} from {clock(on[0])} to {clock(on[0] + duration[0])} s"
     times = [
         f"{clock(a)}-{clock(a + d)} s" if d < FOREVER else f"from {clock(a)} s on"
         for a, d in zip(on, duration, strict=True)

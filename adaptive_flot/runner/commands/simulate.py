@@ -27,8 +27,9 @@ def simulate_file(path: Source, model: Model, *, accurate: bool = False) -> pd.D
 def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) -> pd.DataFrame:
     """Every state, output and signal of the model for the inputs (and parameters) of a record.
 
-    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs. Each
-    further row holds inputs and parameters during the interval that ends at its time.
+    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
+    the `initial_guess` of a model that does not start steady. Each further row holds inputs and parameters during the
+    interval that ends at its time.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     _check_parameters(record, model)
     x0 = record.initial_state
     if x0 is None:
-        x0 = steady_state(model, record.inputs[0], p[0], time=float(record.time[0])).state
+        x0 = _assumed_start(record, model, p[0])
     stepper = Stepper(model, record.dt, accurate=accurate)
     run = stepper.simulate(x0, record.inputs[1:], p[1:], record.time[0])
     states = np.vstack([x0, run.states])
@@ -71,6 +72,13 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     for j, q in enumerate(model.states):
         columns.setdefault(q.column, states[:, j])
     return pd.DataFrame(columns)
+
+
+def _assumed_start(record: Dataset, model: Model, parameters: FloatArray) -> FloatArray:
+    """State (nx,) at the first row of a record that does not hold it; `parameters` (np,) are those of that row."""
+    if model.starts_steady:
+        return steady_state(model, record.inputs[0], parameters, time=float(record.time[0])).state
+    return np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])
 
 
 def _check_parameters(record: Dataset, model: Model) -> None:

@@ -42,3 +42,18 @@ def test_a_gradual_change_is_told_with_its_begin_and_end(site: str, size: float,
     effect = Effect(site, "time", "ramp", {"amplitude": 0.0, "onset": 90.0, "duration": 810.0}, {})
     found = Hypothesis(site, "time", "ramp", effect, ("amplitude",), ({},))
     assert words_of(tank(), found, lambda name: size) == said
+
+
+@pytest.mark.parametrize(
+    ("begins", "said"),
+    [
+        ((300.0,), "heat loss is 7 % smaller from 300 to 420 s"),
+        ((300.0, 900.0), "heat loss is 7 % smaller while something is switched: 300-420 s, 900-1020 s"),
+    ],
+)
+def test_one_interval_is_not_said_to_be_switched(begins: tuple[float, ...], said: str) -> None:
+    """A quantity that wanders is lower for a while, too. Several intervals of one size are no wander."""
+    times = {f"on_{k}": a for k, a in enumerate(begins, 1)} | {f"for_{k}": 120.0 for k in range(1, len(begins) + 1)}
+    effect = Effect("heat_loss", "time", "switch", times, {"count": float(len(begins)), "width": 2.0})
+    found = Hypothesis("heat_loss", "time", "switch", effect, ("amplitude",), ())
+    assert words_of(tank(), found, lambda name: float(np.log(0.93))) == said

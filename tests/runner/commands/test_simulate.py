@@ -48,6 +48,16 @@ def test_it_is_the_stepper_from_the_steady_state_of_the_first_row(model: Model, 
     assert grade.iloc[0] == pytest.approx(grade.iloc[1], rel=1e-2) and grade.iloc[-1] != pytest.approx(grade.iloc[0])
 
 
+def test_a_model_that_does_not_start_steady_starts_from_its_first_guess(model: Model, record: Dataset) -> None:
+    """A battery has no steady state; where a guess is missing, it is the scale of the state."""
+    first = model.states[0]
+    guess = {s.name: 1.01 * s.scale for s in model.states[1:]}
+    moving = replace(model, starts_steady=False, initial_guess=guess)
+    table = simulate_record(record, moving)
+    for s in model.states:
+        assert table[s.column].iloc[0] == pytest.approx(first.scale if s is first else guess[s.name])
+
+
 def test_a_steady_record_stays_where_it_is(model: Model, record: Dataset) -> None:
     constant = replace(record, inputs=np.tile(record.inputs[0], (ROWS, 1)), parameters={})
     table = simulate_record(constant, model)
