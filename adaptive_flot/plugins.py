@@ -154,12 +154,27 @@ def construct(factory: Any, address: str, what: str, *arguments: Any, **options:
         if plugin_failure(error) is not None:
             raise  # from inside the constructor of a user
         given = ", ".join(f"{k}={v!r}" for k, v in options.items()) or "no options"
-        raise PluginError(f"{what} {address!r} can not be made with {given}: {error}") from error
+        raise PluginError(
+            f"{what} {address!r} can not be made with {given}: {_wrong_option(factory, options) or error}"
+        ) from error
     for method in METHODS.get(what, ()):
         if not callable(getattr(made, method, None)):
             kind = "None" if made is None else f"a {type(made).__name__}"
             raise PluginError(f"{what} {address!r} is {kind} without a method {method!r}; write it")
     return made
+
+
+def _wrong_option(factory: Any, options: Mapping[str, Any]) -> str:
+    """A word on the first option that a constructor does not take; empty where it takes all, or does not say."""
+    try:
+        taken = inspect.signature(factory).parameters
+    except (TypeError, ValueError):
+        return ""
+    if any(p.kind is p.VAR_KEYWORD for p in taken.values()):
+        return ""
+    wrong = next((name for name in options if name not in taken), None)
+    known = [p.name for p in taken.values() if p.default is not p.empty]
+    return "" if wrong is None else f"no option '{wrong}'; {near_match(wrong, known)}"
 
 
 def plugin_failure(error: BaseException, *, full_path: bool = True) -> PluginError | None:

@@ -208,7 +208,7 @@ def estimate(
     parameters
         Names of the parameters to estimate; default those with the role "estimated".
     outputs
-        Names of the outputs that drive the estimation; default all that are measured.
+        Name, or names, of the outputs that drive the estimation; default all that are measured.
     fit_share
         Part of the record to fit on, from its beginning: a number between 0 and 1.
     innovations
@@ -247,6 +247,7 @@ def estimate(
     made, origin = read_model(model)
     sources = (*record_files(data, tag_map), *origin.files)
     made = replace(made, compiled=compiled)
+    parameters, outputs = ([given] if isinstance(given, str) else given for given in (parameters, outputs))
     chosen = plugins(estimators, shipped_plugin, "estimator")
     if not 0.0 < fit_share < 1.0:
         raise ModelError(f"fit_share = {fit_share:g}; give a number between 0 and 1, as 0.6")

@@ -268,6 +268,8 @@ def discover(
     records: list[AnyRecord] = list(data) if isinstance(data, (list, tuple)) else [data]
     if not records:
         raise DataError("discover: no record; give at least one")
+    if budget is not None and not budget >= 1.0:
+        raise ModelError(f"budget = {budget:g} s; give at least 1, or None for as long as it takes")
     name, workers = ", ".join(record_name(r) for r in records), processes or available_processes()
     several = len(records) > 1 or bool(references)
     if several and limits:

@@ -105,7 +105,7 @@ def test_a_class_that_no_file_holds_runs(short: Scenario) -> None:
         ({"estimators": [3]}, PluginError, "3 is a int; give a name, a class"),
         ({"estimators": ["rpem", "rpem"]}, PluginError, "'rpem' is given twice"),
         ({"estimators": [("rpem", 3)]}, PluginError, "options 3 are no mapping"),
-        ({"estimators": [(Rpem, {"forgeting": 1})]}, PluginError, "can not be made with forgeting=1"),
+        ({"estimators": [(Rpem, {"forgeting": 1})]}, PluginError, "no option 'forgeting'; did you mean 'forgetting'?"),
         ({"controllers": "schedul"}, ScenarioError, "did you mean 'schedule'"),
         ({"seeds": 5}, ScenarioError, "seeds: 5; give a list"),
         ({"seeds": [1.5]}, ScenarioError, "1.5 is no whole number"),

@@ -12,6 +12,8 @@ from adaptive_flot.greybox.model import FloatArray
 
 FIRST_LINE = 2
 """Line of a CSV file that holds row 0: messages count lines as an editor does."""
+TIME, OR_IMPORT = "time_s", ", or make a record of it with `adaptive-flot import`, which reads time stamps"
+"""The column of times, and what to do where it holds dates."""
 LARGEST = 1e30
 """Largest number that counts as measured; a logger writes 3.4e38 where it has none."""
 LONGEST_SHOWN = 60
@@ -61,7 +63,9 @@ def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatA
     bad = np.flatnonzero((values.isna() & raw.notna()).to_numpy())
     if bad.size:
         where = f"{file}: column {column!r}, line {line(table, int(bad[0]))}"
-        raise DataError(f"{where}: {shown(raw.iloc[bad[0]])} is not a number; correct it")
+        raise DataError(
+            f"{where}: {shown(raw.iloc[bad[0]])} is not a number; correct it{OR_IMPORT if column == TIME else ''}"
+        )
     found = np.asarray(values, dtype=float)
     large = np.flatnonzero(np.abs(found) > LARGEST)
     if large.size:

@@ -23,7 +23,15 @@ Source: TypeAlias = Path | str | pd.DataFrame
 
 
 def named(source: Source) -> Path:
-    """What messages call a table: its file, or `DataFrame` for a table at hand."""
+    """What messages call a table: its file, or `DataFrame` for a table at hand.
+
+    Raises
+    ------
+    DataError
+        It is neither.
+    """
+    if not isinstance(source, (pd.DataFrame, str, Path)):
+        raise DataError(f"a record is a file or a table, and not {type(source).__name__}; give a path or a DataFrame")
     return Path("DataFrame") if isinstance(source, pd.DataFrame) else Path(source)
 
 
@@ -49,7 +57,9 @@ def read_table(source: Source) -> pd.DataFrame:
     except OSError as error:
         raise DataError(_unreadable(file, error)) from error
     if file.suffix.lower() in SPREADSHEETS:
-        raise DataError(f"{file}: a spreadsheet; save its sheet as CSV and give that")
+        raise DataError(
+            f"{file}: a spreadsheet; make a record of it with `adaptive-flot import`, or save its sheet as CSV"
+        )
     return _with_rows(_read(file), file)
 
 
@@ -77,6 +87,9 @@ def _read(file: Path) -> pd.DataFrame:
         raise DataError(f"{file}: a row is longer than the header (a decimal comma?); correct it") from error
     except PermissionError as error:
         raise DataError(_unreadable(file, error)) from error
+    except UnicodeDecodeError as error:
+        why = "not a text in UTF-8: another encoding, or a spreadsheet under another name"
+        raise DataError(f"{file}: {why}; make a record of it with `adaptive-flot import`") from error
     except Exception as error:  # damaged bytes: each of the unpackers and parsers has errors of its own
         said = next(iter(str(error).splitlines()), type(error).__name__)
         raise DataError(f"{file}: not a readable table ({said}); give CSV or Parquet") from error
