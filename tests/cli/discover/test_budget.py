@@ -15,7 +15,9 @@ from tests.discovery.hypotheses.tank import record, tank
 def test_a_budget_bounds_several_records_too(call: Call, tmp_path: Path) -> None:
     """A budget of no time at all names nothing; the command line takes one for several records, as for one."""
     write_tank(tmp_path)
-    result = call("discover", "tank.csv", "tank.csv", "--model", "heated:make_model", "--budget", "1", "--no-report")
+    lines = (tmp_path / "tank.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "again.csv").write_text("".join(lines[:-1]))  # the same record twice would be refused
+    result = call("discover", "tank.csv", "again.csv", "--model", "heated:make_model", "--budget", "1", "--no-report")
     assert result.code == 0 and result.err == ""
     spent = find_changes(tank(), [record("a", 1), record("b", 2)], budget=1e-6).verdict
     assert spent.word == "abstain" and "the budget ended before all" in spent.reason
