@@ -89,7 +89,7 @@ def _read(file: Path) -> pd.DataFrame:
         raise DataError(_unreadable(file, error)) from error
     except UnicodeDecodeError as error:
         why = "not a text in UTF-8: another encoding, or a spreadsheet under another name"
-        raise DataError(f"{file}: {why}; make a record of it with `adaptive-flot import`") from error
+        raise DataError(f"{file}: {why}; give CSV or Parquet, or let `adaptive-flot import` read it") from error
     except Exception as error:  # damaged bytes: each of the unpackers and parsers has errors of its own
         said = next(iter(str(error).splitlines()), type(error).__name__)
         raise DataError(f"{file}: not a readable table ({said}); give CSV or Parquet") from error
