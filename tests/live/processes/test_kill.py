@@ -112,7 +112,7 @@ def test_a_hung_plant_and_a_killed_link(
         ({"tags.concentrate_grade": ...}, "'concentrate_grade' has no tag"),
         ({"writes.air_flow.high": 1.0}, "are wider than the scenario's limits"),
         ({"writes.air_flow": ...}, "writes: give one for each of air_flow, level_setpoint"),
-        ({"controller": "mpc"}, "name one of each"),
+        ({"controller": "mpc"}, "has no controller 'mpc'; known: hold, pi"),
         ({"server.security": "None"}, "server.security"),
         ({"highest_mode": "auto"}, "highest_mode"),
         ({"cycle.shed_aftr": 3}, "unknown key 'cycle.shed_aftr'; did you mean 'shed_after'?"),
