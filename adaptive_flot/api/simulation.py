@@ -121,8 +121,8 @@ def simulate(model: AnyModel, inputs: AnyRecord, *, accurate: bool = False) -> S
     """Simulate a table of inputs: every state, output and signal comes out.
 
     Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
-    the `initial_guess` of a model that does not start steady. Each further row holds the inputs during the interval
-    that ends at its time.
+    the `initial_guess` of a model that has none and does not start steady. Each further row holds the inputs during the
+    interval that ends at its time.
 
     Parameters
     ----------

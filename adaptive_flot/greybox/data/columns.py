@@ -12,8 +12,10 @@ from adaptive_flot.greybox.model import FloatArray
 
 FIRST_LINE = 2
 """Line of a CSV file that holds row 0: messages count lines as an editor does."""
-TIME, OR_IMPORT = "time_s", ", or make a record of it with `adaptive-flot import`, which reads time stamps"
-"""The column of times, and what to do where it holds dates."""
+TIME_COLUMN = "time_s"
+"""The column of times."""
+OR_IMPORT = ", or make a record of it with `adaptive-flot import`, which reads time stamps"
+"""What to do where it holds dates."""
 LARGEST = 1e30
 """Largest number that counts as measured; a logger writes 3.4e38 where it has none."""
 LONGEST_SHOWN = 60
@@ -64,7 +66,7 @@ def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatA
     if bad.size:
         where = f"{file}: column {column!r}, line {line(table, int(bad[0]))}"
         raise DataError(
-            f"{where}: {shown(raw.iloc[bad[0]])} is not a number; correct it{OR_IMPORT if column == TIME else ''}"
+            f"{where}: {shown(raw.iloc[bad[0]])} is not a number; correct it{OR_IMPORT if column == TIME_COLUMN else ''}"
         )
     found = np.asarray(values, dtype=float)
     large = np.flatnonzero(np.abs(found) > LARGEST)

@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
+from adaptive_flot.greybox.data.columns import TIME_COLUMN as TIME_COLUMN
 from adaptive_flot.greybox.data.columns import line, numeric_column, time_column
 from adaptive_flot.greybox.data.stretches import longest_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.data.wrong_unit import check_unit
 from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
-TIME_COLUMN = "time_s"
 UNIFORMITY = 1e-3
 """Largest difference between two sampling intervals, as a share of the interval, that still counts as uniform."""
 MOST_STEPS = 5_000_000

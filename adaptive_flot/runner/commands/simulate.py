@@ -28,8 +28,8 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     """Every state, output and signal of the model for the inputs (and parameters) of a record.
 
     Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
-    the `initial_guess` of a model that does not start steady. Each further row holds inputs and parameters during the
-    interval that ends at its time.
+    the `initial_guess` of a model that has none and does not start steady. Each further row holds inputs and parameters
+    during the interval that ends at its time.
 
     Parameters
     ----------
@@ -76,9 +76,12 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
 
 def _assumed_start(record: Dataset, model: Model, parameters: FloatArray) -> FloatArray:
     """State (nx,) at the first row of a record that does not hold it; `parameters` (np,) are those of that row."""
-    if model.starts_steady:
+    try:
         return steady_state(model, record.inputs[0], parameters, time=float(record.time[0])).state
-    return np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])
+    except RangeError:
+        if model.starts_steady:
+            raise
+        return np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])  # a battery never rests
 
 
 def _check_parameters(record: Dataset, model: Model) -> None:

@@ -11,7 +11,7 @@ import pytest
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.tables import write_table
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.runner.commands.simulate import simulate_file, simulate_record
@@ -48,14 +48,42 @@ def test_it_is_the_stepper_from_the_steady_state_of_the_first_row(model: Model, 
     assert grade.iloc[0] == pytest.approx(grade.iloc[1], rel=1e-2) and grade.iloc[-1] != pytest.approx(grade.iloc[0])
 
 
-def test_a_model_that_does_not_start_steady_starts_from_its_first_guess(model: Model, record: Dataset) -> None:
-    """A battery has no steady state; where a guess is missing, it is the scale of the state."""
-    first = model.states[0]
-    guess = {s.name: 1.01 * s.scale for s in model.states[1:]}
-    moving = replace(model, starts_steady=False, initial_guess=guess)
-    table = simulate_record(record, moving)
-    for s in model.states:
-        assert table[s.column].iloc[0] == pytest.approx(first.scale if s is first else guess[s.name])
+def store(starts_steady: bool) -> Model:
+    """What comes in stays: it has no steady state while anything does."""
+
+    def equations(m: Scope) -> None:
+        charge = m.state("charge")
+        m.derivative("charge", m.input("current"))
+        m.derivative("lost", m.input("current"))
+        m.output("shown", charge)
+
+    return Model(
+        name="store",
+        states=(Quantity("charge", "A s", "", 0.0, 1e3, scale=5.0), Quantity("lost", "A s", "", 0.0, 1e3, scale=3.0)),
+        inputs=(Quantity("current", "A", "", 0.0, 10.0),),
+        parameters=(),
+        outputs=(Quantity("shown", "A s", "", 0.0, 1e3),),
+        equations=equations,
+        starts_steady=starts_steady,
+        initial_guess={"charge": 20.0},
+    )
+
+
+def test_a_model_without_a_steady_state_starts_from_its_first_guess() -> None:
+    """Where a guess is missing, it is the scale of the state. One that is said to start steady is refused."""
+    record = Dataset("r", np.arange(4.0), 1.0, np.ones((4, 1)), np.full((4, 1), np.nan))
+    table = simulate_record(record, store(False))
+    np.testing.assert_allclose(table["charge_A_s"], [20.0, 21.0, 22.0, 23.0])
+    np.testing.assert_allclose(table["lost_A_s"], [3.0, 4.0, 5.0, 6.0])
+    with pytest.raises(RangeError, match="no steady state"):
+        simulate_record(record, store(True))
+
+
+def test_a_model_that_has_a_steady_state_starts_there_though_its_records_need_not(
+    model: Model, record: Dataset
+) -> None:
+    moving = replace(model, starts_steady=False)
+    np.testing.assert_array_equal(simulate_record(record, moving), simulate_record(record, model))
 
 
 def test_a_steady_record_stays_where_it_is(model: Model, record: Dataset) -> None:
