@@ -65,9 +65,8 @@ def numeric_column(table: pd.DataFrame, column: str, file: Path | str) -> FloatA
     bad = np.flatnonzero((values.isna() & raw.notna()).to_numpy())
     if bad.size:
         where = f"{file}: column {column!r}, line {line(table, int(bad[0]))}"
-        raise DataError(
-            f"{where}: {shown(raw.iloc[bad[0]])} is not a number; correct it{OR_IMPORT if column == TIME_COLUMN else ''}"
-        )
+        more = OR_IMPORT if column == TIME_COLUMN else ""
+        raise DataError(f"{where}: {shown(raw.iloc[bad[0]])} is not a number; correct it{more}")
     found = np.asarray(values, dtype=float)
     large = np.flatnonzero(np.abs(found) > LARGEST)
     if large.size:
