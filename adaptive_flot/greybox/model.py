@@ -23,6 +23,7 @@ from functools import cached_property
 from typing import Any, TypeVar, TypeVarTuple
 
 import casadi as ca
+import numpy as np
 
 from adaptive_flot.described import Described
 from adaptive_flot.errors import ModelError, near_match
@@ -207,6 +208,11 @@ class Model(Checks, Described):
         return tuple(
             replace(e, coefficients={c.name: values[e.parameter(c.name)] for c in e.terms}) for e in self.effects
         )
+
+    @property
+    def first_guess(self) -> FloatArray:
+        """State (nx,) of `initial_guess`; the scale of a state where that has none."""
+        return np.array([self.initial_guess.get(q.name, q.scale) for q in self.states])
 
     @property
     def dae(self) -> ca.Function:

@@ -89,7 +89,7 @@ class Unknowns:
             return self._settled_filters(dict(zip(like.model.names("states"), like.initial_state, strict=True)))
         if record.initial_state is not None and n == len(record.initial_state):
             return record.initial_state
-        guess = np.array([self.model.initial_guess.get(s.name, s.scale) for s in self.model.states])
+        guess = self.model.first_guess
         if not self.model.starts_steady:
             return guess
         try:

@@ -53,8 +53,7 @@ class SteadyStates:
         time
             Time [s] at which a model that depends on time is taken.
         """
-        usual = [self.model.initial_guess.get(q.name, q.scale) for q in self.model.states]
-        start = np.array(usual) if guess is None else guess
+        start = self.model.first_guess if guess is None else guess
         scaled = np.broadcast_to(start, (len(inputs), len(self._scale))) / self._scale
         moving = np.ones(len(inputs), dtype=bool)
         for _ in range(MOST_STEPS):

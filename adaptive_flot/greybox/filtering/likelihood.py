@@ -167,7 +167,7 @@ def maximise(
 def first_state(model: Model, record: Dataset, noise: NoiseModel, p: FloatArray) -> tuple[FloatArray, FloatArray]:
     """z0 and P0 before the first row: the record's own state or the model's first guess, known to one scale."""
     scale = np.array([s.scale for s in model.states])
-    guess = np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])
+    guess = model.first_guess
     x = guess
     if record.initial_state is not None:  # states of an effect that came later start from their guess
         x = np.concatenate([record.initial_state, guess[len(record.initial_state) :]])

@@ -67,7 +67,7 @@ def steady_state(
     p = model.parameter_values if parameters is None else np.asarray(parameters, dtype=float)
     u = np.asarray(inputs, dtype=float)
     scale = np.array([q.scale for q in model.states])
-    start = guess if guess is not None else np.array([model.initial_guess.get(q.name, q.scale) for q in model.states])
+    start = guess if guess is not None else model.first_guess
     rate = FastCall(model.ode)
     slope = _jacobian(model, "x")
 

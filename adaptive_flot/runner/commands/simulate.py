@@ -81,7 +81,7 @@ def _assumed_start(record: Dataset, model: Model, parameters: FloatArray) -> Flo
     except RangeError:
         if model.starts_steady:
             raise
-        return np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])  # a battery never rests
+        return model.first_guess  # a battery never rests
 
 
 def _check_parameters(record: Dataset, model: Model) -> None:

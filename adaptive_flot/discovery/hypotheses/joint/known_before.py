@@ -141,7 +141,7 @@ def first_states(model: Model, records: Sequence[Dataset]) -> tuple[FloatArray, 
     """Where each record starts, as a first guess: its own states, the steady state, or the model's first guess."""
     states = []
     for record in records:
-        guess = np.array([model.initial_guess.get(s.name, s.scale) for s in model.states])
+        guess = model.first_guess
         if record.initial_state is not None and len(record.initial_state) == len(model.states):
             guess = record.initial_state
         elif model.starts_steady:
