@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError
+from adaptive_flot.greybox.data.columns import STRETCH
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN
-from adaptive_flot.greybox.data.stretches import STRETCH
 from adaptive_flot.greybox.data.tables import Source, read_table
 from adaptive_flot.greybox.model import Model, Quantity
 from adaptive_flot.records.clean import Cleaned, clean, constant

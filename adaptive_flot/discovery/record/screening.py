@@ -28,6 +28,8 @@ LEAST_OF_SCALE = 0.1
 """The same for a temperature, as a share of its scale: shares of its value depend on the unit."""
 OUTLIER_SHARE = 0.15
 """Share of samples far outside from which a signal is an outlier storm."""
+MOST_UNRECORDED = 3
+"""More holes than these are how the record is, and say nothing of one place."""
 NEIGHBOURS = 9
 QUARTER = 0.3186
 """Quantile 0.25 of the size of a standard normal variable."""
@@ -117,7 +119,21 @@ def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ..
         for a, b in runs_of(stopped, FROZEN_ROWS) if stopped.mean() < MOST_FROZEN else ():
             suspects.append(Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} stands still"))
             notes.append(f"{suspects[-1]}, where it else changes from row to row: a sensor that had stopped?")
+    suspects += _unrecorded(record)
     return replace(record, outputs=outputs), tuple(notes), tuple(suspects)
+
+
+def _unrecorded(record: Dataset) -> list[Suspect]:
+    """Where a record that else has a measurement in every row has none for a few; nothing where that happens often."""
+    empty = np.asarray(~np.isfinite(record.outputs).any(axis=1))
+    found = runs_of(empty, 1)
+    if len(found) > MOST_UNRECORDED or empty.mean() > OUTLIER_SHARE:
+        return []
+    return [
+        Suspect(float(record.time[a]), float(record.time[b - 1]), "no row was recorded")
+        for a, b in found
+        if b - a < FROZEN_ROWS
+    ]
 
 
 def out_of_range(quantity: Quantity, values: FloatArray) -> list[str]:

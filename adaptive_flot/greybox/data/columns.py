@@ -14,6 +14,10 @@ FIRST_LINE = 2
 """Line of a CSV file that holds row 0: messages count lines as an editor does."""
 TIME_COLUMN = "time_s"
 """The column of times."""
+STRETCH = "stretch"
+"""Column that numbers the stretches of a record; a table without it is split where its time jumps."""
+UNIFORMITY = 1e-3
+"""Largest difference between two sampling intervals, as a share of the usual one, that still counts as uniform."""
 OR_IMPORT = ", or make a record of it with `adaptive-flot import`, which reads time stamps"
 """What to do where it holds dates."""
 LARGEST = 1e30

@@ -14,14 +14,13 @@ import pandas as pd
 
 from adaptive_flot.errors import DataError, near_match
 from adaptive_flot.greybox.data.columns import TIME_COLUMN as TIME_COLUMN
-from adaptive_flot.greybox.data.columns import line, numeric_column, time_column
+from adaptive_flot.greybox.data.columns import UNIFORMITY, line, numeric_column, time_column
+from adaptive_flot.greybox.data.lost_rows import with_lost_rows
 from adaptive_flot.greybox.data.stretches import longest_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.data.wrong_unit import check_unit
 from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
-UNIFORMITY = 1e-3
-"""Largest difference between two sampling intervals, as a share of the interval, that still counts as uniform."""
 MOST_STEPS = 5_000_000
 """Most integration steps of one run over a record: some minutes on one core for a flotation cell."""
 
@@ -85,7 +84,8 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     Parameters
     ----------
     path
-        CSV or Parquet file, or a table with these columns; of one in stretches the longest is read, with a note.
+        CSV or Parquet file, or a table with these columns; of one in stretches the longest is read, with a note, and
+        a few lost rows are put back without measurements.
     model
         Names, units and ranges. Inputs are needed; outputs and parameters are used where present. Its longest step
         bounds how long the record may be.
@@ -101,7 +101,8 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
         An input outside the model's physical range, or a column in another unit than its name says (`check_unit`).
     """
     file = named(path)
-    table, notes = longest_stretch(read_table(path), TIME_COLUMN, file)
+    table, lost = with_lost_rows(read_table(path), TIME_COLUMN, file, {q.column for q in model.outputs})
+    table, others = longest_stretch(table, TIME_COLUMN, file)
     columns = [str(c) for c in table.columns]
     taken = {TIME_COLUMN, *(q.column for q in (*model.inputs, *model.outputs, *model.states))}
     time = time_column(table, _find(columns, "time", TIME_COLUMN, "s", file, taken), file)
@@ -129,7 +130,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
             empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
             raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
     first = _first_state(table, columns, model, file)
-    return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, notes)
+    return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, (*lost, *others))
 
 
 def check_record(record: Dataset, model: Model, table: pd.DataFrame, file: Path) -> Dataset:

@@ -8,24 +8,19 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import DataError
-from adaptive_flot.greybox.data.columns import line, numeric_column, time_column
+from adaptive_flot.greybox.data.columns import STRETCH, UNIFORMITY, line, numeric_column, time_column
+from adaptive_flot.greybox.data.lost_rows import MOST_TOLD
 from adaptive_flot.greybox.data.repeated import repeated_rows
 from adaptive_flot.greybox.model import FloatArray
 
-STRETCH = "stretch"
-"""Column that numbers the stretches; a table without it is split where its time jumps."""
 HOLE = 1.5
 """A step of the time that is longer than so many median ones is a hole."""
-UNIFORMITY = 1e-3
-"""Other steps differ by no more than this share of the median one."""
 FEWEST_ROWS = 60
 """Rows of the shortest stretch between holes of the time that is worth a run."""
 FEWEST_AFTER_JUMP = 10
 """Rows after a jump back of the clock: fewer are stamps that are wrong, and no jump."""
 MOST_REPEATED = 0.5
 """Share of the rows beyond which repetition is how the record is."""
-MOST_TOLD = 3
-"""Places that a note names."""
 
 
 LONGEST_IS_USED = "is used, the longest"

@@ -10,6 +10,7 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
+from adaptive_flot.greybox.data.lost_rows import with_lost_rows
 from adaptive_flot.greybox.data.stretches import every_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
 from adaptive_flot.greybox.model import Model
@@ -104,13 +105,15 @@ def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None, alone:
     if isinstance(source, Dataset):
         return [source]
     if tag_map is None or is_record(source, model):
-        parts = every_stretch(read_table(source), TIME_COLUMN, named(source))
+        empty = {q.column for q in model.outputs}
+        table, lost = with_lost_rows(read_table(source), TIME_COLUMN, named(source), empty)
+        parts = every_stretch(table, TIME_COLUMN, named(source))
         most = max(map(len, parts)) >= MOST_ROWS * sum(map(len, parts))
         if len(parts) > 1 and not (alone and most):
             stem = named(source).stem
             read = [read_measurements(part, model).record for part in parts]
             parted = f"{stem} has {len(parts)} stretches with gaps between them, and each is taken as a record"
-            notes = [(parted, *r.notes) if r is read[0] else r.notes for r in read]
+            notes = [(*lost, parted, *r.notes) if r is read[0] else r.notes for r in read]
             return [
                 replace(r, name=f"{stem}, stretch {k}", notes=said)
                 for k, (r, said) in enumerate(zip(read, notes, strict=True), start=1)

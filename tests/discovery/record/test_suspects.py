@@ -49,6 +49,16 @@ def test_what_is_frozen_missing_or_stands_still_becomes_a_suspect_part() -> None
     assert np.isnan(cleaned.outputs[101:160, 0]).all() and any("had stopped?" in n for n in notes)
 
 
+def test_a_few_rows_that_were_lost_are_a_suspect_part_and_many_are_not() -> None:
+    """What begins just there may be the logger."""
+    record = tank_record(Truth(exponent=0.0), 600)
+    few, many = record.outputs.copy(), record.outputs.copy()
+    few[200:202], many[::20] = np.nan, np.nan
+    (there,) = clean_outputs(replace(record, outputs=few), heated_tank())[2]
+    assert str(there) == f"no row was recorded from {record.time[200]:g} to {record.time[201]:g} s"
+    assert clean_outputs(replace(record, outputs=many), heated_tank())[2] == ()
+
+
 def test_an_input_that_is_moved_in_long_steps_has_not_stopped() -> None:
     """Nearly every row lies in a long run: the steps between the runs are no signal that changes from row to row."""
     record = tank_record(Truth(exponent=0.0), 600)
