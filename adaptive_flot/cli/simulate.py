@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from adaptive_flot.cli.options import CellOption, Compile, ModelOption, can_compile, command_line
-from adaptive_flot.errors import DataError, ModelError
+from adaptive_flot.errors import DataError, ModelError, OutputError
 from adaptive_flot.targets import check_targets, model_inputs
 
 
@@ -73,6 +73,8 @@ def _simulate_draws(
 
     check_targets([inputs, *ranges_files(ranges)], [("--out", out), ("--report", report), ("--json", json)])
     check_table_path(out)
+    if report is not None and report.suffix.lower() not in (".html", ".htm"):
+        raise OutputError(f"{report}: the page is written as .html; give such a name")
     read = read_ranges(ranges)
     blocks_of(draws, len(read.constants))
     record = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 import secrets
 import socket
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ TOKENS = ("view", "act")
 """Tokens of the page: for viewing, and for acting."""
 VALID_DAYS = 365
 PRIVATE = 0o600
+LABEL = re.compile(r"[A-Za-z0-9_]([A-Za-z0-9_-]{0,61}[A-Za-z0-9])?")
+"""A label of the name of a host."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +108,14 @@ def make_certificates(folder: Path, hosts: tuple[str, ...] = ("localhost", "127.
 
     Raises
     ------
+    LinkError
+        A host is neither an address nor a name.
     OutputError
         One of the files is there already, or the folder can not be written.
     """
+    wrong = [host for host in hosts if not _is_host(host)]
+    if wrong:
+        raise LinkError(f"{wrong[0]!r} is no name or address of a host; give one such as plant.example or 10.0.0.5")
     files = [*(f for name in USES for f in (folder / f"{name}.der", folder / f"{name}.pem"))]
     secret = [*(password_file(folder, user) for user in USERS), *(token_file(folder, name) for name in TOKENS)]
     files += secret
@@ -141,6 +149,15 @@ def _host(host: str) -> x509.GeneralName:
         return x509.IPAddress(ipaddress.ip_address(host))
     except ValueError:
         return x509.DNSName(host)
+
+
+def _is_host(host: str) -> bool:
+    """Whether a text is an address, or a name as RFC 1123 writes it."""
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return len(host) <= 253 and all(LABEL.fullmatch(label) for label in host.split("."))
+    return True
 
 
 def _write(file: Path, content: bytes, mode: int) -> None:

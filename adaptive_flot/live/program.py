@@ -112,6 +112,7 @@ class Speaker:
         self._estimating = False
         self._stage: Stage | None = None
         self._page = ""
+        self._unreachable = ""
 
     def __call__(self, progress: Progress) -> None:
         """Look at a cycle."""
@@ -135,6 +136,9 @@ class Speaker:
         if page != self._page:
             self._page = page
             self._say(f"{outcome.number}: {page or 'the page runs again'}")
+        if progress.unreachable != self._unreachable:
+            self._unreachable = progress.unreachable
+            self._say(f"{outcome.number}: {progress.unreachable or 'connected to the plant'}")
         if outcome.faults != self._faults:
             self._faults = outcome.faults
             self._say(f"{outcome.number}: {'; '.join(outcome.faults) or 'all is well again'}")

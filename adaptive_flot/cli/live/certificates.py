@@ -18,4 +18,4 @@ def certificates(
     from adaptive_flot.live.certificates import make_certificates
 
     files = make_certificates(out, tuple(host or ("localhost", "127.0.0.1")))
-    typer.echo(f"{len(files)} files: {out}. Keep *.pem and *.password to yourself.")
+    typer.echo(f"{len(files)} files: {out}. Keep *.pem, *.password and *.token to yourself.")

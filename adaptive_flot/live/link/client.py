@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import socket
 from collections.abc import Awaitable, Mapping
 from typing import Any, TypeVar
 
@@ -27,6 +28,19 @@ LOST = (OSError, asyncio.TimeoutError, ua.UaError, ConnectionError)
 """What a broken or hung connection raises."""
 SAME = 1e-9
 """Relative difference up to which a value that is read back is the one that was written."""
+
+
+def no_connection(url: str, error: Exception) -> str:
+    """Why there is no connection to a server, and what to do about it, in words."""
+    if isinstance(error, ConnectionRefusedError) or "Connect call failed" in str(error):  # of one address, of several
+        why = "nothing listens there"
+    elif isinstance(error, TimeoutError):
+        why = "it does not answer"
+    elif isinstance(error, socket.gaierror):
+        why = "no such host"
+    else:
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return f"no connection to {url}: {why}; start the plant's server, or correct server.url in the link file"
 
 
 class PlantClient:

@@ -76,6 +76,8 @@ class Progress:
         See `Desk`.
     extended
         The model in use is longer than the scenario's.
+    unreachable
+        Why the last attempt to connect failed, in words; empty where there is a connection, or none was tried.
     """
 
     snapshot: Snapshot
@@ -91,3 +93,4 @@ class Progress:
     shadows: Mapping[str, ShadowView] = field(default_factory=dict)
     answered: tuple[Answered, ...] = ()
     extended: bool = False
+    unreachable: str = ""

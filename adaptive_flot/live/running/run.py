@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from adaptive_flot.errors import LinkError
-from adaptive_flot.live.link.client import LOST, PlantClient
+from adaptive_flot.live.link.client import LOST, PlantClient, no_connection
 from adaptive_flot.live.link.cycle import CycleState
 from adaptive_flot.live.link.discovery import LiveDiscovery
 from adaptive_flot.live.link_file import Link
@@ -85,6 +85,7 @@ class LinkRun:
         self._client: PlantClient | None = None
         self._connecting: asyncio.Task[PlantClient] | None = None
         self._silent = 0
+        self._unreachable = ""
 
     async def run(self, stop: asyncio.Event, cycles: int | None = None) -> None:
         """Cycle until `stop` is set, or so many times; then give control back.
@@ -147,7 +148,7 @@ class LinkRun:
         answered: tuple[Answered, ...],
     ) -> Progress:
         state, desk = self.state, self.desk
-        beside = desk.alarms, desk.card, desk.shadows(), answered, self.use.extended
+        beside = desk.alarms, desk.card, desk.shadows(), answered, self.use.extended, self._unreachable
         return Progress(
             snapshot, outcome, seconds, found, connected, state.modes, state.histories, self.use.cycle.model, *beside
         )
@@ -214,10 +215,12 @@ class LinkRun:
             client = PlantClient(self.link, min(self.link.file.server.timeout_s, max(self._interval, LEAST_PATIENCE_S)))
             try:
                 await client.connect()
+                self._unreachable = ""
                 return client
             except LinkError:
                 raise
-            except LOST:
+            except LOST as error:
+                self._unreachable = no_connection(self.link.file.server.url, error)
                 await asyncio.sleep(RETRY_S)
 
     async def _leave(self) -> None:

@@ -92,6 +92,10 @@ def test_wrong_ranges_are_one_line(call: Call, inputs: Path, tmp_path: Path, nam
         (["record.csv", "--cell", "ranges.yaml", "--draws", "40", "--accurate"], "--accurate"),
         (["record.csv", "--cell", "ranges.yaml", "--draws", "40", "--model", "cascaded-tanks"], "--model"),
         (["record.csv", "--report", "page.html"], "--report needs --draws"),
+        (
+            ["record.csv", "--cell", "ranges.yaml", "--draws", "40", "--report", "r.txt"],
+            "r.txt: the page is written as",
+        ),
         (["record.csv", "--json", "summary.json"], "--json needs --draws"),
         ([], "no table of inputs"),
         (["nowhere.csv", "--cell", "ranges.yaml", "--draws", "40"], "nowhere.csv"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,3 +69,13 @@ def test_a_page_whose_thread_raises_says_what(paged: Link, monkeypatch: pytest.M
     with served(paged) as (server, _):
         wait_for(lambda: "OSError" in server.problem)
         assert "Too many open files" in server.problem and "the link goes on" in server.problem
+
+
+def test_why_there_is_no_connection_is_said_once_and_when_there_is_one_again(paged: Link) -> None:
+    """The reason may change: nothing listens at first, then the server refuses the user."""
+    said: list[str] = []
+    speaker, progress = Speaker(said.append), DeskBench(paged).interval()
+    for why in ("", "no connection: a", "no connection: a", "no connection: b", "", ""):
+        speaker(replace(progress, unreachable=why))
+    about = [line.partition(": ")[2] for line in said if "connect" in line]
+    assert about == ["no connection: a", "no connection: b", "connected to the plant"]

@@ -19,7 +19,7 @@ from asyncua.crypto import security_policies
 
 from adaptive_flot.errors import LinkError, OutputError
 from adaptive_flot.live.certificates import identity, make_certificates, password_file, read_password
-from adaptive_flot.live.link.client import LOST
+from adaptive_flot.live.link.client import LOST, no_connection
 from adaptive_flot.live.link_file import Link
 from adaptive_flot.live.plant.process import TestPlant
 from adaptive_flot.live.plant.server import PlantServer, ServerPlace
@@ -319,6 +319,25 @@ def test_certificates_are_private_and_never_overwritten(tmp_path: Path) -> None:
     assert len(secret) == 5 and all(f.stat().st_mode & 0o777 == 0o600 for f in secret)
     with pytest.raises(OutputError, match="is there already"):
         make_certificates(tmp_path / "c")
+
+
+@pytest.mark.parametrize("host", ["bad host!!", "", "plant..example", "-plant", "10.0.0.5/24"])
+def test_what_is_no_host_is_refused_before_a_file_is_written(tmp_path: Path, host: str) -> None:
+    """A certificate for it would be good for nothing."""
+    with pytest.raises(LinkError, match="no name or address of a host"):
+        make_certificates(tmp_path / "c", (host,))
+    assert not (tmp_path / "c").exists()
+
+
+def test_why_there_is_no_connection_is_told() -> None:
+    """The address in the link file may be wrong, or the server is not up: both are told from a server that is slow."""
+    url = "opc.tcp://127.0.0.1:4840/plant"
+    several = OSError("Multiple exceptions: [Errno 111] Connect call failed ('::1', 4840, 0, 0), [Errno 111] ...")
+    for error in (ConnectionRefusedError(111, "Connect call failed ('127.0.0.1', 4840)"), several):
+        assert no_connection(url, error).startswith(f"no connection to {url}: nothing listens there; start the plant")
+    assert "does not answer" in no_connection(url, TimeoutError())
+    assert "no such host" in no_connection(url, socket.gaierror(-2, "Name or service not known"))
+    assert ": BadIdentityTokenRejected;" in no_connection(url, ValueError("BadIdentityTokenRejected\nmore"))
 
 
 def test_a_plant_without_its_key_says_so(scenario: Scenario, certificates: Path, tmp_path: Path) -> None:
