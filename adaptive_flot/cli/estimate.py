@@ -50,8 +50,10 @@ def estimate(
     compile_: Compile = False,
 ) -> None:
     """Replay a measured record through fixed, recursive and batch estimation."""
+    from adaptive_flot.child_processes import undisturbed
     from adaptive_flot.console.lines import print_estimate, stage_bar
     from adaptive_flot.errors import CellError
+    from adaptive_flot.files import write_text
     from adaptive_flot.processes.registry import find_cell, make_model
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.estimate import estimate_record
@@ -82,16 +84,18 @@ def estimate(
             blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent,
             innovations=innovations, progress=advance,
         )  # fmt: skip
-    write_replays(result, folder)
-    for target in filter(None, (folder / "summary.json", json)):
-        write_json(target, estimate_summary(data, result))
-    if save_cell is not None:
-        save_fitted_cell(result, find_cell(cell, data.parent), save_cell)
-    if save_model is not None:
-        save_fitted_model(result, save_model, base=model, cell=cell, folder=data.parent)
-    print_estimate(result)
-    from adaptive_flot.report.estimate.page import write_estimate_report
+    from adaptive_flot.report.estimate.page import estimate_report
 
     read = [data, *([map_] if map_ is not None else [])]
-    write_estimate_report(result, folder / "report.html", command=command_line(), read=read)
+    page = estimate_report(result, command_line(), read)
+    with undisturbed():  # no estimates without their page
+        write_replays(result, folder)
+        for target in filter(None, (folder / "summary.json", json)):
+            write_json(target, estimate_summary(data, result))
+        if save_cell is not None:
+            save_fitted_cell(result, find_cell(cell, data.parent), save_cell)
+        if save_model is not None:
+            save_fitted_model(result, save_model, base=model, cell=cell, folder=data.parent)
+        write_text(folder / "report.html", page)
+    print_estimate(result)
     typer.echo(f"Report: {folder / 'report.html'}")
