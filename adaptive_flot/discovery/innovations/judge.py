@@ -19,12 +19,17 @@ from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, E
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import low_end, told_apart
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 
 SMALL = 0.15
 """An effect beside another one, that brings less than this share of the gain, is not told."""
 OWN = 0.8
 """Share of the gain that is lost without an event beside another effect, at least."""
+BY_ITSELF = 0.5
+"""Share of the gain that an event has alone, and beside the other effect, from which it stands by itself."""
+BESIDE = 0.02
+"""Share of a record at its ends in which a change is none."""
 SAME_LAG = 0.8
 """Share of the gain from which a lag at another place is not told apart."""
 SAME_DEAD_TIME = 0.4
@@ -175,8 +180,9 @@ def _overlapping(
 
     Nothing else draws an event that is there. So without it most of the gain is lost (OWN). Not so beside a constant
     error at its site: that and the event are the level before and after. Nor is it given up where it explains most of
-    it (OWN) alone: it is the other effect, then, that draws what is left. Since a reference, what a plant has or has
-    not does not come between two records: it is then enough that the event explains more alone than that.
+    it (OWN) alone: it is the other effect, then, that draws what is left. Nor where it stands by itself, see
+    `stands_by_itself`. Since a reference, what a plant has or has not does not come between two records: it is then
+    enough that the event explains more alone than that.
     """
     if len(best.hypotheses) < 2:
         return ()
@@ -189,9 +195,31 @@ def _overlapping(
         alone, rest = max(without[h.label].criterion for h in others), without[event.label].criterion
         structure = search.since_reference and all(h.kind in STRUCTURE for h in others)
         leads = structure and alone - rest >= LEAST_GAIN
-        return leads or best.criterion - rest >= most or alone - base.criterion >= most
+        by_itself = happens_once(event, search.record) and stands_by_itself(best.criterion, base.criterion, alone, rest)
+        return leads or by_itself or best.criterion - rest >= most or alone - base.criterion >= most
 
     return tuple(h for h in events if not is_needed(h))
+
+
+def happens_once(event: Hypothesis, record: Dataset) -> bool:
+    """Whether an event is one change that stays: what a wrong model leaves comes and goes with the inputs.
+
+    A change within a share BESIDE of the record of its ends is none.
+    """
+    first, last = float(record.time[0]), float(record.time[-1])
+    margin = BESIDE * (last - first)
+    edges = [t for begin, long in event.pulses for t in (begin, begin + long)]
+    return sum(first + margin < t < last - margin for t in edges) == 1
+
+
+def stands_by_itself(both: float, neither: float, alone: float, without: float) -> bool:
+    """Whether an event has most of the gain of two effects (BY_ITSELF) with and without the other one.
+
+    Then the other one explains something else, and draws nothing of it. By criteria: of both effects, of neither, of
+    the event alone, of the other one alone.
+    """
+    least = BY_ITSELF * (both - neither)
+    return alone - neither >= least and both - without >= least
 
 
 def _follows_an_input(search: Search, event: Hypothesis) -> bool:

@@ -10,7 +10,7 @@ from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
-from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.judge import Told, happens_once, stands_by_itself
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import has_short_pause
 from adaptive_flot.discovery.innovations.search.search import Search
@@ -139,13 +139,16 @@ def explains_too_little(before: float, after: float, usual: float, above: float,
     return before > above * usual and after**2 - usual**2 > (1 - share) * (before**2 - usual**2)
 
 
-def not_two(told: Told) -> Told:
+def not_two(search: Search, base: Explanation, told: Told) -> Told:
     """Nothing where two effects are needed, named or of a class, and neither is a store, which most models leave out.
 
     Two things that have gone wrong at a time are rarer than a model that is wrong in a third way, which two effects
     stand in for. A store and a dependence are two such effects as well, or two stores: both say how the process is. A
     gauge that slips was told as two stores, at the inflow and at the outflow. Of a class, one explanation without a
     second effect is enough. A constant error and an event at one site are one thing: its level before and after.
+
+    An event that stands by itself (see `stands_by_itself`) is told without the other effect, which stays open: a gyro
+    that came to show more was found to the row beside a law of the ship that is a little wrong.
     """
     levels = {h.site for h in told.certain if h.driver == "constant"}
     kinds = [h.kind for h in told.certain if not (h.kind in EVENTS and h.site in levels)]
@@ -155,8 +158,24 @@ def not_two(told: Told) -> Told:
         return told
     else:
         said = " and ".join(h.label for h in told.certain)
+        alone = _event_by_itself(search, base, told)
+        if alone is not None:
+            return replace(told, best=alone, certain=alone.hypotheses)
     why = f"two effects are needed, {said}: more likely another one is"
     return replace(told, word="abstain", certain=(), open=(), why=why)
+
+
+def _event_by_itself(search: Search, base: Explanation, told: Told) -> Explanation | None:
+    """The event of a name of two effects without the other one, where it stands by itself; None where it does not."""
+    events = [h for h in told.certain if h.kind in EVENTS]
+    if told.word != "named" or len(told.best.hypotheses) != 2 or len(events) != 1:
+        return None
+    if not happens_once(events[0], search.record):
+        return None
+    (other,) = (h for h in told.best.hypotheses if h is not events[0])
+    alone, without = search.without(told.best, other), search.without(told.best, events[0])
+    by_itself = stands_by_itself(told.best.criterion, base.criterion, alone.criterion, without.criterion)
+    return alone if by_itself else None
 
 
 def _of_two(explanation: Explanation) -> bool:

@@ -118,13 +118,27 @@ def second_opinion(state: State) -> State:
 
 def _noted(state: State, why: str) -> State:
     """The state with what process noise says among the notes on the record."""
-    said = f"with process noise it is {why}"
+    return _with_note(state, f"with process noise it is {why}")
+
+
+def _with_hint(state: State, search: Search, told: Told) -> State:
+    """The state with a note on what the innovations form would tell, where held-out rows do not confirm it.
+
+    It says where to look, and is no verdict: only one part by itself is told so.
+    """
+    if told.word != "named" or len(told.certain) != 1 or told.beside:
+        return state
+    words = told_in_words(search, told).rstrip(".")
+    return _with_note(state, f"with process noise one explanation is best, and free runs do not confirm it: {words}")
+
+
+def _with_note(state: State, said: str) -> State:
     return replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
 
 
 def _by_the_rules(state: State, search: Search, base: Explanation, told: Told) -> Told:
     """What is told, without what stands in for something else more often than not (see `rivals`)."""
-    told = not_two(late_where(search, told, lambda _, site: late_as_well(state, told, site)))
+    told = not_two(search, base, late_where(search, told, lambda _, site: late_as_well(state, told, site)))
     return or_in_time(search, base, unless_a_trend(base, unless_it_wanders(search, base, told)))
 
 
@@ -223,7 +237,8 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
     reached = outputs_in_reach(before.model, after.model)  # a sensor stands in for nothing elsewhere
     shown = tuple(c for c in (over if stands else error) if c.output in reached)
     if (against and not stands) or hardly_explained(shown) or _another_drift(state, told):
-        return _kept(state, told)
+        kept = _kept(state, told)
+        return _with_hint(kept, search, told) if kept.judged.word == "abstain" else kept
     less = smaller(error, state.error, allowed_ratio(state, names))
     beside = wanders or in_all_that_is_near(state, names)  # what has more beside it leaves less, and is no other cause
     if competes(state) and not (among or beside) and not (stands and follows) and not less:
