@@ -111,7 +111,8 @@ def _part_of_record(notes: Sequence[str]) -> str:
     """A word on what a verdict is about: where a hole has left only one stretch of the record, or inputs were moved."""
     left = next((note for note in notes if LONGEST_IS_USED in note), "")
     moved = next((note for note in notes if note == MOVED), "")
-    said = (f"This is about a part of the record only: {left}." if left else "", f"Note: {moved}." if moved else "")
+    rows = left.rpartition(" with ")[2]  # the note says why
+    said = (f"This is about a part of the record, {rows}." if left else "", f"Note: {moved}." if moved else "")
     return " ".join(filter(None, said))
 
 
