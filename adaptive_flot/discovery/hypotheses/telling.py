@@ -159,11 +159,9 @@ def _effects(model: Model, judged: Judged) -> tuple[NamedEffect, ...]:
     assert best is not None and best.hypothesis is not None  # a verdict that tells has a best hypothesis
     fitted = model_with(model, best.hypothesis).with_parameters(best.fit.values)
     effect = fitted.fitted_effects()[-1]
-    count = len(best.values)
-    jack = np.sqrt((count - 1) * np.var(best.values, axis=0))
     interval = {
         c: (effect.coefficients[c] - 1.96 * float(s), effect.coefficients[c] + 1.96 * float(s))
-        for c, s in zip(best.hypothesis.free, jack, strict=True)
+        for c, s in zip(best.hypothesis.free, best.spread, strict=True)
     }
     others = tuple(
         (t.hypothesis.site, t.hypothesis.driver, t.total - best.total, float("nan"))

@@ -130,6 +130,7 @@ def _told(
         compared.rows.losses(after.fit.errors),
         np.empty((0, 0)),
         0.0,
+        np.empty(0),
     )
     word: Literal["named", "class"] = "named" if verdict.word == "named" else "class"
     verdict = replace(verdict, notes=tuple(n for n in verdict.notes if n != NONE_FITTED))

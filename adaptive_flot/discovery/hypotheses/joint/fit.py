@@ -199,6 +199,20 @@ class JointFitter:
                 break
         return fit
 
+    def deviations(self, fit: JointFit) -> FloatArray:
+        """Standard deviations of the coefficients of a fit (q,), with constants and initial states free beside them.
+
+        Those of the normal equations (Gauss-Newton), with the derivatives J of scaled errors r and priors, and the
+        weights w of the criterion::
+
+            C = (J' diag(w) J)^-1    w = 1 / (tau (1 + r^2 / TAIL)) of an error, 1 of a prior
+        """
+        weights = self._criterion(self._residuals(fit.unknowns, fit.errors) ** 2)[1]
+        normal = fit.jacobian.T @ (weights[:, None] * fit.jacobian)
+        variances = np.diag(np.linalg.pinv(normal, hermitian=True))[: self.unknowns.q]
+        found: FloatArray = np.sqrt(np.maximum(variances, 0.0)) * self.unknowns.scale
+        return found
+
     def shared_slopes(self, fit: JointFit) -> FloatArray | None:
         """Derivatives by constants and initial states from another fit to the same records; None where states differ.
 

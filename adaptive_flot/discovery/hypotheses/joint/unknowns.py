@@ -34,6 +34,8 @@ class JointUnknowns:
     ----------
     q, c, nx
         How many of each there are.
+    scale
+        Scales of the coefficients (q,): an unknown of 1 is so much.
     lower, upper
         Bounds (q + c + nx records,): of coefficients, and of constants of which each has an unknown of its own.
     """
@@ -44,7 +46,7 @@ class JointUnknowns:
         self.model, self.constants, self.coefficients, self.initial = model, constants, coefficients, tuple(initial)
         self._own = model.indices("parameters", coefficients)
         self._shared = model.indices("parameters", constants.names)
-        self._scale = np.array([model.parameters[i].scale or 1.0 for i in self._own])
+        self.scale = np.array([model.parameters[i].scale or 1.0 for i in self._own])
         self._state_scale = np.array([s.scale for s in model.states])
         self._ends = np.array([[p.lower for p in model.parameters], [p.upper for p in model.parameters]])
         self.q, self.c, self.nx = len(self._own), len(self._shared), len(model.states)
@@ -57,7 +59,7 @@ class JointUnknowns:
         q, c = self.q, self.c
         ends = np.full((2, q + c + self.nx * len(self.initial)), [[-np.inf], [np.inf]])
         root = np.diag(self.constants.root)
-        ends[:, :q] = self._ends[:, self._own] / self._scale
+        ends[:, :q] = self._ends[:, self._own] / self.scale
         if np.array_equal(self.constants.root, np.diag(root)) and (root > 0).all():
             ends[:, q : q + c] = [self.constants.distances(end) / root for end in self._ends[:, self._shared]]
         return ends[0], ends[1]
@@ -88,7 +90,7 @@ class JointUnknowns:
         """Unknowns with these coefficients, the model's own else, and everything else at its prior."""
         known = values or {}
         own = [known.get(n, self.model.parameters[i].value) for n, i in zip(self.coefficients, self._own, strict=True)]
-        return np.concatenate([np.array(own) / self._scale, np.zeros(self.c + self.nx * len(self.initial))])
+        return np.concatenate([np.array(own) / self.scale, np.zeros(self.c + self.nx * len(self.initial))])
 
     def difference(self, i: int, z: FloatArray) -> FloatArray:
         """A small step of one unknown, to the side on which bounds leave it more room."""
@@ -99,7 +101,7 @@ class JointUnknowns:
     def parameters(self, z: FloatArray) -> FloatArray:
         """All parameters of the model (np,), inside their bounds."""
         p = self.model.parameter_values
-        p[self._own], p[self._shared] = z[: self.q] * self._scale, self._constants(z)
+        p[self._own], p[self._shared] = z[: self.q] * self.scale, self._constants(z)
         inside: FloatArray = np.clip(p, *self._ends)
         return inside
 
@@ -108,7 +110,7 @@ class JointUnknowns:
 
     def _beyond(self, z: FloatArray) -> float:
         """How far coefficients and constants lie outside their bounds: a difference there would show nothing."""
-        p = np.concatenate([z[: self.q] * self._scale, self._constants(z)])
+        p = np.concatenate([z[: self.q] * self.scale, self._constants(z)])
         low, high = self._ends[:, [*self._own, *self._shared]]
         size = np.maximum(np.abs(p), 1e-300)
         return float(np.sum((np.maximum(low - p, 0.0) + np.maximum(p - high, 0.0)) / size))
