@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,26 +20,20 @@ from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_words
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
-from adaptive_flot.discovery.hypotheses.cross_validation import model_with
-from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE, Hypothesis
-from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
+from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.filter.thinning import is_short_since_reference
-from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
-from adaptive_flot.discovery.innovations.search.beam import best_explanations
-from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
-from adaptive_flot.discovery.innovations.search.pauses import with_pauses_closed
-from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend, unless_hardly_off
-from adaptive_flot.discovery.innovations.verdicts.sole_cause import sole_cause
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.places import with_what_is_nearest, with_words_without_a_site
+from adaptive_flot.discovery.since_reference.process_noise import with_process_noise
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
@@ -55,32 +49,6 @@ from adaptive_flot.greybox.model import Model
 
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
 NOT_ASKED = "the budget ended before it could be compared with process noise, which may explain as much"
-LACKING = ("lag", "store", "depends", "turns", "sign")
-"""Kinds of effects that a model may lack on its reference."""
-
-
-@dataclass(frozen=True)
-class _Known:
-    """What is known with process noise.
-
-    Attributes
-    ----------
-    search, base
-        The search in the new record, and the model as it is there.
-    told, sole
-        What was judged; and what is certain alone, of explanations of two effects.
-    before
-        The search in the reference, and the model as it is there.
-    single
-        Explanations of one effect that were found, told or not.
-    """
-
-    search: Search
-    base: Explanation
-    told: Told
-    sole: Told | None
-    before: tuple[Search, Explanation]
-    single: tuple[Explanation, ...]
 
 
 @one_thread()
@@ -158,7 +126,7 @@ def _row_by_row(
     """The comparison with what the innovations form tells, and without what it does not know; None without the time."""
     reference = max(references, key=len)
     with np.errstate(all="ignore"):
-        known = _with_process_noise(compared, record, reference, processes, progress, ends)
+        known = with_process_noise(compared, record, reference, processes, progress, ends)
         if known is None:
             return None
         search, base, told, sole, before = known.search, known.base, known.told, known.sole, known.before
@@ -251,61 +219,6 @@ def _of_another_shape(
     told = {e.effect.site for e in searched.verdict.effects} | {site for site, _ in searched.verdict.members}
     usual = all(c.after <= ABOVE_USUAL * c.noise for c in searched.verdict.error)
     return searched if usual and told and told <= nearest else compared
-
-
-def _with_process_noise(
-    compared: Comparison,
-    record: Dataset,
-    reference: Dataset,
-    processes: int,
-    progress: Callable[[str], None],
-    ends: float,
-) -> _Known | None:
-    """What has changed, by a model that has what the reference lacks; None where the time was up before."""
-    calibration, columns = compared.calibration, compared.rows.columns
-    constants, model = calibration.constants, calibration.model
-    floor = noise_floor([reference], columns)
-    progress("what the reference lacks")
-    before = Search(model, reference, columns, floor, constants.names, constants, processes, LACKING, ends=ends)
-    start = before.base(model.parameter_values)
-    lacking = judge(before, start, best_explanations(before, start))
-    if before.time_is_up:
-        return None
-    explanation = lacking.best if lacking.word == "named" else start
-    extended = before.model_of(explanation)
-    where = extended.indices("parameters", constants.names)
-    known = constants.about(extended.parameter_values[list(where)])
-    progress("events in the new record")
-    search = Search(
-        extended, record, columns, floor, constants.names, known, processes, since_reference=True, ends=ends
-    )
-    base = search.base(extended.parameter_values)
-    found = with_pauses_closed(search, best_explanations(search, base, progress))
-    if search.time_is_up:
-        return None
-    before = replace(before, model=extended)
-    there = before.base(extended.parameter_values)
-    told = _changed(judge(search, base, found), search, before, there)
-    single = tuple(e for e in found if len(e.hypotheses) == 1)
-    return _Known(search, base, told, sole_cause(search, base, found, told), (before, there), single)
-
-
-def _changed(told: Told, search: Search, before: Search, start: Explanation) -> Told:
-    """What is told, without what explains the reference as well: that has not changed."""
-
-    def there(explanation: Explanation, h: Hypothesis) -> bool:
-        if h.kind in EVENTS:
-            return False
-        model = search.model_of(explanation)
-        extended = model_with(before.model, h)
-        p = np.array([model.parameters[model.index("parameters", q.name)].value for q in extended.parameters])
-        p[list(extended.indices("parameters", before.free))] = start.fit.p[
-            list(before.model.indices("parameters", before.free))
-        ]
-        return before.added(start, h, p).criterion > start.criterion + LEAST_GAIN
-
-    certain = tuple(h for h in told.certain if not there(told.best, h))
-    return replace(told, certain=certain, open=tuple((e, h) for e, h in told.open if not there(e, h)))
 
 
 def _has_event(told: Told) -> bool:

@@ -177,10 +177,15 @@ def _kept(state: State, told: Told) -> State:
         return replace(
             state,
             judgement=replace(judgement, word="abstain"),
-            sentence="Something is missing, but the record does not say what: the error is far above the noise from "
-            f"row to row, and {why}.",
+            sentence=f"Something is missing, but the record does not say what: {_times_noise(state)}, and {why}.",
         )
     return state
+
+
+def _times_noise(state: State) -> str:
+    """How far errors on the report rows are above the noise from row to row, in words."""
+    most = max((c.after / c.noise for c in state.error if c.noise > 0), default=0.0)
+    return f"the error is up to {most:.2g} times the noise from row to row" if most > 1 else "little is left"
 
 
 def _knows(told: Told, judgement: Judgement) -> bool:
