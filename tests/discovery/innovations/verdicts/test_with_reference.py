@@ -10,9 +10,10 @@ from adaptive_flot.discovery.hypotheses.judgement import Word
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST, _too_many_parts
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
-from adaptive_flot.discovery.results import OutputChange, Verdict
+from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.taken_back import unless_contradicted, unless_much_is_left
+from adaptive_flot.greybox.effects import Effect
 
 
 @pytest.mark.parametrize(
@@ -126,6 +127,18 @@ def test_a_name_that_leaves_four_times_the_error_of_the_reference_is_not_told(
         assert verdict.reason.startswith("Something differs from the reference, and it is not told what: ")
         assert f"the error of amperes is still {after[1]} times" in verdict.reason
         assert "The nearest: charger does not go below 1 A." in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("driver", "left", "word"), [("time", 2.4, "named"), ("time", 2.9, "abstain"), ("load", 2.9, "named")]
+)
+def test_an_event_comes_nearer_to_the_errors_of_the_reference(driver: str, left: float, word: str) -> None:
+    """Coolant that came 8 K warmer was named as 21 % less of it: the temperature stayed 2.9 times as far off."""
+    effect = Effect("cooling", driver, "shift", {"amplitude": -0.2})
+    error = (OutputChange("temperature", "K", 15.0, left, 1.0, (0.5, 0.9)),)
+    verdict = Verdict("named", "Cooling is 21 % smaller.", (NamedEffect(effect, "", {}, ()),), (), error, "fresh")
+    compared: Any = Compared(verdict)
+    assert unless_much_is_left(compared).verdict.word == word
 
 
 @pytest.mark.parametrize(
