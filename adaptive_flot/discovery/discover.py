@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
+from adaptive_flot.discovery.innovations.places.constants import with_constants_alike
 from adaptive_flot.discovery.innovations.places.free_run import compare_with_what_has_no_site
 from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
 from adaptive_flot.discovery.later_inputs import with_later_inputs
@@ -199,6 +200,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     tell_background,
     second_opinion,
     compare_with_what_has_no_site,
+    with_constants_alike,
     plan_test,
     conclude,
 )

@@ -9,5 +9,6 @@ telling_rows.py       The rows that say anything of an event that passes.
 verification.py       The error on rows to which nothing was fitted.
 reduction.py          By how much an error is smaller, with its interval.
 likelihood.py         What a difference of likelihood says.
+swings.py             Whether an error swings with a period, where nothing has a name.
 beside_background.py  What a background leaves unknown on rows that did not fit it.
 """

@@ -9,6 +9,7 @@ from adaptive_flot.discovery.candidates.catalogue import passed_on
 from adaptive_flot.discovery.further_sites.places import BALANCE, DRAG, LOSS, READING, is_part
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.quantities import Parameter
 from adaptive_flot.greybox.scope import Site
 
 POINTS, WIDE, SAME = 24, 1e6, 1e-9
@@ -65,6 +66,19 @@ def twins(model: Model, effect: Effect) -> tuple[Site, ...]:
     return tuple(s for s in others if _are_the_same(_moves(model, s.name, mode), own))
 
 
+def constants_alike(model: Model, effect: Effect) -> tuple[Parameter, ...]:
+    """Fixed constants whose error does the same as a constant effect: one of them may be off, and nothing has failed.
+
+    A compressor that gives 6 % more than was asked, and a capacity that is 6 % above the data sheet, are one.
+    """
+    site = _site(model, effect.site)
+    if effect.driver != "constant" or (effect.mode or site.mode) != "factor":
+        return ()
+    own = _moves(model, effect.site, "factor")
+    fixed = [q for q in model.parameters if q.role == "fixed" and q.value != 0 and "." not in q.name]
+    return tuple(q for q in fixed if _are_the_same(own, _moves_by(model, q.name)))
+
+
 def _site(model: Model, name: str) -> Site:
     return next(s for s in model.sites if s.name == name)
 
@@ -80,20 +94,21 @@ def _are_the_same(one: FloatArray, two: FloatArray) -> bool:
 
 
 def _moves(model: Model, site: str, mode: Mode) -> FloatArray:
-    """How rates and outputs answer to a small change at a site (POINTS, nx + ny): their derivatives by its size.
+    """How rates and outputs answer to a small change at a site (POINTS, nx + ny): their derivatives by its size."""
+    changed = model.with_effects([Effect(site, "constant", "shift", {"amplitude": 0.0}, mode=mode)])
+    return _moves_by(changed, changed.effects[-1].parameter("amplitude"))
 
-    The points are random, within the ranges of states and inputs.
-    """
+
+def _moves_by(model: Model, parameter: str) -> FloatArray:
+    """The same for a parameter. The points are random, within the ranges of states and inputs."""
     ends = np.array([(q.lower, q.upper) for q in (*model.states, *model.inputs)])
     low, high = np.clip(ends.T, -WIDE, WIDE)
     points = np.random.default_rng(0).uniform(low, high, (POINTS, len(low)))
-    changed = model.with_effects([Effect(site, "constant", "shift", {"amplitude": 0.0}, mode=mode)])
-    k = changed.index("parameters", changed.effects[-1].parameter("amplitude"))
+    k = model.index("parameters", parameter)
     x, u, p = (
-        ca.SX.sym(name, len(kind))
-        for name, kind in (("x", model.states), ("u", model.inputs), ("p", changed.parameters))
+        ca.SX.sym(name, len(kind)) for name, kind in (("x", model.states), ("u", model.inputs), ("p", model.parameters))
     )
-    rates, outputs, *_ = changed.ode(0.0, x, u, p)
+    rates, outputs, *_ = model.ode(0.0, x, u, p)
     by = ca.Function("by", [x, u, p], [ca.densify(ca.jacobian(ca.vertcat(rates, outputs), p[k]))])
-    nx, values = len(model.states), changed.parameter_values
+    nx, values = len(model.states), model.parameter_values
     return np.array([np.array(by(point[:nx], point[nx:], values)).ravel() for point in points])

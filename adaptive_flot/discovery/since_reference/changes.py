@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.swings import swing_notes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_words
@@ -197,6 +198,9 @@ def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Da
         said += [f"{record.name}: {note}." for note in (*record.notes, *ranges, *suspects)]
         if len(records) == 1:
             said += [f"{note}." for note in suspect_notes([e.effect for e in verdict.effects], suspects, record.dt)]
+    if verdict.word == "abstain":
+        swings = zip(compared.rows.records, compared.null.fresh, strict=True)
+        said += [f"{r.name}: {n}." for r, e in swings for n in swing_notes(model, r, compared.rows.columns, e)]
     if referred and len(records) > 1:
         said.append("Events in time were not looked for: that takes one record without a gap, and a reference.")
     if referred and len(records) == 1 and not is_short_since_reference(records[0], compared.calibration.model):

@@ -20,6 +20,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, what_is_left
+from adaptive_flot.discovery.innovations.places.constants import DOES_THE_SAME
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
@@ -133,7 +134,8 @@ def _told(
         np.empty(0),
     )
     word: Literal["named", "class"] = "named" if verdict.word == "named" else "class"
-    verdict = replace(verdict, notes=tuple(n for n in verdict.notes if n != NONE_FITTED))
+    kept = (n for n in verdict.notes if n != NONE_FITTED and not n.startswith(DOES_THE_SAME))
+    verdict = replace(verdict, notes=tuple(kept))
     alone = f"By single faults of the whole record: {compared.verdict.reason}"
     told = Verdict(
         word=word,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adaptive_flot.discovery.assessment.swings import swing_notes
 from adaptive_flot.discovery.assessment.verification import block_rows, changes, whiteness
 from adaptive_flot.discovery.candidates.catalogue import has_a_reason
 from adaptive_flot.discovery.candidates.direction import against, listed
@@ -85,11 +86,17 @@ def conclude(state: State) -> Verdict:
         notes=state.screening.notes
         + _common_nuisance_note(result)
         + ((SIZES_WITH_PROCESS_NOISE,) if state.sizes else ())
-        + suspect_notes([e.effect for e in effects], state.screening.suspects, problem.record.dt),
+        + suspect_notes([e.effect for e in effects], state.screening.suspects, problem.record.dt)
+        + (_swings(problem, before) if judgement.word == "abstain" else ()),
         detection=state.detection,
         location=locate(state.detection, result.rounds[0].scores) if state.detection else None,
         experiment=state.experiment,
     )
+
+
+def _swings(problem: Problem, before: Fit) -> tuple[str, ...]:
+    """Notes on errors of the model as it is that swing with a period."""
+    return swing_notes(before.model, problem.record, problem.columns, before.residual(problem))
 
 
 def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ...]) -> str:
