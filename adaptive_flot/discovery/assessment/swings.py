@@ -10,13 +10,16 @@ from scipy.optimize import minimize_scalar
 
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.quantities import Quantity
 
 FEWEST_PERIODS, FEWEST_ROWS = 5, 8
 """Periods in a record, and rows in a period: slower is what wanders, and faster may be noise."""
 LEAST_SHARE = 0.5
 """Share of the squared error from which it swings."""
+SAME_PERIOD = 0.05
+"""Difference of two periods, as a share, that is none."""
 OF_AN_INPUT = 0.3
-"""Share of an input within the lines about that frequency from which the input makes it swing."""
+"""The same of an input at that frequency: then the input makes it swing."""
 
 
 @dataclass(frozen=True)
@@ -37,28 +40,28 @@ def swing_of(error: FloatArray, inputs: FloatArray, dt: float) -> Swing | None:
 
         e_k = c + a cos(2 pi f t_k) + b sin(2 pi f t_k) + r_k        share = 1 - sum r_k^2 / sum (e_k - mean e)^2
     """
-    n, known = len(error), np.isfinite(error)
+    n = len(error)
     lines = np.arange(FEWEST_PERIODS, n // FEWEST_ROWS)
-    if not lines.size or known.sum() < FEWEST_ROWS or not np.nanstd(error) > 0:
+    if not lines.size or np.isfinite(error).sum() < FEWEST_ROWS or not np.nanstd(error) > 0:
         return None
+    time = dt * np.arange(n, dtype=np.float64)
     k = int(lines[np.argmax(_power(error)[lines])])
-    time = dt * np.arange(n)
-
-    def wave(frequency: float) -> tuple[float, float]:
-        """Share of the squared error, and amplitude."""
-        angle = 2 * np.pi * frequency * time[known]
-        design = np.column_stack([np.ones(len(angle)), np.cos(angle), np.sin(angle)])
-        fitted, *_ = np.linalg.lstsq(design, error[known], rcond=None)
-        left = float(np.var(error[known] - design @ fitted))
-        return 1 - left / float(np.var(error[known])), float(np.hypot(fitted[1], fitted[2]))
-
     ends = ((k - 1) / (n * dt), (k + 1) / (n * dt))
-    best = float(minimize_scalar(lambda f: -wave(f)[0], bounds=ends, method="bounded").x)
-    share, amplitude = wave(best)
-    by_inputs = (float(_power(u)[k - 1 : k + 2].sum() / _power(u).sum()) for u in inputs.T if np.ptp(u) > 0)
-    if share < LEAST_SHARE or any(of_it >= OF_AN_INPUT for of_it in by_inputs):
+    best = float(minimize_scalar(lambda f: -_wave(error, time, f)[0], bounds=ends, method="bounded").x)
+    share, amplitude = _wave(error, time, best)
+    if share < LEAST_SHARE or any(_wave(u, time, best)[0] >= OF_AN_INPUT for u in inputs.T if np.ptp(u) > 0):
         return None
     return Swing(1 / best, amplitude, share)
+
+
+def _wave(values: FloatArray, time: FloatArray, frequency: float) -> tuple[float, float]:
+    """Share of the squared values (N,) about their mean that a wave explains, and its amplitude."""
+    known = np.isfinite(values)
+    angle = 2 * np.pi * frequency * time[known]
+    design = np.column_stack([np.ones(len(angle)), np.cos(angle), np.sin(angle)])
+    fitted = np.linalg.lstsq(design, values[known], rcond=None)[0]
+    left = float(np.var(values[known] - design @ fitted))
+    return 1 - left / float(np.var(values[known])), float(np.hypot(fitted[1], fitted[2]))
 
 
 def _power(values: FloatArray) -> FloatArray:
@@ -69,16 +72,27 @@ def _power(values: FloatArray) -> FloatArray:
     return power
 
 
-def swing_words(name: str, swing: Swing, unit: str) -> str:
-    """``the error of pressure swings by 20 kPa every 260 s, which is 80 % of its square``."""
-    size = f"{swing.amplitude:.2g} {unit}".removesuffix(" -").strip()
+def swing_words(swings: Sequence[tuple[Quantity, Swing]]) -> str:
+    """``errors swing up and down every 260 s: pressure by 22 kPa (92 %) of the squared error: look for ...``."""
+    one = [
+        f"{q.name.replace('_', ' ')} by {s.amplitude:.2g} {q.unit}".removesuffix(" -") + f" ({100 * s.share:.0f} %)"
+        for q, s in swings
+    ]
+    period = max((s for _, s in swings), key=lambda s: s.share).period
+    often = f"{period:.0f}" if period >= 100 else f"{period:.3g}"
     return (
-        f"the error of {name.replace('_', ' ')} swings by {size} up and down every {swing.period:.3g} s, which is "
-        f"{100 * swing.share:.0f} % of its square: look for what comes and goes so often"
+        f"errors swing up and down every {often} s: {', '.join(one)} of the squared error: look for what comes "
+        "and goes so often"
     )
 
 
 def swing_notes(model: Model, record: Dataset, columns: Sequence[int], errors: FloatArray) -> tuple[str, ...]:
-    """A note on each output `columns` (m,) of a record whose error (N, m) swings: `swing_words`."""
-    swings = ((model.outputs[c], swing_of(e, record.inputs, record.dt)) for c, e in zip(columns, errors.T, strict=True))
-    return tuple(swing_words(q.name, swing, q.unit) for q, swing in swings if swing is not None)
+    """A note on the outputs `columns` (m,) of a record whose errors (N, m) swing, one for each period."""
+    found = ((model.outputs[c], swing_of(e, record.inputs, record.dt)) for c, e in zip(columns, errors.T, strict=True))
+    left, notes = [(q, swing) for q, swing in found if swing is not None], list[str]()
+    while left:
+        period = max((s for _, s in left), key=lambda s: s.share).period
+        same = [(q, s) for q, s in left if abs(s.period / period - 1) < SAME_PERIOD]
+        left = [each for each in left if each not in same]
+        notes.append(swing_words(same))
+    return tuple(notes)

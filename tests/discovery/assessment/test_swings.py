@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.assessment.swings import swing_of, swing_words
+from adaptive_flot.discovery.assessment.swings import swing_notes, swing_of
+from adaptive_flot.greybox.data.dataset import Dataset
+from tests.discovery.hypotheses.tank import tank
 
 ROWS, DT = 1400, 2.0
-TIME = DT * np.arange(ROWS)
+TIME = DT * np.arange(ROWS, dtype=np.float64)
 STILL = np.zeros((ROWS, 1))
 
 
@@ -50,10 +56,17 @@ def test_nothing_measured_and_a_short_record_have_no_swing() -> None:
     assert swing_of(np.sin(TIME[:30]), STILL[:30], DT) is None
 
 
-def test_the_words_say_size_period_and_share() -> None:
-    swing = swing_of(20.0 * np.sin(2 * np.pi * TIME / 260.0), STILL, DT)
-    assert swing is not None
-    assert swing_words("suction_pressure", swing, "kPa") == (
-        "the error of suction pressure swings by 20 kPa up and down every 260 s, which is 100 % of its square: look "
-        "for what comes and goes so often"
+def test_outputs_that_swing_together_are_told_together() -> None:
+    """One disturbance moves several outputs: one note says its period, and how large it is in each."""
+    wave, quantity = np.sin(2 * np.pi * TIME / 260.0), tank().outputs[0]
+    outputs = tuple(replace(quantity, name=name, unit=unit) for name, unit in (("heat", "K"), ("flow_1", "-")))
+    model: Any = SimpleNamespace(outputs=outputs)
+    record = Dataset("r", TIME, DT, STILL, np.zeros((ROWS, 2)))
+    errors = np.column_stack([20.0 * wave, 0.3 * wave])
+    (note,) = swing_notes(model, record, (0, 1), errors)
+    assert note == (
+        "errors swing up and down every 260 s: heat by 20 K (100 %), flow 1 by 0.3 (100 %) of the squared error: "
+        "look for what comes and goes so often"
     )
+    other = np.column_stack([20.0 * wave, np.sin(2 * np.pi * TIME / 100.0)])
+    assert len(swing_notes(model, record, (0, 1), other)) == 2
