@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from adaptive_flot.discovery.results.words import in_seconds
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.quantities import Quantity
@@ -79,10 +80,9 @@ def swing_words(swings: Sequence[tuple[Quantity, Swing]]) -> str:
         for q, s in swings
     ]
     period = max((s for _, s in swings), key=lambda s: s.share).period
-    often = f"{period:.0f}" if period >= 100 else f"{period:.3g}"
     return (
-        f"errors swing up and down every {often} s: {', '.join(one)} of the squared error: look for what comes "
-        "and goes so often"
+        f"errors swing up and down every {in_seconds(period)} s: {', '.join(one)} of the squared error: look for what "
+        "comes and goes so often"
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
+from adaptive_flot.discovery.results.words import in_seconds
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 
@@ -124,7 +125,7 @@ def _compared(log: float, here: str, there: str) -> str:
 def _swings(size: float, period: float, mode: str, unit: str) -> str:
     """How far it goes up and down, and how often: `swings by 0.4 K up and down every 900 s`."""
     swing = f"{size:.3g}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
-    return f"swings by {swing} up and down every {period:.3g} s"
+    return f"swings by {swing} up and down every {in_seconds(period)} s"
 
 
 def _grows(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:

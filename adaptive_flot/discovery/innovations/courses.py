@@ -97,8 +97,10 @@ def suspects(
                 yield suspect
 
 
-def periodic(site: Site, value: FloatArray, time: FloatArray, dt: float) -> Iterator[Suspect]:
-    """Yield sines and cosines of time at a site.
+def periodic(
+    site: Site, value: FloatArray, time: FloatArray, dt: float, period: float | None = None
+) -> Iterator[Suspect]:
+    """Yield sines and cosines of time at a site: of many periods, or of one that is known.
 
     Parameters
     ----------
@@ -108,17 +110,19 @@ def periodic(site: Site, value: FloatArray, time: FloatArray, dt: float) -> Iter
         Time of the row at the end of each interval (n,) [s].
     dt
         Sampling interval [s].
+    period
+        The period [s], where it is known.
     """
     n, free = len(value), ("sine", "cosine")
     by = value if site.mode == "factor" else np.ones(n)
     if not np.isfinite(by).all() or not np.abs(by).max() > 0:
         return
     t = time if site.role == "sensor" else time - dt / 2
-    for count in range(SLOWEST, min(n // FASTEST, SLOWEST + MOST_PERIODS) + 1):
-        period = n * dt / count
-        effect = Effect(site.name, "time", "periodic", {"period": period}, mode=site.mode)
+    many = (n * dt / count for count in range(SLOWEST, min(n // FASTEST, SLOWEST + MOST_PERIODS) + 1))
+    for each in many if period is None else (period,):
+        effect = Effect(site.name, "time", "periodic", {"period": each}, mode=site.mode)
         hypothesis = Hypothesis(site.name, "time", "periodic", effect, (*free, "period"), ({},))
-        angle = 2 * np.pi * t / period
+        angle = 2 * np.pi * t / each
         yield Suspect(hypothesis, by[:, None] * np.column_stack([np.sin(angle), np.cos(angle)]), free, 1)
 
 

@@ -239,6 +239,10 @@ class Screening:
             pairs = [(a, b) for a in np.unique(begins) for b in np.unique(ends) if 0 <= a < b - 1 and b <= count]
         return best
 
+    def swing(self, site: Site, period: float | None = None) -> Screened | None:
+        """The wave at a site that explains most, or that of a `period` [s]; None where none can be."""
+        return max(self._swings(site, period), key=lambda s: s.gain, default=None)
+
     def _is_sharp(self, site: str, by: FloatArray, switch: Switch) -> bool:
         """Whether the record tells the switch from a slow course: what wanders is not switched."""
         slow = self._rest(self._response.respond(site, (by * switch.slow(len(by)))[:, None]))
@@ -251,9 +255,9 @@ class Screening:
         steps = (np.arange(count)[:, None] >= edges[None, :]) * by[:, None]
         return best_switch(self._rest(self._response.respond(site, steps)), edges, self._left, count)
 
-    def _swings(self, site: Site) -> list[Screened]:
+    def _swings(self, site: Site, period: float | None = None) -> list[Screened]:
         record = self._response.record
-        group = list(periodic(site, self._values[site.name], record.time[1:], record.dt))
+        group = list(periodic(site, self._values[site.name], record.time[1:], record.dt, period))
         return self._regressions(site.name, group) if group else []
 
     def _regressions(self, site: str, group: list[Suspect]) -> list[Screened]:

@@ -14,3 +14,8 @@ LARGEST_CLASS = 3
 """Most members of a class for each effect: more say too little."""
 ONE_CAUSE = "One cause that acts at several places looks like that, and the catalogue has none"
 """Why several changes with one course are not told: an opinion on one of their sites alone would be none on that."""
+
+
+def in_seconds(period: float) -> str:
+    """A period as it is read: `3990`, `12.4`."""
+    return f"{period:.0f}" if period >= 100 else f"{period:.3g}"

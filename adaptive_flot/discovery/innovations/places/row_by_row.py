@@ -2,12 +2,13 @@
 
 A probe that shows 15 % less for an hour, and fresh water that nobody measures, look alike to a model that has a site
 for the first alone. Their edges differ: what a sensor shows changes at once, and a basin takes its time. So before an
-event is told, one is tried at each further place, at its times and at times of its own. A cause of the whole record is
-compared with a constant change there.
+event is told, one is tried at each further place, at its times and at times of its own. What swings is compared with a
+wave there, and another cause of the whole record with a constant change.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -24,7 +25,7 @@ from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
-from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME, in_seconds
 from adaptive_flot.greybox.scope import Site
 
 
@@ -52,8 +53,9 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     places = [
         s for s in further_sites(further.model) if not any(is_same_part(search.model, s.name, site) for site in sites)
     ]
+    period = _period_of(search, told.best, left_out)
     screening = further.screening(rest, [s.name for s in places])
-    found = further.all_with(rest, [s for site in places for s in _at(screening, site, event)])
+    found = further.all_with(rest, [s for site in places for s in _at(screening, site, left_out, period)])
     changes = ((e, *change_at(further, e)) for e in found)
     possible = (e for e, at, by in changes if is_possible(search.model, search.record, at, by, screening.seen(at)))
     rivals = sorted(possible, key=lambda e: -e.criterion)
@@ -102,25 +104,40 @@ def best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
     return list(kept.values())
 
 
-def _at(screening: Screening, site: Site, event: Hypothesis | None) -> Sequence[Screened]:
-    if event is None:
+def _at(screening: Screening, site: Site, told: Hypothesis, period: float) -> Sequence[Screened]:
+    """What may act at a further site as what is told does at its own; `period` [s] is that of what swings."""
+    if told.kind == "periodic":
+        found = [screening.swing(site, period)]
+    elif told.kind == "ramp":
+        found = [screening.ramp(site)]
+    elif told.kind in EVENTS:
+        found = [*screening.at_times_of(told, site), screening.switch(site)]
+    else:
         return screening.constant(site)
-    if event.kind == "ramp":
-        own = screening.ramp(site)
-        return [own] if own is not None else []
-    own = screening.switch(site)
-    return [*screening.at_times_of(event, site), *([own] if own is not None else [])]
+    return [s for s in found if s is not None]
+
+
+def _period_of(search: Search, explanation: Explanation, h: Hypothesis) -> float:
+    """The fitted period of an effect that swings [s]; NaN of any other."""
+    if h.kind != "periodic":
+        return float("nan")
+    model = search.model_of(explanation)
+    return float(model.parameters[model.index("parameters", h.effect.parameter("period"))].value)
 
 
 def change_at(further: Search, explanation: Explanation) -> tuple[str, float]:
-    """The place of an explanation, and its amount there."""
+    """The place of an explanation, and its amount there; the amplitude of what swings."""
     h, model = explanation.hypotheses[-1], further.model_of(explanation)
-    return h.site, float(model.parameters[model.index("parameters", h.effect.parameter("amplitude"))].value)
+    names = ("sine", "cosine") if h.kind == "periodic" else ("amplitude",)
+    sizes = [float(model.parameters[model.index("parameters", h.effect.parameter(n))].value) for n in names]
+    return h.site, math.hypot(*sizes) if len(sizes) > 1 else sizes[0]
 
 
 def words_at(further: Search, explanation: Explanation) -> str:
     """In words what acts where and when; how much, where the constants are known by which a rate is measured."""
     h, (place, amount) = explanation.hypotheses[-1], change_at(further, explanation)
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
+    if h.kind == "periodic":
+        when = f"up and down every {in_seconds(_period_of(further, explanation, h))} s"
     measured = further.known is not None and not further.known.up_to_a_factor()
     return change_in_words(further.model, place, amount, when, measured)
