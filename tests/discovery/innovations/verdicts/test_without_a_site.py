@@ -56,13 +56,19 @@ def basin() -> Model:
     )
 
 
-def record(seed: int, *, fresh: float = 0.0, probe: float = 1.0, on: slice = ON) -> Dataset:
-    """Salt that is taken out by unmeasured fresh water [g/s], or a probe that shows a share of what is there."""
+def record(
+    seed: int, *, fresh: float = 0.0, probe: float = 1.0, on: slice = ON, period: float = float("inf")
+) -> Dataset:
+    """Salt that is taken out by unmeasured fresh water [g/s], or a probe that shows a share of what is there.
+
+    The water may come and go in a wave of a `period` [s].
+    """
     rng = np.random.default_rng(seed)
     flow = np.repeat(rng.uniform(8.0, 16.0, ROWS // 20), 20)
     feed = np.repeat(rng.uniform(2.0, 4.0, ROWS // 30), 30)
     taken, shows = np.zeros(ROWS), np.ones(ROWS)
     taken[on], shows[on] = fresh, probe
+    taken *= np.cos(2 * np.pi * DT * np.arange(ROWS) / period)
     salt, seen = 3.0, np.zeros(ROWS)
     for k in range(ROWS):
         seen[k] = shows[k] * salt + NOISE * rng.normal()
@@ -89,6 +95,17 @@ def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
     assert kept.why.startswith("as if something takes from the balance of salt (")
     begins, ends = (float(t) for t in kept.why.split("(")[1].split(" s)")[0].split("-"))
     assert abs(begins - 2000.0) < 100.0 and abs(ends - 4000.0) < 100.0
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+def test_water_that_comes_and_goes_is_no_part_that_swings(seed: int) -> None:
+    """Heat of 300 W, up and down, that nobody counts was told as the wall of a cold room."""
+    search, base, told = judged(record(seed, fresh=8.0, on=slice(None), period=500.0))
+    assert [h.kind for h in told.effects] == ["periodic"], "without the rule a part swings"
+    kept = unless_without_a_site(search, base, told)
+    said = kept.why if kept.beside is None else f"as if {kept.beside.words}"
+    assert kept.word == "abstain" or kept.beside is not None
+    assert re.search(r"something (adds|takes) .*the balance of salt \(up and down every (49\d|50\d) s\)", said), said
 
 
 @pytest.mark.parametrize("seed", [2])
