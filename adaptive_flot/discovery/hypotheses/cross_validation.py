@@ -202,8 +202,7 @@ def test_on_stretches(model: Model, rows: Rows, fitted: Fitted, *, hold_constant
 
 def _fitted_elsewhere(fitter: JointFitter, whole: JointFit, hold_constants: bool) -> JointFit:
     if hold_constants:
-        zeros = np.zeros((len(whole.jacobian), len(whole.unknowns) - len(whole.coefficients)))
-        return fitter.fit(whole.unknowns, most=FOLD_EVALUATIONS, shared=zeros)
+        return fitter.fit_coefficients(whole.unknowns, most=FOLD_EVALUATIONS)
     start = fitter.unknowns.inside(whole.unknowns + _step(fitter, whole))
     return fitter.fit(start, most=FOLD_EVALUATIONS, shared=_masked(fitter, whole))
 

@@ -184,6 +184,27 @@ class JointFitter:
             ).x  # fmt: skip
         return self.result(z, slopes(z) if len(z) else np.empty((0, 0)))
 
+    def fit_coefficients(self, z: FloatArray, *, most: int = MOST_EVALUATIONS) -> JointFit:
+        """Fit the coefficients alone; constants and initial states stay as they are.
+
+        They are no unknowns of the search, then. With derivatives of nothing for them, a trust region asks each step to
+        be as long as it allows (Moré 1978), and no step near the solution is ever short enough.
+        """
+        u = self.unknowns
+        q, rest = u.q, z[u.q :]
+
+        def residuals(c: FloatArray) -> FloatArray:
+            whole = np.concatenate([c, rest])
+            return self._residuals(whole, self.errors(whole))
+
+        def slopes(c: FloatArray) -> FloatArray:
+            return self.jacobian(np.concatenate([c, rest]), q)
+
+        c = least_squares(
+            residuals, u.off_bounds(z)[:q], slopes, (u.lower[:q], u.upper[:q]), loss=self._criterion, max_nfev=most, ftol=1e-4, xtol=1e-5,
+        ).x  # fmt: skip
+        return self.result(np.concatenate([c, rest]), np.empty((0, 0)))
+
     def fit_from_afar(self, z: FloatArray) -> JointFit:
         """Fit everything from a start that may be far off, and go on as long as the criterion falls.
 
