@@ -25,6 +25,7 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.filter.thinning import is_short_since_reference
+from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
@@ -137,6 +138,10 @@ def _row_by_row(
             return None
         if on_sites.word != told.word and NO_SITE in on_sites.why:
             compared = with_words_without_a_site(compared, told, on_sites.why)
+        elif on_sites.word != told.word and compared.verdict.word == "abstain":
+            # one more than a class may hold: what it would have been, and when, is where to look
+            note = f"With process noise {on_sites.why}. {told_in_words(search, told)}"
+            compared = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, note)))
         told = unless_hardly_off(on_sites)
         with_it = compared
         if _has_event(told):

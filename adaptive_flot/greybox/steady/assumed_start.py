@@ -56,7 +56,7 @@ def wrong_start(
         return ()
     said = _told(model, record, state, steady)
     return (
-        "a start at rest was assumed, and the record does not start so: its start was fitted"
+        "a start at rest was assumed, and what was fitted does not start so: its start was fitted, too"
         f"{f' ({said})' if said else ''}, and nothing need be done; {REMEDY}",
     )
 

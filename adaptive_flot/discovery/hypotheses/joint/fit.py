@@ -201,7 +201,8 @@ class JointFitter:
             return self.jacobian(np.concatenate([c, rest]), q)
 
         c = least_squares(
-            residuals, u.off_bounds(z)[:q], slopes, (u.lower[:q], u.upper[:q]), loss=self._criterion, max_nfev=most, ftol=1e-4, xtol=1e-5,
+            residuals, u.off_bounds(z)[:q], slopes, (u.lower[:q], u.upper[:q]), loss=self._criterion,
+            max_nfev=most, ftol=1e-4, xtol=1e-5,
         ).x  # fmt: skip
         return self.result(np.concatenate([c, rest]), np.empty((0, 0)))
 

@@ -172,3 +172,17 @@ def test_the_comparison_alone_tells_a_balance_from_the_sites(monkeypatch: pytest
     )
     monkeypatch.setattr(procedure, "unless_without_a_site", lambda c, rows, blocks, null, judged, *_: judged)
     assert compare(basin(), [new], [old]).verdict.word == "named"
+
+
+def test_what_would_be_too_large_a_class_is_told_in_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pump that gave less and less was among three parts, and a place would have been the fourth: all was lost."""
+    why = "3 parts explain it about as well, or it is as if something takes salt"
+    monkeypatch.setattr(
+        changes,
+        "unless_without_a_site",
+        lambda search, base, told: replace(told, word="abstain", certain=(), open=(), why=why),
+    )
+    found = find_changes(basin(), [record(12, probe=0.85)], [record(2)]).verdict
+    (note,) = (n for n in found.notes if n.startswith(f"With process noise {why}."))
+    assert found.word == "abstain" and "Probe is " in note or "Probe shows " in note
+    assert not found.effects
