@@ -15,12 +15,13 @@ from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.searched_change import AT_NOISE
+from adaptive_flot.greybox.effects import Effect
 
 MUCH_LEFT = 4.0
 """An error so many times that of the reference, with what is told, is much: then it stands in for something else."""
-EVENT_LEFT = 2.5
-"""The same of an event: before it the plant is that of the reference, and so are its errors after it. Of twelve right
-names of other processes the most left 1.4 times. Coolant that came warmer, told as less of it, left 2.9 times."""
+ONE_CHANGE_LEFT = 2.5
+"""The same of one change in time: nothing repeats it, and after it errors are those of the reference again. Of
+twelve right names of other processes the most left 1.4 times. Coolant that came warmer, told as less, left 2.9."""
 
 
 def leaves_more(verdict: Verdict) -> bool:
@@ -74,7 +75,7 @@ def unless_much_is_left(compared: Comparison) -> Comparison:
 
     A name by the output of which it leaves the most: another part may explain that, too. A class, which says less, by
     the geometric mean of after / usual over the outputs; but no output may be twice as far above as one of a name. That
-    of an event must come nearer (EVENT_LEFT).
+    of one change in time must come nearer (ONE_CHANGE_LEFT). What comes and goes is confirmed at each of its times.
     """
     verdict = compared.verdict
     left = {c.output: c.after / c.noise for c in verdict.error if c.noise > 0 and c.after > 0}
@@ -82,12 +83,17 @@ def unless_much_is_left(compared: Comparison) -> Comparison:
         return compared
     logs = np.log(list(left.values()))
     most_of_all = float(np.max(logs)) - (np.log(2.0) if verdict.word == "class" else 0.0)
-    begins = bool(verdict.effects) and all(e.effect.driver == "time" for e in verdict.effects)
-    if max(most_of_all, float(np.mean(logs))) <= np.log(EVENT_LEFT if begins else MUCH_LEFT):
+    once = bool(verdict.effects) and all(_changes_once(e.effect) for e in verdict.effects)
+    if max(most_of_all, float(np.mean(logs))) <= np.log(ONE_CHANGE_LEFT if once else MUCH_LEFT):
         return compared
     most = max(left, key=lambda name: left[name])
     why = f"with it the error of {most.replace('_', ' ')} is still {left[most]:.1f} times that of the reference"
     return taken_back(compared, f"{why}, so it may stand in for something else")
+
+
+def _changes_once(effect: Effect) -> bool:
+    """Whether an effect is one change in time, at once or gradually, and no spells."""
+    return effect.driver == "time" and float(effect.settings.get("count", 1.0)) == 1.0
 
 
 def unless_more_than_noise(compared: Comparison) -> Comparison:

@@ -29,7 +29,7 @@ def test_a_lost_row_is_a_row_without_a_measurement() -> None:
     )
 
 
-@given(st.sets(st.integers(1, 198), min_size=1, max_size=20))
+@given(st.sets(st.integers(1, 198), min_size=1, max_size=15))
 @settings(max_examples=50, deadline=None)
 def test_what_is_put_back_is_what_was_lost(lost: set[int]) -> None:
     """Every row that is there stays as it is, and the times are those of the whole record, or it is split as ever."""

@@ -32,7 +32,7 @@ def verdict(
     h = SimpleNamespace(site="valve", driver="own_value", label="valve leaks")
     best = SimpleNamespace(hypotheses=(h,), criterion=10.0, fit=SimpleNamespace(rows=np.zeros(50)))
     told: Any = SimpleNamespace(
-        word="named", effects=(h,), open=(), best=best, sites=frozenset(["valve"]), why="", beside=None
+        word="named", effects=(h,), certain=(), open=(), best=best, sites=frozenset(["valve"]), why="", beside=None
     )  # fmt: skip
     monkeypatch.setattr(asking, "_free_run", lambda *a: fit)
     monkeypatch.setattr(asking, "report_errors", lambda *a: (free,))

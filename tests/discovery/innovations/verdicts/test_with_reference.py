@@ -130,11 +130,18 @@ def test_a_name_that_leaves_four_times_the_error_of_the_reference_is_not_told(
 
 
 @pytest.mark.parametrize(
-    ("driver", "left", "word"), [("time", 2.4, "named"), ("time", 2.9, "abstain"), ("load", 2.9, "named")]
+    ("driver", "spells", "left", "word"),
+    [("time", 1, 2.4, "named"), ("time", 1, 2.9, "abstain"), ("time", 3, 2.9, "named"), ("load", 1, 2.9, "named")],
 )
-def test_an_event_comes_nearer_to_the_errors_of_the_reference(driver: str, left: float, word: str) -> None:
-    """Coolant that came 8 K warmer was named as 21 % less of it: the temperature stayed 2.9 times as far off."""
-    effect = Effect("cooling", driver, "shift", {"amplitude": -0.2})
+def test_one_change_comes_nearer_to_the_errors_of_the_reference(
+    driver: str, spells: int, left: float, word: str
+) -> None:
+    """Coolant that came 8 K warmer was named as 21 % less of it: the temperature stayed 2.9 times as far off.
+
+    A lid that is opened again and again leaves as much, and is confirmed each time.
+    """
+    settings = {"count": float(spells), "width": 1.0} if driver == "time" else {}
+    effect = Effect("cooling", driver, "switch" if settings else "shift", {"amplitude": -0.2}, settings)
     error = (OutputChange("temperature", "K", 15.0, left, 1.0, (0.5, 0.9)),)
     verdict = Verdict("named", "Cooling is 21 % smaller.", (NamedEffect(effect, "", {}, ()),), (), error, "fresh")
     compared: Any = Compared(verdict)
