@@ -93,7 +93,7 @@ def unless_much_is_left(compared: Comparison) -> Comparison:
 
 def _changes_once(effect: Effect) -> bool:
     """Whether an effect is one change in time, at once or gradually, and no spells."""
-    return effect.driver == "time" and float(effect.settings.get("count", 1.0)) == 1.0
+    return effect.driver == "time" and effect.settings.get("count", 1.0) == 1.0
 
 
 def unless_more_than_noise(compared: Comparison) -> Comparison:
