@@ -53,7 +53,7 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     places = [
         s for s in further_sites(further.model) if not any(is_same_part(search.model, s.name, site) for site in sites)
     ]
-    period = _period_of(search, told.best, left_out)
+    period = search.coefficient(told.best, left_out, "period") if left_out.kind == "periodic" else None
     screening = further.screening(rest, [s.name for s in places])
     found = further.all_with(rest, [s for site in places for s in _at(screening, site, left_out, period)])
     changes = ((e, *change_at(further, e)) for e in found)
@@ -104,7 +104,7 @@ def best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
     return list(kept.values())
 
 
-def _at(screening: Screening, site: Site, told: Hypothesis, period: float) -> Sequence[Screened]:
+def _at(screening: Screening, site: Site, told: Hypothesis, period: float | None) -> Sequence[Screened]:
     """What may act at a further site as what is told does at its own; `period` [s] is that of what swings."""
     if told.kind == "periodic":
         found = [screening.swing(site, period)]
@@ -117,20 +117,12 @@ def _at(screening: Screening, site: Site, told: Hypothesis, period: float) -> Se
     return [s for s in found if s is not None]
 
 
-def _period_of(search: Search, explanation: Explanation, h: Hypothesis) -> float:
-    """The fitted period of an effect that swings [s]; NaN of any other."""
-    if h.kind != "periodic":
-        return float("nan")
-    model = search.model_of(explanation)
-    return float(model.parameters[model.index("parameters", h.effect.parameter("period"))].value)
-
-
 def change_at(further: Search, explanation: Explanation) -> tuple[str, float]:
     """The place of an explanation, and its amount there; the amplitude of what swings."""
-    h, model = explanation.hypotheses[-1], further.model_of(explanation)
-    names = ("sine", "cosine") if h.kind == "periodic" else ("amplitude",)
-    sizes = [float(model.parameters[model.index("parameters", h.effect.parameter(n))].value) for n in names]
-    return h.site, math.hypot(*sizes) if len(sizes) > 1 else sizes[0]
+    h = explanation.hypotheses[-1]
+    if h.kind == "periodic":
+        return h.site, math.hypot(*(further.coefficient(explanation, h, n) for n in ("sine", "cosine")))
+    return h.site, further.coefficient(explanation, h, "amplitude")
 
 
 def words_at(further: Search, explanation: Explanation) -> str:
@@ -138,6 +130,6 @@ def words_at(further: Search, explanation: Explanation) -> str:
     h, (place, amount) = explanation.hypotheses[-1], change_at(further, explanation)
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
     if h.kind == "periodic":
-        when = f"up and down every {in_seconds(_period_of(further, explanation, h))} s"
+        when = f"up and down every {in_seconds(further.coefficient(explanation, h, 'period'))} s"
     measured = further.known is not None and not further.known.up_to_a_factor()
     return change_in_words(further.model, place, amount, when, measured)

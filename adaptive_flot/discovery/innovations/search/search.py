@@ -84,6 +84,11 @@ class Search:
         p = explanation.fit.p
         return model.with_parameters({q.name: float(v) for q, v in zip(model.parameters, p, strict=True)})
 
+    def coefficient(self, explanation: Explanation, h: Hypothesis, name: str) -> float:
+        """A fitted coefficient of one of its effects."""
+        model = self.model_of(explanation)
+        return float(model.parameters[model.index("parameters", h.effect.parameter(name))].value)
+
     def started(self, explanation: Explanation, h: Hypothesis) -> Hypothesis:
         """One of its effects with the fitted coefficients to start from, for a fit of another kind."""
         model = self.model_of(explanation)
