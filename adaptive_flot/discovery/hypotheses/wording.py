@@ -10,10 +10,13 @@ from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.results.words import in_seconds
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.quantities import ARBITRARY_ZERO
 
 MOST_TIMES = 6
 """Times that a sentence lists at most."""
 NOTHING = "next to nothing"
+PROPORTIONAL = 0.05
+"""A sensor's error in the middle of its range is its share of the value, where it is so close to that."""
 WITHOUT_SIZE = {
     "time": "changes with time",
     "constant": "is off all the time",
@@ -73,6 +76,10 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         verb = "shows" if site.role == "sensor" else "is"
         return f"{name} {verb} {abs(first):.3g}{unit} too {'much' if first > 0 else 'little'}"
     if h.kind == "span":
+        middle = h.effect.settings["middle"]
+        if site.unit not in ARBITRARY_ZERO and _is_proportional(values["offset"], values["slope"], middle):
+            much = "much" if values["slope"] > 0 else "little"
+            return f"{name} shows {abs(100 * values['slope']):.2g} % too {much}"
         return (
             f"{name} is wrongly calibrated: {values['offset']:+.3g}{unit} in the middle of its range, "
             f"and a span {_factor(float(np.log(max(1 + values['slope'], 1e-9))))}"
@@ -95,6 +102,12 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         more = f"{abs(change):.3g}{unit} {'more' if change > 0 else 'less'}"
         return f"{name} depends on {driver}: {more} at {driver} {high:.3g} than at {low:.3g}"
     return f"{name} depends on {driver}: {_compared(change, f'{driver} {high:.3g}', f'{low:.3g}')}"
+
+
+def _is_proportional(offset: float, slope: float, middle: object) -> bool:
+    """Whether an error of a span, and that in the middle of the range, are one share of the value."""
+    there = slope * float(middle)  # type: ignore[arg-type]
+    return there != 0.0 and abs(offset - there) <= PROPORTIONAL * abs(there)
 
 
 def _at_its_end(value: float, h: Hypothesis) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.wording import words_of
-from adaptive_flot.greybox import Effect
+from adaptive_flot.greybox import Effect, Model, Quantity, Scope
 from tests.discovery.hypotheses.tank import tank
 
 
@@ -57,3 +57,44 @@ def test_one_interval_is_not_said_to_be_switched(begins: tuple[float, ...], said
     effect = Effect("heat_loss", "time", "switch", times, {"count": float(len(begins)), "width": 2.0})
     found = Hypothesis("heat_loss", "time", "switch", effect, ("amplitude",), ())
     assert words_of(tank(), found, lambda name: float(np.log(0.93))) == said
+
+
+@pytest.mark.parametrize(
+    ("unit", "offset", "slope", "said"),
+    [
+        ("m3/s", -3.0, -0.3, "gauge shows 30 % too little"),
+        ("m3/s", 1.02, 0.1, "gauge shows 10 % too much"),
+        (
+            "m3/s",
+            -2.0,
+            -0.3,
+            "gauge is wrongly calibrated: -2 m3/s in the middle of its range, and a span 30 % smaller",
+        ),
+        (
+            "m3/s",
+            0.0,
+            -0.3,
+            "gauge is wrongly calibrated: +0 m3/s in the middle of its range, and a span 30 % smaller",
+        ),
+        (
+            "K",
+            -3.0,
+            -0.3,
+            "gauge is wrongly calibrated: -3 K in the middle of its range, and a span 30 % smaller",
+        ),
+    ],
+)
+def test_a_gauge_that_errs_by_one_share_is_told_so(unit: str, offset: float, slope: float, said: str) -> None:
+    """The middle of its range is 10. A share of a temperature means nothing."""
+
+    def equations(m: Scope) -> None:
+        m.derivative("x", m.input("u"))
+        m.output("seen", m.site("gauge", m.state("x"), "sensor", "offset", unit=unit))
+
+    quantities = ((Quantity(name, unit, ""),) for name in ("x", "u", "seen"))
+    states, inputs, outputs = quantities
+    model = Model("any", states, inputs, (), outputs, equations)
+    effect = Effect("gauge", "own_value", "span", {}, {"middle": 10.0})
+    found = Hypothesis("gauge", "own_value", "span", effect, ("offset", "slope"), ({},))
+    value = dict(zip(found.parameters, (offset, slope), strict=True))
+    assert words_of(model, found, value.__getitem__) == said

@@ -11,9 +11,14 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
+from adaptive_flot.discovery.results import OutputChange, Verdict
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
-from adaptive_flot.discovery.since_reference.searched_change import with_constants_held, with_searched_effect
+from adaptive_flot.discovery.since_reference.searched_change import (
+    tells_more,
+    with_constants_held,
+    with_searched_effect,
+)
 from adaptive_flot.discovery.verdict.words.wording import since_reference
 from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.tank import record, tank
@@ -144,6 +149,28 @@ def test_what_the_reference_lacks_too_is_not_told_as_a_change() -> None:
     old = replace(before.calibration, rows=before.rows, fit=before.null.fit)
     found = replace(before, calibration=old)
     assert searched(found) is found
+
+
+@pytest.mark.parametrize(
+    ("said", "found", "more"),
+    [
+        ((1.0, 1.7, 1.1), (1.0, 1.0, 1.1), True),  # nothing is missing any more
+        ((1.0, 1.7, 1.1), (1.0, 1.4, 1.1), False),  # hardly less
+        ((1.0, 1.7, 1.1), (1.6, 1.0, 1.1), False),  # something else is missing now
+        ((1.0, 1.4, 1.1), (1.0, 1.0, 1.1), False),  # nothing was
+        ((2.0, 2.0, 2.0), (1.5, 1.5, 1.5), True),  # all are smaller
+    ],
+)
+def test_what_is_told_gives_way_where_it_leaves_something_missing(
+    said: tuple[float, ...], found: tuple[float, ...], more: bool
+) -> None:
+    """A gas slip that is 45 % larger left the tails at 1.7 times its usual error; one that follows the air left 1.0."""
+
+    def verdict(left: tuple[float, ...]) -> Verdict:
+        error = tuple(OutputChange(f"output {k}", "-", 9.0, after, 1.0, (0.5, 0.9)) for k, after in enumerate(left))
+        return Verdict("named", "", error=error)
+
+    assert tells_more(verdict(said), verdict(found)) is more
 
 
 def test_constants_of_the_reference_are_held() -> None:
