@@ -38,6 +38,7 @@ from adaptive_flot.discovery.stages import (
     tell_background,
 )
 from adaptive_flot.discovery.test_design.signals import input_range
+from adaptive_flot.discovery.verdict.at_noise import none_at_noise
 from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, conclude
 from adaptive_flot.discovery.verdict.heed_report import heed_report
 from adaptive_flot.discovery.verdict.one_course import heed_one_course
@@ -201,6 +202,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     second_opinion,
     compare_with_what_has_no_site,
     with_constants_alike,
+    none_at_noise,
     plan_test,
     conclude,
 )

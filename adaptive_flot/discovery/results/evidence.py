@@ -126,8 +126,9 @@ class OutputChange:
 
     @property
     def words(self) -> str:
-        """Output and errors before and after, without a unit where there is none."""
-        return f"{self.output} {self.before:.3g} -> {self.after:.3g} {self.unit}".rstrip(" -")
+        """Output and errors before and after, once where they are the same, without a unit where there is none."""
+        changed = "" if self.after == self.before else f" -> {self.after:.3g}"
+        return f"{self.output} {self.before:.3g}{changed} {self.unit}".rstrip(" -")
 
 
 @dataclass(frozen=True)

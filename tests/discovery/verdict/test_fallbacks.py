@@ -21,7 +21,7 @@ from tests.discovery.background.test_uncertain_constants import jacketed_tank, r
 FAN, TIME, SENSOR = ("heat_loss", "fan_speed"), ("heat_loss", "time"), ("thermometer", "time")
 
 
-def _undecided(found: Discovery, *sets: tuple[tuple[str, str], ...]) -> State:
+def left_open(found: Discovery, *sets: tuple[tuple[str, str], ...]) -> State:
     """The stages of a discovery as if these sets had come near, the best of them first, and none had been told."""
     assert found.search is not None and found.problem is not None
     first = found.search.rounds[0]
@@ -41,7 +41,7 @@ def _undecided(found: Discovery, *sets: tuple[tuple[str, str], ...]) -> State:
 
 
 def test_the_effect_that_every_set_has_is_named_where_the_rest_is_not_told(draught: Discovery) -> None:
-    state = _undecided(draught, (FAN, SENSOR), (FAN, ("heating", "time")))
+    state = left_open(draught, (FAN, SENSOR), (FAN, ("heating", "time")))
     told = tell_part_alone(state)
     assert told.judged.word == "named" and told.judged.best is not None
     assert told.judged.best.names == (FAN,)
@@ -51,12 +51,12 @@ def test_the_effect_that_every_set_has_is_named_where_the_rest_is_not_told(draug
 
 
 def test_an_effect_is_not_certain_that_a_set_goes_without(draught: Discovery) -> None:
-    state = _undecided(draught, (FAN, SENSOR), (("heating", "fan_speed"), SENSOR))
+    state = left_open(draught, (FAN, SENSOR), (("heating", "fan_speed"), SENSOR))
     assert tell_part_alone(state) is state
 
 
 def test_an_effect_is_not_certain_that_another_single_one_comes_near(draught: Discovery) -> None:
-    state = _undecided(draught, (FAN, SENSOR))
+    state = left_open(draught, (FAN, SENSOR))
     problem, result = state.searched
     first = result.rounds[0]
     best = first.alternatives[0]
@@ -67,14 +67,14 @@ def test_an_effect_is_not_certain_that_another_single_one_comes_near(draught: Di
 
 
 def test_nothing_is_taken_from_what_is_told(draught: Discovery) -> None:
-    state = _undecided(draught, (FAN, SENSOR))
+    state = left_open(draught, (FAN, SENSOR))
     named = replace(state, judgement=replace(state.judged, word="named"))
     assert tell_part_alone(named) is named and try_as_course(named) is named
 
 
 def test_report_rows_that_contradict_the_effect_have_their_veto(draught: Discovery) -> None:
     """On these rows alone the model as it is, is right."""
-    state = _undecided(draught, (FAN, SENSOR))
+    state = left_open(draught, (FAN, SENSOR))
     problem, (before, _) = state.known_problem, state.refitted
     rows = problem.rows("report")
     outputs = problem.record.outputs.copy()
