@@ -78,6 +78,8 @@ def with_searched_effect(
     error = tuple(replace(c, noise=max(usual[c.output], c.noise)) for c in verdict.error if c.output in usual)
     if all(c.before <= ABOVE_USUAL * c.noise for c in error) or hardly_explained(error, ABOVE_USUAL, MOST):
         return compared
+    if _follows_time(verdict) and any(c.after > ABOVE_USUAL * c.noise for c in error):
+        return compared
     if compared.verdict.word in WITH_A_NAME and not tells_more(compared.verdict, verdict):
         return compared
     after = fit_all_rows(found.model, compared.rows, None, calibration.constants, None)
@@ -105,6 +107,14 @@ def with_constants_held(model: Model, names: tuple[str, ...]) -> Model:
     """The model with constants that are not fitted."""
     parameters = tuple(replace(p, role="fixed") if p.name in names else p for p in model.parameters)
     return replace(model, parameters=parameters)
+
+
+def _follows_time(found: Verdict) -> bool:
+    """Whether a free curve in time is told, which bends to what any cause has done, and has no excuse for what is left.
+
+    A burst rate that follows the solids was told as one that fell, and air recovery kept 1.8 times its usual error.
+    """
+    return any(e.effect.driver == "time" and e.effect.family.is_curve for e in found.effects)
 
 
 def tells_more(said: Verdict, found: Verdict) -> bool:

@@ -6,13 +6,14 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
-from adaptive_flot.discovery.results import OutputChange, Verdict
-from adaptive_flot.discovery.since_reference import changes
+from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
+from adaptive_flot.discovery.since_reference import changes, searched_change
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.discovery.since_reference.searched_change import (
     tells_more,
@@ -171,6 +172,25 @@ def test_what_is_told_gives_way_where_it_leaves_something_missing(
         return Verdict("named", "", error=error)
 
     assert tells_more(verdict(said), verdict(found)) is more
+
+
+@pytest.mark.parametrize(("left", "told"), [(1.3, True), (1.8, False)])
+def test_a_curve_in_time_is_told_only_where_it_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch, left: float, told: bool
+) -> None:
+    """It bends to what any cause has done: a burst rate that follows the solids was told as one that fell."""
+    before = compared()
+    curve = Effect("heat_loss", "time", "curve", {"value_1": 0.0, "value_2": 0.3}, {"knots": (0.0, 9000.0)})
+    c, usual = before.rows.columns[0], float(before.calibration.usual.overall[0])
+    output = before.calibration.model.outputs[c]
+    error = (OutputChange(output.name, output.unit, 9 * usual, left * usual, usual, (0.5, 0.9)),)
+    effects = (NamedEffect(curve, "", {}, ()),)
+    found = SimpleNamespace(
+        verdict=Verdict("named", "Loss grew.", effects, error=error),
+        model=before.calibration.model.with_effects([curve]),
+    )
+    monkeypatch.setattr(searched_change, "discover", lambda *given, **named: found)
+    assert (searched(before).verdict.word == "named") is told
 
 
 def test_constants_of_the_reference_are_held() -> None:
