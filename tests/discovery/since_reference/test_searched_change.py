@@ -185,10 +185,8 @@ def test_a_curve_in_time_is_told_only_where_it_leaves_nothing(
     output = before.calibration.model.outputs[c]
     error = (OutputChange(output.name, output.unit, 9 * usual, left * usual, usual, (0.5, 0.9)),)
     effects = (NamedEffect(curve, "", {}, ()),)
-    found = SimpleNamespace(
-        verdict=Verdict("named", "Loss grew.", effects, error=error),
-        model=before.calibration.model.with_effects([curve]),
-    )
+    grew = Verdict("named", "Loss grew.", effects, error=error)
+    found = SimpleNamespace(verdict=grew, model=before.calibration.model.with_effects([curve]))
     monkeypatch.setattr(searched_change, "discover", lambda *given, **named: found)
     assert (searched(before).verdict.word == "named") is told
 

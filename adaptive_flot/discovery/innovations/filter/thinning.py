@@ -14,7 +14,9 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 
 MOST_WORK = 5_000
-"""Rows times states up to which a record is taken as it is. With half of the rows, friction in three spells was lost."""
+"""Rows times states up to which a record is taken as it is: half the rows lost friction that came in three spells."""
+THINNED_TO = 4_000
+"""Rows times states that are left of a longer record at most."""
 MOST_SINCE_REFERENCE = 9_000
 """The same where a reference tells the constants: half a minute on two cores."""
 USUAL_STATES = 3
@@ -44,7 +46,7 @@ def searchable(record: Dataset, model: Model) -> Dataset | None:
     """The record, thinned where it is long; None where too few rows would be left for so many states."""
     if is_short(record, model):
         return record
-    thin = thinned(record, -(-len(record) * len(model.states) // MOST_WORK))
+    thin = thinned(record, -(-len(record) * len(model.states) // THINNED_TO))
     return thin if len(thin) >= FEWEST_ROWS else None
 
 
