@@ -15,9 +15,10 @@ from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_wi
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
+from adaptive_flot.discovery.record.robust import AT_NOISE, without_memory
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.discovery.results.words import WITH_A_NAME
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import FloatArray, Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
@@ -32,21 +33,27 @@ MOVED = 1.0
 JUDGED_ON = "free run, fresh stretches"
 
 
-AT_NOISE = 1.1
-"""Errors of at most so many times the noise from row to row are that noise."""
-
-
 def unless_at_noise(judged: Judged, rows: Rows, null: Tested) -> Judged:
     """The judgement: `none` where no hypothesis stands, and errors are the noise from row to row of these records.
 
     Else it would be said that something is missing where nothing is left to explain. With a reference, an instrument
-    may have become noisier.
+    may have become noisier, and outliers make errors larger, see `without_memory`.
     """
     if judged.word != "abstain" or judged.best is not None:
         return judged
-    if (rms(rows, null.fresh) > AT_NOISE * noise_floor(rows.records, rows.columns)).any():
+    above = rms(rows, null.fresh) > AT_NOISE * noise_floor(rows.records, rows.columns)
+    errors = [np.where(c[:, None], e, np.nan) for e, c in zip(null.fresh, rows.counted, strict=True)]
+    seen = [r.outputs[:, list(rows.columns)] for r in rows.records]
+    noise = without_memory(_one_below_the_other(errors), _one_below_the_other(seen))
+    if (above & ~noise).any():
         return judged
     return replace(judged, word="none", why="their errors are those of the noise from row to row")
+
+
+def _one_below_the_other(series: Sequence[FloatArray]) -> FloatArray:
+    """Series (N, m) as one, with a row of NaN after each."""
+    gap = np.full((1, series[0].shape[1]), np.nan)
+    return np.concatenate([part for one in series for part in (one, gap)])
 
 
 def verdict_of(

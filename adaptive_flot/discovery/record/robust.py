@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from adaptive_flot.greybox.model import FloatArray
@@ -41,6 +42,43 @@ def noise_by_differences(series: FloatArray) -> FloatArray:
         robust = 1.4826 * float(np.median(np.abs(d)))
         deviations.append((robust or float(np.sqrt(np.mean(d**2)))) / np.sqrt(2))
     return np.array(deviations)
+
+
+def memory(series: FloatArray) -> FloatArray:
+    """Correlation of neighbours in each column (m,) of a series (N, m) about zero; zero of fewer than two such pairs.
+
+    Over the rows k where both are there::
+
+        sum_k e_k e_(k+1) / sqrt(sum_k e_k^2  sum_k e_(k+1)^2)
+    """
+    found = np.zeros(series.shape[1])
+    for j, e in enumerate(series.T):
+        both = np.isfinite(e[:-1]) & np.isfinite(e[1:])
+        one, other = e[:-1][both], e[1:][both]
+        size = np.sqrt(np.sum(one**2) * np.sum(other**2))
+        if len(one) > 1 and size > 0:
+            found[j] = np.sum(one * other) / size
+    return found
+
+
+AT_NOISE = 1.1
+"""Errors of at most so many times the noise from row to row are that noise."""
+GOES_ON = 0.5
+"""What is measured goes on from row to row where neighbours have such a correlation; so would what a model lacks."""
+
+
+def without_memory(errors: FloatArray, measured: FloatArray) -> NDArray[np.bool_]:
+    """Whether errors (N, m) of what is `measured` (N, m) are noise from row to row, however large single ones are (m,).
+
+    Errors of a correlation r between neighbours are sqrt(1 / (1 - r)) times the noise that their differences show, and
+    that is at most AT_NOISE. What is measured must go on from row to row: else what a model lacks has no memory
+    either. Outliers, and noise that is larger where the value is, make errors larger than the usual difference between
+    rows, and have none.
+    """
+    with np.errstate(all="ignore"):
+        about = measured - np.nanmean(measured, axis=0)
+    found: NDArray[np.bool_] = (memory(about) > GOES_ON) & (memory(errors) <= 1 - 1 / AT_NOISE**2)
+    return found
 
 
 def clipped_std(e: FloatArray, *, robust: bool = True) -> float:

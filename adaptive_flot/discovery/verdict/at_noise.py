@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
+from adaptive_flot.discovery.record.robust import AT_NOISE, memory, without_memory
 from adaptive_flot.discovery.results import Judgement, State
-from adaptive_flot.greybox.model import FloatArray
 
-AT_NOISE = 1.1
-"""Errors of at most so many times the noise from row to row are that noise."""
 MOST_MEMORY = 0.3
 """Correlation of neighbouring errors above which they are no noise from row to row.
 
 Differences of what moves fast look like noise. A model that lacks this errs with a memory.
 """
 
-FEWEST_PAIRS = 3
-EXPLAINED = "The model explains the record: its errors are the noise from row to row"
+EXPLAINED = "The model explains the record: its errors are the noise from row to row."
 
 
 def none_at_noise(state: State) -> State:
@@ -31,9 +26,13 @@ def none_at_noise(state: State) -> State:
     problem = state.known_problem
     if judgement.word != "abstain" or not state.error or any(c.noise <= 0 for c in state.error):
         return state
-    times = max(c.before / c.noise for c in state.error)
-    if times > AT_NOISE or np.max(memory(before.residual(problem))) > MOST_MEMORY:
-        return state
+    errors = before.residual(problem)
+    small, noise = memory(errors) <= MOST_MEMORY, without_memory(errors, problem.measured)
+    names = [before.model.outputs[c].name for c in problem.columns]
+    for c in state.error:
+        j = names.index(c.output)
+        if not noise[j] and not (small[j] and c.before <= AT_NOISE * c.noise):
+            return state
     notes = state.screening.notes
     if judgement.best is not None:
         best = " with ".join(f"{site} by {driver}" for site, driver in judgement.best.names).replace("_", " ")
@@ -45,24 +44,7 @@ def none_at_noise(state: State) -> State:
         after=before,
         screening=replace(state.screening, notes=notes),
         error=tuple(replace(c, after=c.before, reduction95=(0.0, 0.0)) for c in state.error),
-        sentence=f"{EXPLAINED} ({times:.2g} times at most).",
+        sentence=EXPLAINED,
         contradiction="",
         certain="",
     )
-
-
-def memory(errors: FloatArray) -> FloatArray:
-    """Correlation of neighbouring errors of each output (m,); zero where fewer than three pairs have both.
-
-    With errors e of mean zero at the rows k where both are there::
-
-        sum_k e_k e_(k+1) / sqrt(sum_k e_k^2  sum_k e_(k+1)^2)
-    """
-    found = np.zeros(errors.shape[1])
-    for j, e in enumerate(errors.T):
-        one, other = e[:-1], e[1:]
-        both = np.isfinite(one) & np.isfinite(other)
-        size = np.sqrt(np.sum(one[both] ** 2) * np.sum(other[both] ** 2))
-        if np.count_nonzero(both) >= FEWEST_PAIRS and size > 0:
-            found[j] = np.sum(one[both] * other[both]) / size
-    return found
