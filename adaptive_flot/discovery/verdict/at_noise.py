@@ -13,7 +13,7 @@ MOST_MEMORY = 0.3
 Differences of what moves fast look like noise. A model that lacks this errs with a memory.
 """
 
-EXPLAINED = "The model explains the record: its errors are the noise from row to row."
+EXPLAINED = "The model explains the record: its errors are the noise from row to row, and what else is there is too small to tell."
 
 
 def none_at_noise(state: State) -> State:
