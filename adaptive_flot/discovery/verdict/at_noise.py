@@ -13,7 +13,10 @@ MOST_MEMORY = 0.3
 Differences of what moves fast look like noise. A model that lacks this errs with a memory.
 """
 
-EXPLAINED = "The model explains the record: its errors are the noise from row to row, and what else is there is too small to tell."
+EXPLAINED = (
+    "The model explains the record: its errors are the noise from row to row. "
+    "What else is there is too small to be told."
+)
 
 
 def none_at_noise(state: State) -> State:
