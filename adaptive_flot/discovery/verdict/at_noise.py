@@ -26,7 +26,7 @@ def none_at_noise(state: State) -> State:
     told to lack something by that. A note says by how much the best one is better.
     """
     judgement, (before, _) = state.judged, state.refitted
-    problem = state.known_problem
+    problem, result = state.searched
     if judgement.word != "abstain" or not state.error or any(c.noise <= 0 for c in state.error):
         return state
     errors = before.residual(problem)
@@ -44,6 +44,7 @@ def none_at_noise(state: State) -> State:
     return replace(
         state,
         judgement=Judgement("none", None, (), judgement.rivals, judgement.margin),
+        search=replace(result, verification=None),  # of what was not told
         after=before,
         screening=replace(state.screening, notes=notes),
         error=tuple(replace(c, after=c.before, reduction95=(0.0, 0.0)) for c in state.error),
