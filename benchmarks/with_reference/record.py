@@ -58,7 +58,7 @@ def make_record(seed: int, k: int) -> Record:
             else:
                 spec, sized = sized_effect(experiment, entry, rng, last=False)
                 done, size = sized.done, sized.removable
-                hidden = [Hidden.of(spec, size)]
+                hidden = [_with_other_names(Hidden.of(spec, size))]
         except (SimulationError, DrawError) as error:
             problems.append(str(error))
             continue
@@ -74,6 +74,14 @@ def make_record(seed: int, k: int) -> Record:
         }
         return Record(_table(done), _table(reference), answer)
     raise RuntimeError(f"record {k} of seed {seed}: {'; '.join(problems)}")
+
+
+def _with_other_names(hidden: Hidden) -> Hidden:
+    """A sensor that errs by a share of its value, or along a bent line, depends on its own value."""
+    if not hidden.site.endswith("_sensor") or hidden.shape not in ("gain", "bent"):
+        return hidden
+    other = {"site": hidden.site, "driver": "own_value", "reason": f"{hidden.shape} is an error of the span"}
+    return replace(hidden, accepted=[*hidden.accepted, other])
 
 
 def _table(done: SimulatedRun) -> pd.DataFrame:

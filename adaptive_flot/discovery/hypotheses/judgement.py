@@ -27,6 +27,8 @@ Word = Literal["none", "named", "class", "abstain", "insufficient"]
 CHANCE = 0.95
 """Quantile of what chance does."""
 DRAWS = 999
+NORMAL95 = 1.96
+"""Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 FEWEST_ROWS = 60
 """Rows that the new records, and the reference, must have."""
 
@@ -108,7 +110,7 @@ class Judged:
         sites: dict[str, list[Tested]] = {}
         for t in filter(None, (self.best, *self.alike)):
             sites.setdefault(_site(t), []).append(t)
-        return tuple(min(each, key=_costs) for each in sites.values())
+        return tuple(map(_first, sites.values()))
 
 
 def _costs(tested: Tested) -> float:
@@ -120,11 +122,33 @@ def _costs(tested: Tested) -> float:
     return tested.total + LEAST_DIFFERENCE * len(tested.fit.coefficients)
 
 
+def _first(same: Sequence[Tested]) -> Tested:
+    """Of hypotheses at one site the one that is told: the best one, or an offset where an error of the span is idle."""
+    found = min(same, key=_costs)
+    offset = (t for t in same if t.hypothesis is not None and t.hypothesis.kind == "offset")
+    return next(offset, found) if has_idle_span(found) else found
+
+
+def has_idle_span(tested: Tested) -> bool:
+    """Whether an error of a span has a slope of less than its uncertainty, so that it is an offset.
+
+    An analyser that showed 0.024 too much was told as one with "a span 0 % smaller".
+    """
+    h = tested.hypothesis
+    if h is None or h.kind != "span":
+        return False
+    value = dict(zip(h.free, map(tested.fit.value, h.parameters), strict=True))
+    spread = dict(zip(h.free, tested.spread, strict=True))
+    return bool(abs(value["slope"]) <= NORMAL95 * spread["slope"])
+
+
 def _simplest(best: Tested, alike: tuple[Tested, ...]) -> tuple[Tested, tuple[Tested, ...]]:
-    """Of what is not told apart, the hypothesis at the best one's site that puts it best comes first."""
+    """Of what is not told apart, the hypothesis at the best one's site that is told comes first; see `_first`."""
     same = [best, *(t for t in alike if _site(t) == _site(best))]
-    first = min(same, key=_costs)
-    return first, tuple(t for t in (best, *alike) if t is not first)
+    first = _first(same)
+    offset = first.hypothesis is not None and first.hypothesis.kind == "offset"
+    others = (t for t in (best, *alike) if t is not first)
+    return first, tuple(t for t in others if not (offset and t in same and has_idle_span(t)))
 
 
 def _site(tested: Tested) -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
@@ -42,12 +43,16 @@ def unless_at_noise(judged: Judged, rows: Rows, null: Tested) -> Judged:
     if judged.word != "abstain" or judged.best is not None:
         return judged
     above = rms(rows, null.fresh) > AT_NOISE * noise_floor(rows.records, rows.columns)
-    errors = [np.where(c[:, None], e, np.nan) for e, c in zip(null.fresh, rows.counted, strict=True)]
-    seen = [r.outputs[:, list(rows.columns)] for r in rows.records]
-    noise = without_memory(_one_below_the_other(errors), _one_below_the_other(seen))
-    if (above & ~noise).any():
+    if (above & ~are_noise(rows, null.fresh)).any():
         return judged
     return replace(judged, word="none", why="their errors are those of the noise from row to row")
+
+
+def are_noise(rows: Rows, errors: Sequence[FloatArray]) -> NDArray[np.bool_]:
+    """Whether errors of each record (N, m) are noise without a memory, output by output (m,); see `without_memory`."""
+    counted = [np.where(c[:, None], e, np.nan) for e, c in zip(errors, rows.counted, strict=True)]
+    seen = [r.outputs[:, list(rows.columns)] for r in rows.records]
+    return without_memory(_one_below_the_other(counted), _one_below_the_other(seen))
 
 
 def _one_below_the_other(series: Sequence[FloatArray]) -> FloatArray:
@@ -80,6 +85,7 @@ def verdict_of(
         for r in [reduction(blocks, j, null.fresh, after.fresh)]
     )  # fmt: skip
     effects = _effects(model, judged) if told else ()
+    more = [c for c, noise in zip(error, are_noise(rows, after.fresh), strict=True) if not noise]
     members = tuple((t.hypothesis.site, t.hypothesis.driver) for t in judged.parts if t.hypothesis)
     members += ((judged.beside.place, judged.beside.driver),) if told and judged.beside else ()
     word = "class" if judged.word == "named" and judged.beside else judged.word
@@ -95,7 +101,7 @@ def verdict_of(
         parameters=labels,
         notes=(
             *_stopped(model, rows),
-            *(what_is_left(error, reference) if told else ()),
+            *(what_is_left(more, reference) if told else ()),
             *(_moved(calibration, after) if reference else ()),
             *(_by_a_factor(calibration, model, judged) if reference and told else ()),
         ),

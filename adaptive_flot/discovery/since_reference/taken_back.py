@@ -9,7 +9,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE, are_noise
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.results import Verdict
@@ -99,11 +99,17 @@ def _changes_once(effect: Effect) -> bool:
 def unless_more_than_noise(compared: Comparison) -> Comparison:
     """The comparison, its name or class taken back where the model is right on its reference, and not with the name.
 
-    Where it errs by no more than noise there, the right name leaves no more in any output.
+    Where it errs by no more than noise there, the right name leaves no more in any output. Errors without a memory are
+    noise, however large: a meter is noisier where more flows.
     """
     verdict = compared.verdict
     level = _noise_where_right(compared)
     left = {c.output: c.after / level[c.output] for c in verdict.error if c.output in level}
+    if compared.judged.best is not None:
+        noise = are_noise(compared.rows, compared.judged.best.fresh)
+        outputs = compared.calibration.model.outputs
+        at = {outputs[c].name for c, is_noise in zip(compared.rows.columns, noise, strict=True) if is_noise}
+        left = {name: times for name, times in left.items() if name not in at}
     most = max(left, key=lambda name: left[name], default="")
     if verdict.word not in WITH_A_NAME or not most or left[most] <= FAR_ABOVE:
         return compared

@@ -20,6 +20,7 @@ from adaptive_flot.discovery.since_reference.searched_change import (
     with_constants_held,
     with_searched_effect,
 )
+from adaptive_flot.discovery.since_reference.taken_back import unless_more_than_noise
 from adaptive_flot.discovery.verdict.words.wording import since_reference
 from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.tank import record, tank
@@ -189,6 +190,22 @@ def test_a_curve_in_time_is_told_only_where_it_leaves_nothing(
     found = SimpleNamespace(verdict=grew, model=before.calibration.model.with_effects([curve]))
     monkeypatch.setattr(searched_change, "discover", lambda *given, **named: found)
     assert (searched(before).verdict.word == "named") is told
+
+
+@pytest.mark.parametrize(("memory", "word"), [(0.0, "named"), (0.8, "abstain")])
+def test_noise_that_is_larger_than_on_the_reference_takes_no_name_back(memory: float, word: str) -> None:
+    """A feed flow that was 8 % larger was taken back for a meter that is noisier where more flows."""
+    before = compared()
+    usual = before.calibration.usual.overall
+    size = 3.0 * usual[0]
+    white = np.random.default_rng(0).standard_normal((len(before.rows.records[0]) + 1, len(usual)))
+    errors = size * (white[1:] + memory * white[:-1])
+    output = before.calibration.model.outputs[before.rows.columns[0]]
+    error = (OutputChange(output.name, output.unit, 9 * size, size, float(usual[0]), (0.5, 0.9)),)
+    named = replace(before.verdict, word="named", error=error)
+    judged = replace(before.judged, word="named", best=replace(before.null, fresh=(errors,)))
+    found = unless_more_than_noise(replace(before, verdict=named, judged=judged))
+    assert found.verdict.word == word, found.verdict.reason
 
 
 def test_constants_of_the_reference_are_held() -> None:
