@@ -20,15 +20,13 @@ from adaptive_flot.discovery.hypotheses.comparison import (
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
 from adaptive_flot.discovery.hypotheses.plausible import at_edge
-from adaptive_flot.discovery.results.words import LARGEST_CLASS
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, NORMAL95
 from adaptive_flot.greybox.model import FloatArray
 
 Word = Literal["none", "named", "class", "abstain", "insufficient"]
 CHANCE = 0.95
 """Quantile of what chance does."""
 DRAWS = 999
-NORMAL95 = 1.96
-"""Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 FEWEST_ROWS = 60
 """Rows that the new records, and the reference, must have."""
 

@@ -18,7 +18,7 @@ from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.record.robust import AT_NOISE, without_memory
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
-from adaptive_flot.discovery.results.words import WITH_A_NAME
+from adaptive_flot.discovery.results.words import NORMAL95, WITH_A_NAME
 from adaptive_flot.greybox.model import FloatArray, Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
@@ -85,7 +85,8 @@ def verdict_of(
         for r in [reduction(blocks, j, null.fresh, after.fresh)]
     )  # fmt: skip
     effects = _effects(model, judged) if told else ()
-    more = [c for c, noise in zip(error, are_noise(rows, after.fresh), strict=True) if not noise]
+    noise = are_noise(rows, after.fresh) if told else [True] * len(error)
+    more = [c for c, is_noise in zip(error, noise, strict=True) if not is_noise]
     members = tuple((t.hypothesis.site, t.hypothesis.driver) for t in judged.parts if t.hypothesis)
     members += ((judged.beside.place, judged.beside.driver),) if told and judged.beside else ()
     word = "class" if judged.word == "named" and judged.beside else judged.word
@@ -101,7 +102,7 @@ def verdict_of(
         parameters=labels,
         notes=(
             *_stopped(model, rows),
-            *(what_is_left(more, reference) if told else ()),
+            *what_is_left(more, reference),
             *(_moved(calibration, after) if reference else ()),
             *(_by_a_factor(calibration, model, judged) if reference and told else ()),
         ),
@@ -173,7 +174,7 @@ def _effects(model: Model, judged: Judged) -> tuple[NamedEffect, ...]:
     fitted = model_with(model, best.hypothesis).with_parameters(best.fit.values)
     effect = fitted.fitted_effects()[-1]
     interval = {
-        c: (effect.coefficients[c] - 1.96 * float(s), effect.coefficients[c] + 1.96 * float(s))
+        c: (effect.coefficients[c] - NORMAL95 * float(s), effect.coefficients[c] + NORMAL95 * float(s))
         for c, s in zip(best.hypothesis.free, best.spread, strict=True)
     }
     others = tuple(

@@ -12,6 +12,8 @@ TELLING: tuple[Word, ...] = (*WITH_A_NAME, "unnamed")
 """Words that tell an effect, with or without its name."""
 LARGEST_CLASS = 3
 """Most members of a class for each effect: more say too little."""
+NORMAL95 = 1.96
+"""Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 ONE_CAUSE = "One cause that acts at several places looks like that, and the catalogue has none"
 """Why several changes with one course are not told: an opinion on one of their sites alone would be none on that."""
 

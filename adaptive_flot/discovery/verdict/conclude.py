@@ -16,7 +16,7 @@ from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
-from adaptive_flot.discovery.results.words import TELLING
+from adaptive_flot.discovery.results.words import NORMAL95, TELLING
 from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.report_veto import much_better
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve, effect_curves
@@ -36,8 +36,6 @@ from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
-NORMAL95 = 1.96
-"""Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 TIMES = (CoefficientRole.TIME_CONSTANT, CoefficientRole.DEAD_TIME, CoefficientRole.DURATION, CoefficientRole.PERIOD)
 FAR = 50.0
 """Logarithm of a factor that says nothing any more."""
