@@ -245,6 +245,12 @@ class Model(Checks, Described):
         """
         return self.max_step_s / (STEPS_BESIDE_A_TURN if any(e.family.turns for e in self.effects) else 1)
 
+    @property
+    def jumping(self) -> tuple[bool, ...]:
+        """Of each state whether it moves at once at times: its decay rate is then far larger than one over the step."""
+        jumping = tuple(f"{e.label}." for e in self.effects if e.family.jumps)
+        return tuple(name.startswith(jumping) for name in self.names("states"))
+
     def derived(self, builder: Callable[[Model, *Arguments], Made], *arguments: *Arguments) -> Made:
         """Return `builder(model, *arguments)`, made once for this model and those of other parameter values.
 

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.variant import Variant
 from adaptive_flot.discovery.record.screening import LEAST_RANGE
+from adaptive_flot.discovery.record.slip_jump import asked_from_outside, jumping
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.scope import Site
@@ -101,6 +102,12 @@ def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
             profile = TimeProfile(site.name, dragged(v, band) - v, True)
             effect = Effect(site.name, "lag", "stiction", settings=settings)
             yield Variant(effect, (profile,), ("amplitude",), (("band", band),))
+    if site.name not in asked_from_outside(responses.fit.model):
+        return
+    effect = Effect(site.name, "lag", "slip_jump", settings={"scale": scale, "interval_s": responses.problem.record.dt})
+    for band, position in jumping(v):
+        profile = TimeProfile(site.name, position - v, True)
+        yield Variant(effect, (profile,), ("amplitude",), (("band", band),))
 
 
 def dragged(v: FloatArray, band: float) -> FloatArray:

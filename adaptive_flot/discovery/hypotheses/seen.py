@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
+from adaptive_flot.discovery.record.seen import Seen, seen_along
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.stepper import Stepper
 
-Seen = dict[str, FloatArray]
 AT_REST = 1e-3
 """A part is at rest where it gives less than this share of the most that it gives."""
 
@@ -34,18 +33,3 @@ def seen_values(model: Model, fit: JointFit, records: Sequence[Dataset]) -> tupl
     each = [seen_along(fitted, record, x0) for record, x0 in zip(records, fit.initial, strict=True)]
     sites, drivers = ({k: np.concatenate([one[i][k] for one in each]) for k in each[0][i]} for i in (0, 1))
     return sites, drivers
-
-
-def seen_along(model: Model, record: Dataset, x0: FloatArray) -> tuple[Seen, Seen]:
-    """Values at every site, and of every driver, along a free run from a state (nx,); each (N,)."""
-    p, n = model.parameter_values, len(record)
-    run = Stepper(model, record.dt).simulate(x0, record.inputs[1:], p, float(record.time[0]))
-    states, table = np.vstack([x0, run.states]), np.tile(p[:, None], n)
-    drivers = dict(zip(model.names("inputs"), record.inputs.T, strict=True))
-    drivers |= dict(zip(model.names("states"), states.T, strict=True))
-    if model.signals:
-        drivers |= {s.name: np.concatenate([[c[0]], c]) for s, c in zip(model.signals, run.signals.T, strict=True)}
-    wanted = model.drivers or (*model.names("inputs"), *model.names("states"))
-    z = model.ode.map(n)(record.time, states.T, record.inputs.T, table)[3]
-    at = np.array(model.site_values.map(n)(record.time, states.T, record.inputs.T, table, z))
-    return {s.name: at[i] for i, s in enumerate(model.sites)}, {d: drivers[d] for d in wanted if d in drivers}

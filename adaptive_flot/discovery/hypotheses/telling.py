@@ -17,6 +17,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.record.robust import AT_NOISE, without_memory
+from adaptive_flot.discovery.record.slip_jump import band_ranges
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.discovery.results.words import NORMAL95, WITH_A_NAME
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -84,7 +85,7 @@ def verdict_of(
         for j, c in enumerate(rows.columns)
         for r in [reduction(blocks, j, null.fresh, after.fresh)]
     )  # fmt: skip
-    effects = _effects(model, judged) if told else ()
+    effects = _effects(model, judged, rows) if told else ()
     noise = are_noise(rows, after.fresh) if told else [True] * len(error)
     more = [c for c, is_noise in zip(error, noise, strict=True) if not is_noise]
     members = tuple((t.hypothesis.site, t.hypothesis.driver) for t in judged.parts if t.hypothesis)
@@ -168,7 +169,7 @@ def what_is_left(error: Sequence[OutputChange], reference: bool) -> tuple[str, .
     return (f"More is missing: the error that is left is still above {than}: {', '.join(left)}.",)
 
 
-def _effects(model: Model, judged: Judged) -> tuple[NamedEffect, ...]:
+def _effects(model: Model, judged: Judged, rows: Rows) -> tuple[NamedEffect, ...]:
     best = judged.best
     assert best is not None and best.hypothesis is not None  # a verdict that tells has a best hypothesis
     fitted = model_with(model, best.hypothesis).with_parameters(best.fit.values)
@@ -177,6 +178,7 @@ def _effects(model: Model, judged: Judged) -> tuple[NamedEffect, ...]:
         c: (effect.coefficients[c] - NORMAL95 * float(s), effect.coefficients[c] + NORMAL95 * float(s))
         for c, s in zip(best.hypothesis.free, best.spread, strict=True)
     }
+    interval |= band_ranges(fitted, effect, rows.records, best.fit.initial)
     others = tuple(
         (t.hypothesis.site, t.hypothesis.driver, t.total - best.total, float("nan"))
         for t in judged.alike

@@ -66,7 +66,8 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.kind == "periodic":
         return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], mode, unit)}"
     if h.kind == "hysteresis":
-        return f"{name} sticks: it stays until it is asked to move by more than {first:.3g}{unit}"
+        then = ", and then jumps to what is asked" if h.effect.family.jumps else ""
+        return f"{name} sticks: it stays until it is asked to move by more than {first:.3g}{unit}{then}"
     if h.kind == "dead zone":
         centre = h.effect.coefficients["centre"]
         return f"{name} does not move within {first:.3g}{unit} of {centre:.3g}{unit}"

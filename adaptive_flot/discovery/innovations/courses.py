@@ -23,6 +23,7 @@ from adaptive_flot.discovery.hypotheses.families import (
     turned,
 )
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
+from adaptive_flot.discovery.record.slip_jump import asked_from_outside, jumping
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -137,6 +138,8 @@ def _at_site(
         if site.role == "actuator":
             yield from _leaks_or_ends(site.name, v)
             yield from _sticks_or_idles(site.name, v, size, dt)
+            if site.name in asked_from_outside(model):
+                yield from _jumps(site.name, v, size, dt)
         if site.role == "sensor":
             yield from _wrong_scale(site.name, v)
     yield from _constant(site, v, spread)
@@ -209,6 +212,15 @@ def _sticks_or_idles(site: str, v: FloatArray, size: float, dt: float) -> Iterat
             yield _fixed(
                 Effect(site, "own_value", "dead_zone", told), "dead zone", "half_width", course, MATTERS * spread
             )
+
+
+def _jumps(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
+    """An actuator that stays until it is asked to move by more than a band, and then jumps to what is asked."""
+    spread = float(np.ptp(v))
+    for band, position in jumping(v):
+        told, settings = {"amplitude": 1.0, "band": band}, {"scale": size or 1.0, "interval_s": dt}
+        effect = Effect(site, "lag", "slip_jump", told, settings)
+        yield _fixed(effect, "hysteresis", "band", position - v, MATTERS * spread)
 
 
 def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:

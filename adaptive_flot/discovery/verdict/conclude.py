@@ -15,6 +15,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
+from adaptive_flot.discovery.record.slip_jump import band_ranges
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
 from adaptive_flot.discovery.results.words import NORMAL95, TELLING
 from adaptive_flot.discovery.verdict.locate import locate
@@ -63,7 +64,7 @@ def conclude(state: State) -> Verdict:
     final = before if judgement.best is None else after
     labels = [after.model.parameters[after.model.index("parameters", n)].label for n in problem.adapted]
     values = final.values[: len(labels)]
-    effects = _effects(judgement, state.told) if tells else ()
+    effects = _effects(judgement, state.told, problem.record) if tells else ()
     if any(e.effect.family.memory for e in effects):
         effects = with_ranges(effects, _curves(state, effects), problem.record.dt)
     drift = drift_words(judgement, after) if judgement.word == "none" and judgement.best else ()
@@ -165,7 +166,7 @@ def _common_nuisance_note(result: SearchResult) -> tuple[str, ...]:
     return (f"close alternatives were compared with what they leave, {site} by {driver}, added to each",)
 
 
-def _effects(judgement: Judgement, told: Fit) -> tuple[NamedEffect, ...]:
+def _effects(judgement: Judgement, told: Fit, record: Dataset) -> tuple[NamedEffect, ...]:
     """Each effect that is told, with Wald intervals and the names that could replace it."""
     assert judgement.best is not None  # a verdict that names has an alternative
     model, best = told.model, judgement.best
@@ -186,6 +187,7 @@ def _effects(judgement: Judgement, told: Fit) -> tuple[NamedEffect, ...]:
             for c in effect.terms
             if c.name in effect.coefficients and effect.parameter(c.name) in std
         }
+        interval |= band_ranges(model, effect, (record,), (told.initial_state,))
         named.append(NamedEffect(effect, _meaning(model, effect), interval, others))
     return tuple(named)
 

@@ -164,6 +164,8 @@ class Form:
         Whether an event is over after its duration: the value is then where it would have been without it.
     is_beside
         Whether it is a flow of its own beside the value: what other effects do to the value does not touch it.
+    jumps
+        Whether a state of its own moves at once: its decay rate is then far larger than one over the step.
     """
 
     name: str
@@ -180,6 +182,7 @@ class Form:
     abrupt: bool = False
     passes: bool = False
     is_beside: bool = False
+    jumps: bool = False
 
     @property
     def is_constant(self) -> bool:

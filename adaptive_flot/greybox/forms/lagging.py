@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log
+
 import casadi as ca
 
 from adaptive_flot.greybox.forms.form import (
@@ -91,6 +93,35 @@ def _stiction(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) 
     return value + c["amplitude"] * (x * scale - value)
 
 
+JUMP_EDGE = 0.002
+"""Rounding of the band of a part that jumps, as a share of it: at 0.99 of the band it creeps by 1 % a row."""
+JUMPS_BY = 1000.0
+"""Rate of a jump, times the sampling interval: a step that is a fiftieth of it leaves nothing of the jump (2e-9)."""
+
+
+def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    """A part at x that stays where it is until v is more than the band away, and then jumps to v.
+
+    The one-parameter model of stiction: Stenman, Gustafsson & Forsman, *A segmentation-based method for detection of
+    stiction in control valves*, Int. J. Adapt. Control Signal Process. 17 (2003). Here, with the interval h::
+
+        dx/dt = r (v - x),   r = JUMPS_BY m / h,   m = 1 / (1 + JUMPS_BY exp((band - |v - x|) / (JUMP_EDGE band)))
+
+    so that r = 1 / h at the band. What acts is x + m (v - x): the jump at its beginning. The rate is handed to the step
+    as that of a fast state. The step holds it at its value at the start, so that x is at v when it ends, although the
+    slope is nothing on the way.
+    """
+    del driver
+    scale, interval = number(s, "scale"), number(s, "interval_s")
+    x = m.own_state("position")
+    error, band = value / scale - x, c["band"] / scale
+    beyond = (ca.fabs(error) - band) / (JUMP_EDGE * (band + 1e-9)) - log(JUMPS_BY)
+    moves = (1 + ca.tanh(beyond / 2)) / 2
+    rate = JUMPS_BY / interval * moves
+    m.own_derivative("position", rate * error, decay=-rate)
+    return value + c["amplitude"] * ((x + moves * error) * scale - value)
+
+
 def _delay_states(settings: Settings) -> tuple[str, ...]:
     return tuple(f"stage_{k + 1}" for k in range(int(number(settings, "stages"))))
 
@@ -163,6 +194,19 @@ LAGGING_FORMS: tuple[Form, ...] = (
         direct=_stiction,
         states=lambda settings: ("position",),
         abrupt=True,
+    ),
+    Form(
+        "slip_jump",
+        "the value stays until the demand leaves a band, and then jumps to it",
+        FormKind.MEMORY,
+        fixed(BLEND, Coefficient("band", CoefficientRole.BAND, 0.0, 0.0, unit="value")),
+        ("lag",),
+        {"scale": None, "interval_s": 1.0},
+        {"scale": "value", "interval_s": "s"},
+        direct=_slip_jump,
+        states=lambda settings: ("position",),
+        abrupt=True,
+        jumps=True,
     ),
 )
 """Each is switched on by its blend; its times and its band are shapes."""

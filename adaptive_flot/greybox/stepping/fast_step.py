@@ -103,11 +103,13 @@ def fast_step_along(
         """Slope without its linear part."""
         return rates(time, state)[0] - decay * state
 
+    # steps of unknown length may be long, and what jumps decays far within any step
+    far = tuple(jumps or not isinstance(h, float) for jumps in model.jumping)
     end = Moving(x, moved)
     for i in range(substeps):
         start = t + i * h
         slope, _, decay = rates(start, end)
-        w = _weights(decay, h)
+        w = _weights(decay, h, far)
         n1 = slope - decay * end
         halfway = w.half * end
         a = halfway + w.half_slope * n1
@@ -132,31 +134,33 @@ class _Weights:
     last: Moving
 
 
-def _weights(decay: Moving, h: float | ca.SX) -> _Weights:
-    """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6."""
+def _weights(decay: Moving, h: float | ca.SX, far: tuple[bool, ...]) -> _Weights:
+    """Weights for z = decay h; for z = 0 those of the classical Runge-Kutta method: 1, h/2, 1, h/6, h/3, h/6.
+
+    `far` says of each state whether its z may be further from zero than the series allows.
+    """
     n, q = decay.along.shape
-    of_number = isinstance(h, float)
-    values = _weights_of(n, of_number)(h * decay.value, h)
+    values = _weights_of(far)(h * decay.value, h)
     if not q:
         return _Weights(*(Moving(v, ca.SX(n, 0)) for v in values))
     # each weight depends on its own decay rate only: one derivative serves all directions
-    moved = [_scaled(d * h, decay.along) for d in _slopes_of(n, of_number)(h * decay.value, h)]
+    moved = [_scaled(d * h, decay.along) for d in _slopes_of(far)(h * decay.value, h)]
     return _Weights(*(Moving(v, m) for v, m in zip(values, moved, strict=True)))
 
 
 @lru_cache(maxsize=128)
-def _weights_of(n: int, of_number: bool) -> ca.Function:
-    """The weights of n states for a step that is a number, or a symbol; made once, as it is asked for in every step."""
-    z, step = ca.SX.sym("z", n), ca.SX.sym("h")
-    return ca.Function("weights", [z, step], weights(z, step, series_phi(z) if of_number else closed_phi(z)))
+def _weights_of(far: tuple[bool, ...]) -> ca.Function:
+    """The weights of n states; made once, as it is asked for in every step."""
+    z, step = ca.SX.sym("z", len(far)), ca.SX.sym("h")
+    return ca.Function("weights", [z, step], weights(z, step, _phi(z, far)))
 
 
 @lru_cache(maxsize=128)
-def _slopes_of(n: int, of_number: bool) -> ca.Function:
+def _slopes_of(far: tuple[bool, ...]) -> ca.Function:
     """Their derivatives by z."""
-    z, step = ca.SX.sym("z", n), ca.SX.sym("h")
-    factors = weights(z, step, series_phi(z) if of_number else closed_phi(z))
-    return ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(n)) for w in factors])
+    z, step = ca.SX.sym("z", len(far)), ca.SX.sym("h")
+    factors = weights(z, step, _phi(z, far))
+    return ca.Function("weight_slopes", [z, step], [ca.jtimes(w, z, ca.DM.ones(len(far))) for w in factors])
 
 
 Phis = tuple[ca.SX, ca.SX, ca.SX, ca.SX]
@@ -205,6 +209,15 @@ def closed_phi(z: ca.SX) -> Phis:
     near = z > -1
     pairs = zip(series_phi(ca.if_else(near, z, 0.0)), far_phi(ca.if_else(near, -1.0, z)), strict=True)
     first, second, third, halved = (ca.if_else(near, small, large) for small, large in pairs)
+    return first, second, third, halved
+
+
+def _phi(z: ca.SX, far: tuple[bool, ...]) -> Phis:
+    """phi_1 to phi_3 of z (n,) and phi_1 of z / 2: the closed ones where a state may be far, else the series."""
+    if not any(far):
+        return series_phi(z)
+    each = [closed_phi(z[i]) if is_far else series_phi(z[i]) for i, is_far in enumerate(far)]
+    first, second, third, halved = (ca.vertcat(*phis) for phis in zip(*each, strict=True))
     return first, second, third, halved
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from adaptive_flot.discovery.candidates.dynamics import dragged
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.record.slip_jump import jumped
 from adaptive_flot.greybox.data.dataset import Dataset
 from tests.discovery.heated import Truth, heated_tank, moves, tank_record
 
@@ -56,3 +57,16 @@ def test_a_heater_that_sticks_is_late() -> None:
     band = found.effects[0].effect.coefficients["band"]
     assert found.reason.startswith(f"Heating sticks: it moves only where more than {band:.3g} W is asked"), found.reason
     assert found.effects[0].effect.coefficients["band"] == pytest.approx(0.9 * 400.0, rel=0.1)
+
+
+def test_a_heater_that_sticks_and_then_jumps_is_told_with_all_bands_that_draw_its_jumps() -> None:
+    rng = np.random.default_rng(3)
+    asked = 1700.0 + np.repeat(np.clip(np.cumsum(rng.normal(0, 250, 150)), -1200, 1300), 4)
+    found = discover(heated_tank(), _told(asked, jumped(asked, 400.0))).verdict
+    assert found.word == "named"
+    (told,) = found.effects
+    assert (told.effect.site, told.effect.form) == ("heating", "slip_jump")
+    assert "then jumps to what is asked" in found.reason
+    least, largest = told.interval95["band"]
+    assert least <= 0.9 * 400.0 <= largest and least <= told.effect.coefficients["band"] <= largest
+    assert largest < 1.15 * least

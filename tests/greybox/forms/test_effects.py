@@ -31,6 +31,7 @@ SETTINGS: dict[str, dict[str, float | tuple[float, ...]]] = {
     "held": {"scale": 1e-6},
     "delay": {"scale": 1e-6},
     "stiction": {"scale": 1e-6},
+    "slip_jump": {"scale": 1e-6},
 }
 DRIVERS = {"signal": "air_flow"}
 ONCE = "concentrate_flow"  # a site that the equations pass once, so that forms with states may act there

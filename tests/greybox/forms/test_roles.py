@@ -77,7 +77,7 @@ AWAKE = {CoefficientRole.ONSET: 100.0, CoefficientRole.THRESHOLD: 1.0, Coefficie
 AWAKE |= {
     CoefficientRole.FLOOR: 8.0,
     CoefficientRole.POSITION: 2.0,
-    CoefficientRole.BAND: 1.0,
+    CoefficientRole.BAND: 4.0,
     CoefficientRole.PERIOD: 70.0,
 }
 

@@ -22,8 +22,8 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
-from adaptive_flot.discovery.hypotheses.seen import seen_along
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
+from adaptive_flot.discovery.record.seen import seen_along
 from adaptive_flot.discovery.results import Alternative, Judgement, State
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN

@@ -47,9 +47,8 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     if effect.driver == "constant":
         said = f"{name} {_always(site, effect)}"
     elif effect.driver == "lag" and (bands := effect.values(CoefficientRole.BAND)):
-        said = (
-            f"{name} sticks: it moves only where more than {bands[0]:.3g}{_unit(site)} is asked, and stays behind by it"
-        )
+        then = "then jumps to what is asked" if effect.family.jumps else "stays behind by it"
+        said = f"{name} sticks: it moves only where more than {bands[0]:.3g}{_unit(site)} is asked, and {then}"
     elif effect.driver == "lag":
         taus = " and ".join(f"{v:.3g} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
         said = f"{name} answers slowly, with a time constant of {taus}"

@@ -32,7 +32,7 @@ class Kernels:
     rates_entries, ends_entries
         Row and column of each entry of the Jacobians, by rows.
     decays
-        For each state whether it has a decay rate.
+        For each state 0 where it has no decay rate, 1 where that is near zero in every step, 2 where it may be far.
     """
 
     rates: ca.Function
@@ -41,7 +41,7 @@ class Kernels:
     far: ca.Function
     rates_entries: tuple[tuple[int, int], ...]
     ends_entries: tuple[tuple[int, int], ...]
-    decays: tuple[bool, ...]
+    decays: tuple[int, ...]
 
 
 def kernels(model: Model, wrt: tuple[str, ...] | None, fixed_step: bool) -> Kernels:
@@ -94,7 +94,9 @@ def kernels(model: Model, wrt: tuple[str, ...] | None, fixed_step: bool) -> Kern
         far,
         rates_entries,
         ends_entries,
-        tuple(not decay[i].is_zero() for i in range(x.numel())),
+        tuple(
+            0 if decay[i].is_zero() else 1 if fixed_step and not jumps else 2 for i, jumps in enumerate(model.jumping)
+        ),
     )
 
 
@@ -104,9 +106,9 @@ def weight_kernels(fixed_step: bool, derivatives: bool) -> tuple[ca.Function, ca
     z, again, h = (ca.SX.sym(name) for name in ("z", "again", "h"))
 
     def kernel(name: str, phi: Callable[[ca.SX], Phis]) -> ca.Function:
-        values = weights(z, h, phi(z if fixed_step else again))
+        values = weights(z, h, phi(z if fixed_step and name == "near" else again))
         both = ca.vertcat(z, again)
         slopes = [ca.jtimes(w, both, ca.SX.ones(2)) for w in values] if derivatives else []
         return ca.Function(name, [z, h, again], [ca.vertcat(*values, *slopes)], {"cse": True})
 
-    return kernel("near", series_phi), kernel("far", series_phi if fixed_step else far_phi)
+    return kernel("near", series_phi), kernel("far", far_phi)

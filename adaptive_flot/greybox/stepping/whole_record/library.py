@@ -110,7 +110,7 @@ class WholeRecord:
         rate, end = made.rates_entries, made.ends_entries
         jacobians = len(rate), sum(row < self._nx for row, _ in rate), len(end)
         self._sizes = self._nx, nu, self._ny, self._ns, self._np, *jacobians
-        self._tables = _table([*made.decays, False], np.uint8), *_columns(rate), *_columns(end)
+        self._tables = _table([*made.decays, 0], np.uint8), *_columns(rate), *_columns(end)
         own = {name: tape_of(getattr(made, name), _HELD[name]) for name in ("rates", "ends")}
         self._tapes = own | _weight_tapes(dt is not None, wrt is not None)
         self._run = _library()

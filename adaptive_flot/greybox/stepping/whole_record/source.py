@@ -95,7 +95,7 @@ static void step(const Kernels *K, double t, double h, double *restrict x, doubl
     for (int i = 0; i < nx; i++) {
         memset(w[i], 0, sizeof w[i]);
         if (K->decays[i]) {
-            const Tape *weights = h * r[i] > -1. ? &K->near : &K->far;
+            const Tape *weights = K->decays[i] < 2 || h * r[i] > -1. ? &K->near : &K->far;
             *argument(weights, 0) = h * r[i];
             *argument(weights, 1) = h;
             *argument(weights, 2) = h * r[i];
