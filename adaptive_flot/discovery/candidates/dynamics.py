@@ -105,9 +105,9 @@ def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
     if site.name not in asked_from_outside(responses.fit.model):
         return
     effect = Effect(site.name, "lag", "slip_jump", settings={"scale": scale, "interval_s": responses.problem.record.dt})
-    for band, position in jumping(v):
+    for band, rest, position in jumping(v):
         profile = TimeProfile(site.name, position - v, True)
-        yield Variant(effect, (profile,), ("amplitude",), (("band", band),))
+        yield Variant(effect, (profile,), ("amplitude",), (("band", band), ("rest", rest)))
 
 
 def dragged(v: FloatArray, band: float) -> FloatArray:

@@ -67,6 +67,8 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], mode, unit)}"
     if h.kind == "hysteresis":
         then = ", and then jumps to what is asked" if h.effect.family.jumps else ""
+        if rest := values.get("rest"):
+            then = f", and then jumps to within {rest:.3g}{unit} of what is asked"
         return f"{name} sticks: it stays until it is asked to move by more than {first:.3g}{unit}{then}"
     if h.kind == "dead zone":
         centre = h.effect.coefficients["centre"]

@@ -216,11 +216,12 @@ def _sticks_or_idles(site: str, v: FloatArray, size: float, dt: float) -> Iterat
 
 def _jumps(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
     """An actuator that stays until it is asked to move by more than a band, and then jumps to what is asked."""
-    spread = float(np.ptp(v))
-    for band, position in jumping(v):
-        told, settings = {"amplitude": 1.0, "band": band}, {"scale": size or 1.0, "interval_s": dt}
-        effect = Effect(site, "lag", "slip_jump", told, settings)
-        yield _fixed(effect, "hysteresis", "band", position - v, MATTERS * spread)
+    scale, settings = MATTERS * float(np.ptp(v)), {"scale": size or 1.0, "interval_s": dt}
+    for band, rest, position in jumping(v):
+        free = ("band", "rest") if rest else ("band",)
+        effect = Effect(site, "lag", "slip_jump", {"amplitude": 1.0, "band": band, "rest": rest}, settings)
+        hypothesis = Hypothesis(site, "lag", "hysteresis", effect, free, ({},), {}, dict.fromkeys(free, scale))
+        yield Suspect(hypothesis, (position - v)[:, None], (), len(free))
 
 
 def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:

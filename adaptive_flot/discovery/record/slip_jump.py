@@ -19,24 +19,26 @@ from adaptive_flot.greybox.model import FloatArray, Model
 
 BANDS = np.geomspace(0.02, 0.6, 25)
 """Bands that are tried, as shares of the range of what is asked: each is 15 % wider than the last."""
+RESTS = (0.0, 0.4, 0.7)
+"""Rests that are tried, as shares of the band; with a rest as large as the band it would be dragged along."""
 LEAST_JUMPS = 3
 """What jumps less often shows a step or two in time, which says nothing of a band."""
 
 
-def jumped(v: FloatArray, band: float) -> FloatArray:
-    """Position (N,) of what stays until a demand (N,) is more than a band away, and then jumps to it."""
+def jumped(v: FloatArray, band: float, rest: float = 0.0) -> FloatArray:
+    """Position (N,) of what stays until a demand (N,) is more than a band away, and then jumps to it, less a rest."""
     position = np.empty_like(v)
     at = v[0]
     for k, demand in enumerate(v):
         if abs(demand - at) > band:
-            at = demand
+            at = demand - np.copysign(rest, demand - at)
         position[k] = at
     return position
 
 
-def same_jumps(v: FloatArray, band: float) -> tuple[float, float]:
+def same_jumps(v: FloatArray, band: float, rest: float = 0.0) -> tuple[float, float]:
     """Least and largest band with the same positions behind a demand (N,); infinite where it never jumps."""
-    position = jumped(v, band)
+    position = jumped(v, band, rest)
     asked = np.abs(v - np.concatenate([v[:1], position[:-1]]))
     return float(np.max(asked[asked <= band])), float(np.min(asked[asked > band], initial=np.inf))
 
@@ -57,29 +59,29 @@ def _asked_from_outside(model: Model) -> frozenset[str]:
     return frozenset(site.name for i, site in enumerate(model.sites) if i not in rows)
 
 
-def jumping(v: FloatArray) -> Iterator[tuple[float, FloatArray]]:
-    """Yield bands, each in the middle of those with the same positions, and the positions (N,) behind a demand (N,).
+def jumping(v: FloatArray) -> Iterator[tuple[float, float, FloatArray]]:
+    """Yield bands, rests, and the positions (N,) behind a demand (N,).
 
-    Only bands with at least LEAST_JUMPS jumps.
+    Each band is in the middle of those with the same positions. Only bands with at least LEAST_JUMPS jumps.
     """
-    largest = 0.0
-    for band in BANDS * float(np.ptp(v)):
-        if band <= largest:
-            continue
-        least, largest = same_jumps(v, float(band))
-        middle = (least + largest) / 2
-        if not np.isfinite(middle):
-            return
-        position = jumped(v, middle)
-        if np.count_nonzero(np.diff(position)) < LEAST_JUMPS:
-            return
-        yield middle, position
+    for share in RESTS:
+        largest = 0.0
+        for band in BANDS * float(np.ptp(v)):
+            rest = share * float(band)
+            if band <= largest:
+                continue
+            least, largest = same_jumps(v, float(band), rest)
+            middle = (max(least, rest) + largest) / 2
+            position = jumped(v, float(band), rest)
+            if not np.isfinite(middle) or np.count_nonzero(np.diff(position)) < LEAST_JUMPS:
+                break
+            yield middle, rest, position
 
 
 def band_ranges(
     model: Model, effect: Effect, records: Sequence[Dataset], starts: Sequence[FloatArray]
 ) -> dict[str, tuple[float, float]]:
-    """Range of the band of a fitted effect that is a slip jump, by its name; empty for any other effect.
+    """Range of the band of a fitted effect that is a slip jump, with its rest, by its name; empty for any other effect.
 
     Parameters
     ----------
@@ -93,6 +95,7 @@ def band_ranges(
     if not effect.family.jumps:
         return {}
     (name,), (band,) = effect.names(CoefficientRole.BAND), effect.values(CoefficientRole.BAND)
+    (rest,) = effect.values(CoefficientRole.REST) or (0.0,)
     asked = [seen_along(model, record, x0)[0][effect.site] for record, x0 in zip(records, starts, strict=True)]
-    each = [same_jumps(v, band) for v in asked if np.isfinite(v).all()]
+    each = [same_jumps(v, band, rest) for v in asked if np.isfinite(v).all()]
     return {name: (max(low for low, _ in each), min(high for _, high in each))} if each else {}

@@ -40,6 +40,7 @@ class CoefficientRole(Enum):
     THRESHOLD = "value of the driver at which something begins"
     LIMIT = "value that can not be passed"
     BAND = "half the width of a dead band"
+    REST = "what is left of the way when a part has jumped"
     FLOOR = "value that is not gone below"
     POSITION = "value at which a part stays"
     OFFSET = "what is added to the value"

@@ -100,15 +100,18 @@ JUMPS_BY = 1000.0
 
 
 def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
-    """A part at x that stays where it is until v is more than the band away, and then jumps to v.
+    """A part at x that stays where it is until v is more than the band away, and then jumps to v, less a rest.
 
-    The one-parameter model of stiction: Stenman, Gustafsson & Forsman, *A segmentation-based method for detection of
-    stiction in control valves*, Int. J. Adapt. Control Signal Process. 17 (2003). Here, with the interval h::
+    The model of stiction with two parameters: He, Wang, Pottmann & Qin, *A curve fitting method for detecting valve
+    stiction in oscillating control loops*, Ind. Eng. Chem. Res. 46 (2007), with f_s the band and f_d the rest. Without
+    a rest it is that of Stenman, Gustafsson & Forsman, Int. J. Adapt. Control Signal Process. 17 (2003). Here, with the
+    interval h::
 
-        dx/dt = r (v - x),   r = JUMPS_BY m / h,   m = 1 / (1 + JUMPS_BY exp((band - |v - x|) / (JUMP_EDGE band)))
+        dx/dt = r (w - x),   w = v - rest sign(v - x),   r = JUMPS_BY m / h,
+        m = 1 / (1 + JUMPS_BY exp((band - |v - x|) / (JUMP_EDGE band)))
 
-    so that r = 1 / h at the band. What acts is x + m (v - x): the jump at its beginning. The rate is handed to the step
-    as that of a fast state. The step holds it at its value at the start, so that x is at v when it ends, although the
+    so that r = 1 / h at the band. What acts is x + m (w - x): the jump at its beginning. The rate is handed to the step
+    as that of a fast state. The step holds it at its value at the start, so that x is at w when it ends, although the
     slope is nothing on the way.
     """
     del driver
@@ -117,9 +120,9 @@ def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings)
     error, band = value / scale - x, c["band"] / scale
     beyond = (ca.fabs(error) - band) / (JUMP_EDGE * (band + 1e-9)) - log(JUMPS_BY)
     moves = (1 + ca.tanh(beyond / 2)) / 2
-    rate = JUMPS_BY / interval * moves
-    m.own_derivative("position", rate * error, decay=-rate)
-    return value + c["amplitude"] * ((x + moves * error) * scale - value)
+    rate, way = JUMPS_BY / interval * moves, error - c["rest"] / scale * error / (ca.fabs(error) + 1e-12)
+    m.own_derivative("position", rate * way, decay=-rate)
+    return value + c["amplitude"] * ((x + moves * way) * scale - value)
 
 
 def _delay_states(settings: Settings) -> tuple[str, ...]:
@@ -197,9 +200,13 @@ LAGGING_FORMS: tuple[Form, ...] = (
     ),
     Form(
         "slip_jump",
-        "the value stays until the demand leaves a band, and then jumps to it",
+        "the value stays until the demand leaves a band, and then jumps to it, less a rest",
         FormKind.MEMORY,
-        fixed(BLEND, Coefficient("band", CoefficientRole.BAND, 0.0, 0.0, unit="value")),
+        fixed(
+            BLEND,
+            Coefficient("band", CoefficientRole.BAND, 0.0, 0.0, unit="value"),
+            Coefficient("rest", CoefficientRole.REST, 0.0, 0.0, unit="value"),
+        ),
         ("lag",),
         {"scale": None, "interval_s": 1.0},
         {"scale": "value", "interval_s": "s"},

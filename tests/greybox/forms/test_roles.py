@@ -78,6 +78,7 @@ AWAKE |= {
     CoefficientRole.FLOOR: 8.0,
     CoefficientRole.POSITION: 2.0,
     CoefficientRole.BAND: 4.0,
+    CoefficientRole.REST: 0.5,
     CoefficientRole.PERIOD: 70.0,
 }
 

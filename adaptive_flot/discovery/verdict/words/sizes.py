@@ -47,7 +47,8 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     if effect.driver == "constant":
         said = f"{name} {_always(site, effect)}"
     elif effect.driver == "lag" and (bands := effect.values(CoefficientRole.BAND)):
-        then = "then jumps to what is asked" if effect.family.jumps else "stays behind by it"
+        within = f"within {rest:.3g}{_unit(site)} of " if (rest := sum(effect.values(CoefficientRole.REST))) else ""
+        then = f"then jumps to {within}what is asked" if effect.family.jumps else "stays behind by it"
         said = f"{name} sticks: it moves only where more than {bands[0]:.3g}{_unit(site)} is asked, and {then}"
     elif effect.driver == "lag":
         taus = " and ".join(f"{v:.3g} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
