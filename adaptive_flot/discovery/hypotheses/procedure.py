@@ -168,7 +168,7 @@ def compare(
     usual = _usual_losses(calibration) if references else None
     excluded = bool(references) and excluded_by(calibration, null.fit)
     judged, blocks = judge(rows, null, tested, usual, excluded)
-    judged = judged if excluded else unless_at_noise(judged, rows, null)
+    judged = judged if excluded else unless_at_noise(judged, rows, null, calibration if references else None)
     if usual is not None and complete:
         progress("compare with what has no site")
         judged = unless_without_a_site(calibration, rows, blocks, null, judged, usual, base.fit, processes, ends)

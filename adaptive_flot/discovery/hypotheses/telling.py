@@ -7,20 +7,20 @@ from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
+from adaptive_flot.discovery.hypotheses.joint.at_noise import JUST_ABOVE, are_noise, are_usual
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
-from adaptive_flot.discovery.record.robust import AT_NOISE, without_memory
+from adaptive_flot.discovery.record.robust import AT_NOISE
 from adaptive_flot.discovery.record.slip_jump import band_ranges
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.discovery.results.words import NORMAL95, WITH_A_NAME
-from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
@@ -28,38 +28,27 @@ FAR_ABOVE = 2.0
 """An error so many times its usual one is far above it."""
 FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
-JUST_ABOVE = 1.05
-"""Errors of at most so many times those of the reference are told as no larger."""
 MOVED = 1.0
 """A constant is said to have moved from so many of its standard deviations on."""
 JUDGED_ON = "free run, fresh stretches"
 
 
-def unless_at_noise(judged: Judged, rows: Rows, null: Tested) -> Judged:
+def unless_at_noise(judged: Judged, rows: Rows, null: Tested, reference: Calibration | None) -> Judged:
     """The judgement: `none` where no hypothesis stands, and errors are the noise from row to row of these records.
 
-    Else it would be said that something is missing where nothing is left to explain. With a reference, an instrument
-    may have become noisier, and outliers make errors larger, see `without_memory`.
+    Or where they are those of the reference, but for outliers. Else it would be said that something is missing where
+    nothing is left to explain. An instrument may have become noisier, see `without_memory`.
     """
     if judged.word != "abstain" or judged.best is not None:
         return judged
     above = rms(rows, null.fresh) > AT_NOISE * noise_floor(rows.records, rows.columns)
-    if (above & ~are_noise(rows, null.fresh)).any():
-        return judged
-    return replace(judged, word="none", why="their errors are those of the noise from row to row")
-
-
-def are_noise(rows: Rows, errors: Sequence[FloatArray]) -> NDArray[np.bool_]:
-    """Whether errors of each record (N, m) are noise without a memory, output by output (m,); see `without_memory`."""
-    counted = [np.where(c[:, None], e, np.nan) for e, c in zip(errors, rows.counted, strict=True)]
-    seen = [r.outputs[:, list(rows.columns)] for r in rows.records]
-    return without_memory(_one_below_the_other(counted), _one_below_the_other(seen))
-
-
-def _one_below_the_other(series: Sequence[FloatArray]) -> FloatArray:
-    """Series (N, m) as one, with a row of NaN after each."""
-    gap = np.full((1, series[0].shape[1]), np.nan)
-    return np.concatenate([part for one in series for part in (one, gap)])
+    if not (above & ~are_noise(rows, null.fresh)).any():
+        return replace(judged, word="none", why="their errors are those of the noise from row to row")
+    if reference and are_usual(rows, null.fresh, reference.rows, reference.fit.errors).all():
+        return replace(
+            judged, word="none", why="but for single values far off, their errors are those of the reference"
+        )
+    return judged
 
 
 def verdict_of(

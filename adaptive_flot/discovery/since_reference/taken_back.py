@@ -7,9 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from adaptive_flot.discovery.hypotheses.joint.at_noise import are_noise
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
-from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE, are_noise
+from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.results import Verdict
