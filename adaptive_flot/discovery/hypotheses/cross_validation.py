@@ -9,8 +9,9 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.joint.fit import MOST_EVALUATIONS, JointFit, JointFitter
-from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, first_states, stores_at_rest
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, at_rest, first_states
 from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, BoolArray, Rows
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model, Parameter
 
 FOLDS = 5
@@ -145,7 +146,7 @@ def fit_all_rows(
     """
     extended = model_with(model, hypothesis)
     own = hypothesis.parameters if hypothesis else ()
-    initial = [with_effect_states(extended, x) for x in first_states(model, rows.records)]
+    initial = with_effect_states(extended, first_states(model, rows.records), rows.records)
     fitter = JointFitter(extended, rows, constants, own, initial)
     fit = (
         fitter.fit_from_afar(fitter.unknowns.start())
@@ -299,6 +300,9 @@ def fitted_and_tested(
     return None if fitted is None else test_on_stretches(model, rows, refined(model, rows, fitted), hold_constants=True)
 
 
-def with_effect_states(model: Model, x: FloatArray) -> FloatArray:
-    """Initial state (nx,) with those of the effect behind: a lag starts where it follows, a store at rest."""
-    return stores_at_rest(model, np.concatenate([x, np.ones(len(model.states) - len(x))]))
+def with_effect_states(
+    model: Model, initial: Sequence[FloatArray], records: Sequence[Dataset]
+) -> tuple[FloatArray, ...]:
+    """Initial states (nx,) with those of the effect behind: a lag starts where it follows, a store at rest."""
+    together = (np.concatenate([x, np.ones(len(model.states) - len(x))]) for x in initial)
+    return tuple(at_rest(model, x, record) for x, record in zip(together, records, strict=True))

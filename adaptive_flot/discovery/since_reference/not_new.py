@@ -98,7 +98,7 @@ def _explains_all_records_better(compared: Comparison) -> bool:
         return False
     both = compared.rows.behind(calibration.rows)
     extended = model_with(calibration.model, h)
-    before = [with_effect_states(extended, x) for x in calibration.fit.initial]
+    before = with_effect_states(extended, calibration.fit.initial, calibration.rows.records)
     constants = loose_constants(calibration.model, calibration.constants.names)
     fitter = JointFitter(extended, both, constants, h.parameters, [*before, *best.fit.initial])
     with np.errstate(all="ignore"):

@@ -98,6 +98,9 @@ JUMP_EDGE = 0.002
 JUMPS_BY = 1000.0
 """Rate of a jump, times the sampling interval: a step that is a fiftieth of it leaves nothing of the jump (2e-9)."""
 
+CREEPS = 1e-9
+"""Share of the way that it creeps in an interval, so that a record begins with what was asked."""
+
 
 def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     """A part at x that stays where it is until v is more than the band away, and then jumps to v, less a rest.
@@ -107,7 +110,7 @@ def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings)
     a rest it is that of Stenman, Gustafsson & Forsman, Int. J. Adapt. Control Signal Process. 17 (2003). Here, with the
     interval h::
 
-        dx/dt = r (w - x),   w = v - rest sign(v - x),   r = JUMPS_BY m / h,
+        dx/dt = r (w - x) + CREEPS / h (v - x),   w = v - rest sign(v - x),   r = JUMPS_BY m / h,
         m = 1 / (1 + JUMPS_BY exp((band - |v - x|) / (JUMP_EDGE band)))
 
     so that r = 1 / h at the band. What acts is x + m (w - x): the jump at its beginning. The rate is handed to the step
@@ -121,7 +124,7 @@ def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings)
     beyond = (ca.fabs(error) - band) / (JUMP_EDGE * (band + 1e-9)) - log(JUMPS_BY)
     moves = (1 + ca.tanh(beyond / 2)) / 2
     rate, way = JUMPS_BY / interval * moves, error - c["rest"] / scale * error / (ca.fabs(error) + 1e-12)
-    m.own_derivative("position", rate * way, decay=-rate)
+    m.own_derivative("position", rate * way + CREEPS / interval * error, decay=-rate)
     return value + c["amplitude"] * ((x + moves * way) * scale - value)
 
 

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
+from adaptive_flot.discovery.record.seen import seen_along
 from adaptive_flot.errors import RangeError
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.forms.form import number
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady.steady_state import steady_state
 
@@ -128,12 +130,18 @@ def scattered_starts(model: Model, constants: Constants) -> list[FloatArray]:
     return starts
 
 
-def stores_at_rest(model: Model, state: FloatArray) -> FloatArray:
-    """A state (nx,), copied, with every hidden store where its balance stands."""
+def at_rest(model: Model, state: FloatArray, record: Dataset) -> FloatArray:
+    """A state (nx,), copied, with every hidden store where its balance stands, and what jumps where it is asked to be.
+
+    That is what is asked in the first row of a record.
+    """
     names, x = model.names("states"), state.copy()
     for effect in model.effects:
         if effect.form == "store" and effect.driver in names:
             x[names.index(f"{effect.label}.store")] = x[names.index(effect.driver)]
+        if effect.family.jumps:
+            first = seen_along(model, record.rows(0, 1), x)[0][effect.site][0]
+            x[names.index(f"{effect.label}.position")] = first / number(effect.full_settings, "scale")
     return x
 
 
@@ -147,5 +155,5 @@ def first_states(model: Model, records: Sequence[Dataset]) -> tuple[FloatArray, 
         elif model.starts_steady:
             with suppress(RangeError):
                 guess = steady_state(model, record.inputs[0], model.parameter_values).state
-        states.append(stores_at_rest(model, guess))
+        states.append(at_rest(model, guess, record))
     return tuple(states)

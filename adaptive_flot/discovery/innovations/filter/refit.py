@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student_t
 
-from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, stores_at_rest
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.discovery.innovations.filter.linear_response import LinearResponse, ResponseFunctions, weight_of
 from adaptive_flot.discovery.innovations.filter.noise_fit import Costs, noise_of, search_noise
@@ -121,7 +121,7 @@ class Refitter:
     def start(self, noise: NoiseModel, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """State and covariance before the first row."""
         z, P = first_state(self.model, self.record, noise, p)
-        return stores_at_rest(self.model, z), UNSURE**2 * P
+        return at_rest(self.model, z, self.record), UNSURE**2 * P
 
     def noise(self, size: tuple[float, float]) -> NoiseModel:
         """Noise of a size."""
