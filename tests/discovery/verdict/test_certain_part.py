@@ -139,7 +139,7 @@ def test_a_part_that_no_output_needs_is_not_told(two_things: Discovery) -> None:
 def test_what_all_sets_share_is_not_certain_while_an_output_stays_wrong(two_things: Discovery) -> None:
     result = _search(two_things, ((LOSS, SENSOR), 0.0), ((HEATER, SENSOR), 5.0))
     judged = replace(_judged(result), word="class", members=(LOSS, HEATER, SENSOR))
-    assert "Certain: flow_meter by constant." in reason_words(judged, result, (), ())
+    assert "Certain: flow meter shows 6.1 % too much." in reason_words(judged, result, (), ())
     said = reason_words(judged, result, (), (), wrong=["temperature"])
     assert "All that come near have flow_meter by constant; still wrong: temperature." in said and "Certain" not in said
 
@@ -160,7 +160,7 @@ def test_two_dependences_of_one_quantity_are_no_two_causes(two_things: Discovery
     judged = judge(both)
     assert judged.word == "class" and set(judged.members) == set(both.alternatives[0].names)
     said = reason_words(judged, both, (), ())
-    assert "Certain: flow_meter by constant. heat_loss depends on fan_speed or time, or on both" in said
+    assert "Certain: flow meter shows 6.1 % too much. heat_loss depends on fan_speed or time, or on both" in said
     assert "can not tell these apart" not in said
     apart = _search(two_things, ((LOSS, ("heating", "time"), SENSOR), 0.0))
     assert judge(apart).word == "named"

@@ -109,7 +109,7 @@ def test_what_all_have_is_certain_though_the_best_has_another_on_its_signal(drau
     near = replace(best, names=(FAN, ("thermometer", "time")), known=(True, True))
     found = replace(draught.search, alternatives=(two, near), left=0.0, left_threshold=10.0)
     said = reason_words(judge(found), found, (), ())
-    assert "Certain: heat_loss by fan_speed." in said and "or both" not in said
+    assert "Certain: heat loss depends on fan speed." in said and "or both" not in said
 
 
 def test_two_dependences_on_different_signals_are_no_class() -> None:

@@ -90,8 +90,13 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
 
 def words_alone(a: Alternative) -> str:
     """The only effect of an alternative as it was fitted in the search, without an interval and without a curve."""
-    (effect,) = a.effects
-    return words_of_effect(a.fit.model, NamedEffect(effect, "", {}, ()))
+    (words,) = words_each(a).values()
+    return words
+
+
+def words_each(a: Alternative) -> dict[tuple[str, str], str]:
+    """Each effect of an alternative as it was fitted in the search, by its name (site, driver)."""
+    return {(e.site, e.driver): words_of_effect(a.fit.model, NamedEffect(e, "", {}, ())) for e in a.effects}
 
 
 def spaced(name: str) -> str:

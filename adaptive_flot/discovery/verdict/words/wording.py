@@ -10,7 +10,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_signal, same_site
-from adaptive_flot.discovery.verdict.words.sizes import spaced, words_alone
+from adaptive_flot.discovery.verdict.words.sizes import spaced, words_alone, words_each
 
 LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
 LACKS_ONE, LACKS_SEVERAL = "The model lacks one", "The model lacks several effects."
@@ -148,9 +148,13 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
     either = same_site(shared)
     both = same_signal([n for n in shared if n not in either])
     words = [LACKS_SEVERAL]
-    if sure := ", ".join(f"{s} by {d}" for s, d in shared if (s, d) not in (*either, *both)):
-        begun, ended = ("All that come near have", f"; still wrong: {', '.join(wrong)}") if wrong else ("Certain:", "")
-        words.append(f"{begun} {sure}{ended}.")
+    if sure := [name for name in shared if name not in (*either, *both)]:
+        if wrong:
+            has = ", ".join(" by ".join(name) for name in sure)
+            words.append(f"All that come near have {has}; still wrong: {', '.join(wrong)}.")
+        else:
+            fitted = words_each(judgement.best)
+            words.append(f"Certain: {'; '.join(fitted.get(name, _of_name(*name)) for name in sure)}.")
     for site in dict.fromkeys(s for s, _ in either):
         drivers = " or ".join(d for s, d in either if s == site)
         words.append(f"{site} depends on {drivers}, or on both: one dependence of another shape would look the same.")
