@@ -104,10 +104,11 @@ def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
             yield Variant(effect, (profile,), ("amplitude",), (("band", band),))
     if site.name not in asked_from_outside(responses.fit.model):
         return
-    effect = Effect(site.name, "lag", "slip_jump", settings={"scale": scale, "interval_s": responses.problem.record.dt})
+    settings = {"scale": scale, "interval_s": responses.problem.record.dt}
     for band, rest, position in jumping(v):
-        profile = TimeProfile(site.name, position - v, True)
-        yield Variant(effect, (profile,), ("amplitude",), (("band", band), ("rest", rest)))
+        profile, chosen = TimeProfile(site.name, position - v, True), {"band": band, "rest": rest}
+        effect = Effect(site.name, "lag", "slip_jump", chosen, settings)
+        yield Variant(effect, (profile,), ("amplitude",), tuple(chosen.items()))
 
 
 def dragged(v: FloatArray, band: float) -> FloatArray:

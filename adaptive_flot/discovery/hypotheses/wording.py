@@ -28,6 +28,14 @@ WITHOUT_SIZE = {
 """What is said of an alternative of the free run, by what it depends on."""
 
 
+def sticks(band: float, rest: float, unit: str, *, jumps: bool) -> str:
+    """What a part does that follows only beyond a band: it jumps to what is asked, to within a rest, or has play."""
+    if not jumps:
+        return f"has play: it stays up to {band:.3g}{unit} behind what is asked"
+    then = f"jumps to within {rest:.3g}{unit} of what is asked" if rest else "jumps to what is asked"
+    return f"sticks: it stays until it is asked to move by more than {band:.3g}{unit}, and then {then}"
+
+
 def clock(time: float) -> str:
     """A time [s]: whole seconds, and three digits below a hundred."""
     return f"{time:.0f}" if abs(time) >= 100 else f"{time:.3g}"
@@ -66,10 +74,7 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     if h.kind == "periodic":
         return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], mode, unit)}"
     if h.kind == "hysteresis":
-        then = ", and then jumps to what is asked" if h.effect.family.jumps else ""
-        if rest := values.get("rest"):
-            then = f", and then jumps to within {rest:.3g}{unit} of what is asked"
-        return f"{name} sticks: it stays until it is asked to move by more than {first:.3g}{unit}{then}"
+        return f"{name} {sticks(first, values.get('rest', 0.0), unit, jumps=h.effect.family.jumps)}"
     if h.kind == "dead zone":
         centre = h.effect.coefficients["centre"]
         return f"{name} does not move within {first:.3g}{unit} of {centre:.3g}{unit}"

@@ -23,7 +23,7 @@ from adaptive_flot.discovery.hypotheses.families import (
     turned,
 )
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
-from adaptive_flot.discovery.record.slip_jump import asked_from_outside, jumping
+from adaptive_flot.discovery.record.slip_jump import asked_from_outside, jumping, same_jumps
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -220,7 +220,8 @@ def _jumps(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect
     for band, rest, position in jumping(v):
         free = ("band", "rest") if rest else ("band",)
         effect = Effect(site, "lag", "slip_jump", {"amplitude": 1.0, "band": band, "rest": rest}, settings)
-        hypothesis = Hypothesis(site, "lag", "hysteresis", effect, free, ({},), {}, dict.fromkeys(free, scale))
+        limits = {"band": same_jumps(v, band, rest)}
+        hypothesis = Hypothesis(site, "lag", "hysteresis", effect, free, ({},), limits, dict.fromkeys(free, scale))
         yield Suspect(hypothesis, (position - v)[:, None], (), len(free))
 
 

@@ -20,7 +20,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 BANDS = np.geomspace(0.02, 0.6, 25)
 """Bands that are tried, as shares of the range of what is asked: each is 15 % wider than the last."""
 RESTS = (0.0, 0.4, 0.7)
-"""Rests that are tried, as shares of the band; with a rest as large as the band it would be dragged along."""
+"""Rests that are tried, as shares of the band. One as large as the band is play, another form."""
 LEAST_JUMPS = 3
 """What jumps less often shows a step or two in time, which says nothing of a band."""
 

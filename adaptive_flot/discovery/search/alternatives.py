@@ -203,8 +203,16 @@ def _warmed(start: Fit, warm: Fit) -> Fit:
 
 
 def fixed_coefficients(effect: Effect) -> dict[str, float]:
-    """Coefficients that a search holds: the fraction of a lag, a dead time or a limit."""
-    return dict.fromkeys(effect.names(CoefficientRole.BLEND), 1.0)
+    """Coefficients that a search holds: the fraction of a lag, a dead time or a limit; the band of what jumps.
+
+    Between two bands with other jumps a fit finds no slope. A rest is fitted where there is one.
+    """
+    held = dict.fromkeys(effect.names(CoefficientRole.BLEND), 1.0)
+    if effect.family.jumps:
+        chosen = effect.coefficients
+        held |= {name: chosen[name] for name in effect.names(CoefficientRole.BAND) if name in chosen}
+        held |= {name: 0.0 for name in effect.names(CoefficientRole.REST) if not chosen.get(name)}
+    return held
 
 
 def limited(model: Model, effect: Effect, start: dict[str, float]) -> dict[str, float]:

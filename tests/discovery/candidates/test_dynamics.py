@@ -55,7 +55,7 @@ def test_a_heater_that_sticks_is_late() -> None:
     told = [(e.effect.site, e.effect.driver, e.effect.form) for e in found.effects]
     assert told == [("heating", "lag", "stiction")]
     band = found.effects[0].effect.coefficients["band"]
-    assert found.reason.startswith(f"Heating sticks: it moves only where more than {band:.3g} W is asked"), found.reason
+    assert found.reason.startswith(f"Heating has play: it stays up to {band:.3g} W behind what is asked"), found.reason
     assert found.effects[0].effect.coefficients["band"] == pytest.approx(0.9 * 400.0, rel=0.1)
 
 

@@ -79,9 +79,9 @@ def with_cause(
     notes = (*what_is_left(error, reference=True), *(n for n in verdict.notes if n not in over_hours))
     if excluded_by(compared.calibration, found[0].fit):
         notes = (*notes, SIZES_OPEN)
-    said = ", ".join(c.words for c in error)
+    said, (first, _, _) = ", ".join(c.words for c in error), compared.verdict.reason.partition(". ")
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
-    alone = f"By free runs alone, which what wanders spoils: {compared.verdict.reason}"
+    alone = f"Free runs over the whole record do not show it, as the process wanders too much. They say: {first}."
     return replace(
         compared,
         verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*notes, alone)),

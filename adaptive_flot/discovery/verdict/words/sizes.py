@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.wording import clock
+from adaptive_flot.discovery.hypotheses.wording import clock, sticks
 from adaptive_flot.discovery.results import Alternative, NamedEffect
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.greybox.effects import LATE, Effect
@@ -46,10 +46,9 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     name = spaced(site.name)
     if effect.driver == "constant":
         said = f"{name} {_always(site, effect)}"
-    elif effect.driver == "lag" and (bands := effect.values(CoefficientRole.BAND)):
-        within = f"within {rest:.3g}{_unit(site)} of " if (rest := sum(effect.values(CoefficientRole.REST))) else ""
-        then = f"then jumps to {within}what is asked" if effect.family.jumps else "stays behind by it"
-        said = f"{name} sticks: it moves only where more than {bands[0]:.3g}{_unit(site)} is asked, and {then}"
+    elif effect.driver == "lag" and effect.values(CoefficientRole.BAND):
+        (band,), rest = effect.values(CoefficientRole.BAND), sum(effect.values(CoefficientRole.REST))
+        said = f"{name} {sticks(band, rest, _unit(site), jumps=effect.family.jumps)}"
     elif effect.driver == "lag":
         taus = " and ".join(f"{v:.3g} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
         said = f"{name} answers slowly, with a time constant of {taus}"

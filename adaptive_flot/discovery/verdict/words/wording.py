@@ -8,9 +8,10 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
-from adaptive_flot.discovery.results import Judgement, NamedEffect, SearchResult
+from adaptive_flot.discovery.results import Alternative, Judgement, NamedEffect, SearchResult
 from adaptive_flot.discovery.verdict.judge import same_signal, same_site
 from adaptive_flot.discovery.verdict.words.sizes import spaced, words_alone, words_each
+from adaptive_flot.greybox.forms.form import CoefficientRole
 
 LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
 LACKS_ONE, LACKS_SEVERAL = "The model lacks one", "The model lacks several effects."
@@ -97,7 +98,7 @@ def reason_words(
     if judgement.word == "unnamed":
         evidence = f"{beside_a_part(judgement)}{evidence}.{_still_wrong(wrong)}"
         return f"{said}. The model lacks this, and it has no name. {evidence}"
-    close = ", ".join("+".join(f"{s} by {d}" for s, d in a.names) for a in (judgement.best, *judgement.rivals[:3]) if a)
+    close = ", ".join("+".join(_brief(a)) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
         f"none explains it well ({close}). {evidence}."
@@ -166,6 +167,12 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
         listed = "; ".join(r or "nothing more" for r in rest)
         words.append(f"This record can not tell these apart, of which the first is kept: {listed}.")
     return " ".join(words)
+
+
+def _brief(a: Alternative) -> list[str]:
+    """Each effect of an alternative in a few words: `valve by lag (sticks)`."""
+    sticks = {(e.site, e.driver) for e in a.effects if e.names(CoefficientRole.BAND) and e.family.has_memory}
+    return [f"{s} by {d}{' (sticks)' if (s, d) in sticks else ''}" for s, d in a.names]
 
 
 def _of_name(site: str, driver: str) -> str:
