@@ -15,7 +15,7 @@ class Variant:
     Attributes
     ----------
     effect
-        The effect at amplitude zero, with its settings.
+        The effect at amplitude zero, with its settings, and shapes that every fit holds.
     profiles
         Profiles at the site (r of them) whose linear combination it is near amplitude zero.
     coefficients
