@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.further_sites.places import AMOUNT, BALANCE, DRAG, LOSS, RATE, READING, loss_size
+from adaptive_flot.discovery.results.words import short
 from adaptive_flot.greybox.model import Model
 
 NO_SITE = "the model has no site for that"
@@ -34,11 +35,11 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
     if site.startswith(READING):
         name = site.removeprefix(READING)
         unit = model.inputs[model.index("inputs", name)].unit
-        off = f"{abs(amount):.3g} {'' if unit == '-' else unit}".strip()
+        off = f"{short(abs(amount))} {'' if unit == '-' else unit}".strip()
         return f"{_plain(name)} were {off} {'more' if amount > 0 else 'less'} than the record says{at}"
     if site.startswith(AMOUNT):
         name = site.removeprefix(AMOUNT)
-        size = f"{abs(amount):.3g} {next(s.unit for s in model.sites if s.name == name) or '-'}".removesuffix(" -")
+        size = f"{short(abs(amount))} {next(s.unit for s in model.sites if s.name == name) or '-'}".removesuffix(" -")
         much = f"{size} " if measured else "by an amount "
         return f"{_plain(name)} were {much}{'larger' if amount > 0 else 'smaller'} at any value{at}"
     if site.startswith(RATE):
@@ -47,23 +48,23 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
     if site.startswith(LOSS):
         name = site.removeprefix(LOSS)
         share = abs(amount) / loss_size(model.states[model.index("states", name)])
-        rate = f"{100 * share:.3g} % of itself every second" if measured else "a share of itself"
+        rate = f"{short(100 * share)} % of itself every second" if measured else "a share of itself"
         return f"{_plain(name)} {'lost' if amount > 0 else 'gained'} {rate}{at}"
     if site.startswith(DRAG):
         name = site.removeprefix(DRAG)
         state = model.states[model.index("states", name)]
         lost = abs(amount) * (state.scale / loss_size(state)) ** 2
         unit = "1" if state.unit in ("", "-") else state.unit
-        at_scale = f"{state.scale:.3g} {unit}".removesuffix(" 1")
+        at_scale = f"{short(state.scale)} {unit}".removesuffix(" 1")
         rate = (
-            f"{lost:.3g} {unit}/s where it is {at_scale}, and more with its square"
+            f"{short(lost)} {unit}/s where it is {at_scale}, and more with its square"
             if measured
             else "more with its square"
         )
         return f"{_plain(name)} {'lost' if amount > 0 else 'gained'} {rate}{at}"
     name = site.removeprefix(BALANCE)
     unit = model.states[model.index("states", name)].unit
-    rate = f" {abs(amount):.3g} {'1' if unit in ('', '-') else unit}/s" if measured else ""
+    rate = f" {short(abs(amount))} {'1' if unit in ('', '-') else unit}/s" if measured else ""
     does, where = ("adds", "to") if amount > 0 else ("takes", "from")
     return f"something {does}{rate} {where} the balance of {_plain(name)}{at}"
 

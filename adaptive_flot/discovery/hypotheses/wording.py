@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
-from adaptive_flot.discovery.results.words import in_seconds
+from adaptive_flot.discovery.results.words import in_seconds, short
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import ARBITRARY_ZERO
@@ -31,14 +31,14 @@ WITHOUT_SIZE = {
 def sticks(band: float, rest: float, unit: str, *, jumps: bool) -> str:
     """What a part does that follows only beyond a band: it jumps to what is asked, to within a rest, or has play."""
     if not jumps:
-        return f"has play: it stays up to {band:.3g}{unit} behind what is asked"
-    then = f"jumps to within {rest:.3g}{unit} of what is asked" if rest else "jumps to what is asked"
-    return f"sticks: it stays until it is asked to move by more than {band:.3g}{unit}, and then {then}"
+        return f"has play: it stays up to {short(band)}{unit} behind what is asked"
+    then = f"jumps to within {short(rest)}{unit} of what is asked" if rest else "jumps to what is asked"
+    return f"sticks: it stays until it is asked to move by more than {short(band)}{unit}, and then {then}"
 
 
 def clock(time: float) -> str:
     """A time [s]: whole seconds, and three digits below a hundred."""
-    return f"{time:.0f}" if abs(time) >= 100 else f"{time:.3g}"
+    return f"{time:.0f}" if abs(time) >= 100 else short(time)
 
 
 def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
@@ -54,19 +54,19 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     name, unit = site.name.replace("_", " "), f" {site.unit}" if site.unit and site.unit != "-" else ""
     first, mode = _at_its_end(next(iter(values.values())), h), h.effect.mode or site.mode
     if h.kind == "stuck" and site.role == "sensor":
-        return f"{name} shows {first:.3g}{unit} all the time"
+        return f"{name} shows {short(first)}{unit} all the time"
     if h.kind == "stuck":
-        return f"{name} stays at {first:.3g}{unit}, whatever is asked"
+        return f"{name} stays at {short(first)}{unit}, whatever is asked"
     if h.kind == "stuck for a time":
         ((begin, long),) = h.pulses
         when = f"from {clock(begin)} s on" if long >= FOREVER else f"at {clock(begin)}-{clock(begin + long)} s"
         if site.role == "sensor":
-            return f"{name} shows {first:.3g}{unit} and nothing else {when}"
-        return f"{name} stays at {first:.3g}{unit} {when}, whatever is asked"
+            return f"{name} shows {short(first)}{unit} and nothing else {when}"
+        return f"{name} stays at {short(first)}{unit} {when}, whatever is asked"
     if h.kind == "leaks":
-        return f"{name} does not go below {first:.3g}{unit}"
+        return f"{name} does not go below {short(first)}{unit}"
     if h.kind == "range":
-        return f"{name} does not go above {first:.3g}{unit}"
+        return f"{name} does not go above {short(first)}{unit}"
     if h.kind == "switch":
         return f"{name} {_switched(h.effect, mode, first, unit, site.role == 'sensor')}"
     if h.kind == "ramp":
@@ -77,12 +77,12 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         return f"{name} {sticks(first, values.get('rest', 0.0), unit, jumps=h.effect.family.jumps)}"
     if h.kind == "dead zone":
         centre = h.effect.coefficients["centre"]
-        return f"{name} does not move within {first:.3g}{unit} of {centre:.3g}{unit}"
+        return f"{name} does not move within {short(first)}{unit} of {short(centre)}{unit}"
     if h.kind == "gain":
         return f"{name} is {_factor(first)}"
     if h.kind == "offset":
         verb = "shows" if site.role == "sensor" else "is"
-        return f"{name} {verb} {abs(first):.3g}{unit} too {'much' if first > 0 else 'little'}"
+        return f"{name} {verb} {short(abs(first))}{unit} too {'much' if first > 0 else 'little'}"
     if h.kind == "span":
         middle = h.effect.settings["middle"]
         if site.unit not in ARBITRARY_ZERO and _is_proportional(values["offset"], values["slope"], middle):
@@ -96,20 +96,22 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         return f"{name} does not see the sign: it shows the absolute value ({100 * first:.0f} % of the way)"
     if h.kind == "lag":
         what = "dead time" if h.driver == "delay" else "time constant"
-        return f"{name} answers late, with a {what} of {first:.3g} s"
+        return f"{name} answers late, with a {what} of {short(first)} s"
     if h.kind == "store":
         tau = values["time_constant"]
-        return f"{name} lacks a second store behind {h.driver.replace('_', ' ')}, with a time constant of {tau:.3g} s"
+        return (
+            f"{name} lacks a second store behind {h.driver.replace('_', ' ')}, with a time constant of {short(tau)} s"
+        )
     if h.kind == "turns":
-        more = f"{abs(2 * values['turn']):.3g}{unit} {'more' if values['turn'] > 0 else 'less'}"
+        more = f"{short(abs(2 * values['turn']))}{unit} {'more' if values['turn'] > 0 else 'less'}"
         return f"{name} depends on the sign of {h.driver.replace('_', ' ')}: {more} above zero than below"
     change = values["value_2"] - values["value_1"]
     low, high = h.effect.settings["knots"]  # type: ignore[misc]
     driver = h.driver.replace("_", " ")
     if h.effect.mode == "offset":
-        more = f"{abs(change):.3g}{unit} {'more' if change > 0 else 'less'}"
-        return f"{name} depends on {driver}: {more} at {driver} {high:.3g} than at {low:.3g}"
-    return f"{name} depends on {driver}: {_compared(change, f'{driver} {high:.3g}', f'{low:.3g}')}"
+        more = f"{short(abs(change))}{unit} {'more' if change > 0 else 'less'}"
+        return f"{name} depends on {driver}: {more} at {driver} {short(high)} than at {short(low)}"
+    return f"{name} depends on {driver}: {_compared(change, f'{driver} {short(high)}', short(low))}"
 
 
 def _is_proportional(offset: float, slope: float, middle: object) -> bool:
@@ -145,7 +147,7 @@ def _compared(log: float, here: str, there: str) -> str:
 
 def _swings(size: float, period: float, mode: str, unit: str) -> str:
     """How far it goes up and down, and how often: `swings by 0.4 K up and down every 900 s`."""
-    swing = f"{size:.3g}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
+    swing = f"{short(size)}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
     return f"swings by {swing} up and down every {in_seconds(period)} s"
 
 
@@ -153,7 +155,7 @@ def _grows(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> s
     """What changes gradually, with its times: `becomes 27 % smaller, gradually from 1380 to 1900 s`."""
     onset, duration = effect.coefficients["onset"], effect.coefficients["duration"]
     if mode == "offset":
-        change = f"comes to {'show' if sensor else 'be'} {abs(size):.3g}{unit} {'more' if size > 0 else 'less'}"
+        change = f"comes to {'show' if sensor else 'be'} {short(abs(size))}{unit} {'more' if size > 0 else 'less'}"
     else:
         change = f"becomes {_factor(size)}"
     return f"{change}, gradually from {clock(onset)} to {clock(onset + duration)} s"
@@ -166,7 +168,7 @@ def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -
     duration = [effect.coefficients[f"for_{k}"] for k in range(1, count + 1)]
     lasting = count == 1 and duration[0] >= FOREVER
     if mode == "offset":
-        change = f"{abs(size):.3g}{unit} {'more' if size > 0 else 'less'}"
+        change = f"{short(abs(size))}{unit} {'more' if size > 0 else 'less'}"
         rest = f"shows {change}" if sensor else f"is {change}"
     else:
         rest = f"is {_factor(size)}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from adaptive_flot.discovery.results.words import short
+
 
 @dataclass(frozen=True)
 class Symptom:
@@ -120,15 +122,15 @@ class OutputChange:
     def __str__(self) -> str:
         low, high = (100 * r for r in self.reduction95)
         return (
-            f"{self.output}: {self.before:.3g} -> {self.after:.3g} {self.unit} "
-            f"(noise {self.noise:.3g}; reduction {low:.0f} to {high:.0f} %)"
+            f"{self.output}: {short(self.before)} -> {short(self.after)} {self.unit} "
+            f"(noise {short(self.noise)}; reduction {low:.0f} to {high:.0f} %)"
         )
 
     @property
     def words(self) -> str:
         """Output and errors before and after, once where they are the same, without a unit where there is none."""
-        changed = "" if self.after == self.before else f" -> {self.after:.3g}"
-        return f"{self.output} {self.before:.3g}{changed} {self.unit}".rstrip(" -")
+        changed = "" if self.after == self.before else f" -> {short(self.after)}"
+        return f"{self.output} {short(self.before)}{changed} {self.unit}".rstrip(" -")
 
 
 @dataclass(frozen=True)

@@ -21,3 +21,9 @@ ONE_CAUSE = "One cause that acts at several places looks like that, and the cata
 def in_seconds(period: float) -> str:
     """A period as it is read: `3990`, `12.4`."""
     return f"{period:.0f}" if period >= 100 else f"{period:.3g}"
+
+
+def short(value: float) -> str:
+    """A number as it is read: three digits, and no power of ten below a million (`1140`, not `1.14e+03`)."""
+    digits = f"{value:.3g}"
+    return f"{float(digits):.0f}" if 1e3 <= abs(float(digits)) < 1e6 else digits

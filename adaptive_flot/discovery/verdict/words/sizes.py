@@ -8,6 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.wording import clock, sticks
 from adaptive_flot.discovery.results import Alternative, NamedEffect
+from adaptive_flot.discovery.results.words import short
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.greybox.effects import LATE, Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, number
@@ -50,21 +51,21 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
         (band,), rest = effect.values(CoefficientRole.BAND), sum(effect.values(CoefficientRole.REST))
         said = f"{name} {sticks(band, rest, _unit(site), jumps=effect.family.jumps)}"
     elif effect.driver == "lag":
-        taus = " and ".join(f"{v:.3g} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
+        taus = " and ".join(f"{short(v)} s" for v in effect.values(CoefficientRole.TIME_CONSTANT))
         said = f"{name} answers slowly, with a time constant of {taus}"
     elif effect.driver == "delay" and (read := effect.values(CoefficientRole.READING)):
         interval = (read[1] - read[0]) / number(effect.full_settings, "periods")
-        said = f"{name} is read every {interval:.3g} s, and kept in between"
+        said = f"{name} is read every {short(interval)} s, and kept in between"
     elif effect.driver == "delay":
         (dead,) = effect.values(CoefficientRole.DEAD_TIME)
-        said = f"{name} answers {dead:.3g} s late"
+        said = f"{name} answers {short(dead)} s late"
     elif effect.driver == "saturation":
         (limit,) = effect.values(CoefficientRole.LIMIT)
-        said = f"{name} does not go beyond {limit:.3g}{_unit(site)}"
+        said = f"{name} does not go beyond {short(limit)}{_unit(site)}"
     elif effect.family.is_event and (level := effect.values(CoefficientRole.POSITION)):
         (begin,), (long,) = effect.values(CoefficientRole.ONSET), effect.values(CoefficientRole.DURATION)
         verb, asked = ("showed", "") if site.role == "sensor" else ("stayed at", ", whatever was asked")
-        said = f"{name} {verb} {level[0]:.3g}{_unit(site)} from {clock(begin)} s to {clock(begin + long)} s{asked}"
+        said = f"{name} {verb} {short(level[0])}{_unit(site)} from {clock(begin)} s to {clock(begin + long)} s{asked}"
     elif curve is not None and effect.family.is_event and _ends(effect) > curve.driver[-1]:
         # what has happened until then is told, without the interval of all that would
         return f"{name} {_until_the_end(site, curve)}" + (f" ({told.meaning})" if told.meaning else "")
@@ -144,9 +145,9 @@ def _switched(model: Model, site: Site, effect: Effect) -> str:
     unit = units.get(effect.driver, "-")
     unit = "" if unit == "-" else f" {unit}"
     what, *before = (_off(site, effect, each) for each in (level, *others))
-    begun = f"once {spaced(effect.driver)} has risen above {on_above:.3g}{unit}"
+    begun = f"once {spaced(effect.driver)} has risen above {short(on_above)}{unit}"
     otherwise = f", and {before[0]} otherwise" if before else ""
-    return f"{what} {begun}, until it falls below {off_below:.3g}{unit}{otherwise}"
+    return f"{what} {begun}, until it falls below {short(off_below)}{unit}{otherwise}"
 
 
 def _off(site: Site, effect: Effect, level: float) -> str:
@@ -194,15 +195,15 @@ def _over_sign(site: Site, effect: Effect) -> str:
 def _over_driver(site: Site, curve: EffectCurve) -> str:
     a, b = _extremes(curve)
     driver, unit = spaced(curve.effect.driver), f" {curve.driver_unit}" if curve.driver_unit not in ("", "-") else ""
-    here, there = f"at {driver} {curve.driver[b]:.3g}{unit}", f"at {curve.driver[a]:.3g}{unit}"
+    here, there = f"at {driver} {short(curve.driver[b])}{unit}", f"at {short(curve.driver[a])}{unit}"
     if curve.relative:
         size, word = _times(_ratio(curve, a, b)).rsplit(" ", 1)
         return f"{size} {here} {word} {there}"
     if curve.bend_only:  # the straight part is one of the adapted parameters
         most = int(np.argmax(np.abs(curve.change)))
         more = "more" if curve.change[most] > 0 else "less"
-        size = f"{abs(curve.change[most]):.3g}{_unit(site)} {more}"
-        return f"{size} at {driver} {curve.driver[most]:.3g}{unit} than a straight line through the middle says"
+        size = f"{short(abs(curve.change[most]))}{_unit(site)} {more}"
+        return f"{size} at {driver} {short(curve.driver[most])}{unit} than a straight line through the middle says"
     more = "more" if curve.change[b] > curve.change[a] else "less"
     return f"{_between(site, curve, a, b)} {more} {here} than {there}"
 
@@ -220,7 +221,7 @@ def _between(site: Site, curve: EffectCurve, a: int, b: int) -> str:
     """Size of the change between two places of a curve."""
     if curve.relative:
         return _percent(_ratio(curve, a, b))
-    return f"{abs(curve.change[b] - curve.change[a]):.3g}{_unit(site)}"
+    return f"{short(abs(curve.change[b] - curve.change[a]))}{_unit(site)}"
 
 
 def _ratio(curve: EffectCurve, a: int, b: int) -> float:
@@ -231,12 +232,12 @@ def _deviation(site: Site, effect: Effect, level: float) -> str:
     """A change at a site: `20 % less`, `0.3 K more`."""
     if _is_factor(site, effect):
         return _times(float(np.exp(level))).rsplit(" ", 1)[0]
-    return f"{abs(level):.3g}{_unit(site)} {'more' if level > 0 else 'less'}"
+    return f"{short(abs(level))}{_unit(site)} {'more' if level > 0 else 'less'}"
 
 
 def _amount(site: Site, effect: Effect, level: float) -> str:
     if not _is_factor(site, effect):
-        return f"{abs(level):.3g}{_unit(site)}"
+        return f"{short(abs(level))}{_unit(site)}"
     return _percent(float(np.exp(level)))
 
 
