@@ -28,6 +28,8 @@ FAR_ABOVE = 2.0
 """An error so many times its usual one is far above it."""
 FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
+SEEN, WIDER, BEYOND = (0.002, 0.998), 0.05, 0.05
+"""Quantiles that a reference covers, wider by a share of their distance; and the share of rows beyond that counts."""
 MOVED = 1.0
 """A constant is said to have moved from so many of its standard deviations on."""
 JUDGED_ON = "free run, fresh stretches"
@@ -94,6 +96,7 @@ def verdict_of(
             *_stopped(model, rows),
             *what_is_left(more, reference),
             *(_moved(calibration, after) if reference else ()),
+            *(_beyond(calibration, rows, null) if reference and word == "abstain" else ()),
             *(_by_a_factor(calibration, model, judged) if reference and told else ()),
         ),
         seconds=seconds,
@@ -128,6 +131,32 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
     if not moved:
         return ()
     return (f"The new records are fitted with other constants than the reference: {', '.join(moved)}.",)
+
+
+def _beyond(calibration: Calibration, rows: Rows, null: Tested) -> tuple[str, ...]:
+    """Where the plant is beyond all that the reference has shown, in a share of the new rows.
+
+    By its inputs, and by its outputs as the model has them: a gauge that is off brings no plant anywhere.
+    """
+    model, columns = calibration.model, list(rows.columns)
+    names = [q.name.replace("_", " ") for q in (*model.inputs, *(model.outputs[c] for c in columns))]
+    old = np.concatenate([np.hstack([r.inputs, r.outputs[:, columns]]) for r in calibration.rows.records])
+    new = np.concatenate(
+        [np.hstack([r.inputs, r.outputs[:, columns] - e]) for r, e in zip(rows.records, null.fresh, strict=True)]
+    )
+    notes = []
+    for name, was, now in zip(names, old.T, new.T, strict=True):
+        was, now = was[np.isfinite(was)], now[np.isfinite(now)]
+        if not len(was) or not len(now):
+            continue
+        low, high = np.quantile(was, SEEN)
+        apart = WIDER * (high - low)
+        for share, where in ((np.mean(now > high + apart), "higher"), (np.mean(now < low - apart), "lower")):
+            if share > BEYOND:
+                notes.append(f"{name} is {where} in {100 * share:.0f} % of the rows than in the reference")
+    if not notes:
+        return ()
+    return (f"The model was never compared with the plant there: {'; '.join(notes)}.",)
 
 
 def _by_a_factor(calibration: Calibration, model: Model, judged: Judged) -> tuple[str, ...]:
