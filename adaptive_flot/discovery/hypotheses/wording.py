@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
+from adaptive_flot.discovery.record.slip_jump import PLAY
 from adaptive_flot.discovery.results.words import in_seconds, short
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
@@ -30,8 +31,8 @@ WITHOUT_SIZE = {
 
 def sticks(band: float, rest: float, unit: str, *, jumps: bool) -> str:
     """What a part does that follows only beyond a band: it jumps to what is asked, to within a rest, or has play."""
-    if not jumps:
-        return f"has play: it stays up to {short(band)}{unit} behind what is asked"
+    if not jumps or rest > PLAY * band:
+        return f"has play: it stays up to {short(rest if jumps else band)}{unit} behind what is asked"
     then = f"jumps to within {short(rest)}{unit} of what is asked" if rest else "jumps to what is asked"
     return f"sticks: it stays until it is asked to move by more than {short(band)}{unit}, and then {then}"
 

@@ -19,8 +19,10 @@ from adaptive_flot.greybox.model import FloatArray, Model
 
 BANDS = np.geomspace(0.02, 0.6, 25)
 """Bands that are tried, as shares of the range of what is asked: each is 15 % wider than the last."""
-RESTS = (0.0, 0.4, 0.7)
-"""Rests that are tried, as shares of the band. One as large as the band is play, another form."""
+RESTS = (0.0, 0.4, 0.7, 0.97)
+"""Rests that are tried, as shares of the band. With one nearly as large it is dragged along: it has play."""
+PLAY = 0.9
+"""A rest of at least this share of the band is play."""
 LEAST_JUMPS = 3
 """What jumps less often shows a step or two in time, which says nothing of a band."""
 

@@ -98,6 +98,8 @@ JUMP_EDGE = 0.002
 JUMPS_BY = 1000.0
 """Rate of a jump, times the sampling interval: a step that is a fiftieth of it leaves nothing of the jump (2e-9)."""
 
+LARGEST_REST = 0.97
+"""A rest is at most this share of the band: a larger one would leave it in the rounding of the band, where it creeps."""
 CREEPS = 1e-9
 """Share of the way that it creeps in an interval, so that a record begins with what was asked."""
 
@@ -123,7 +125,8 @@ def _slip_jump(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings)
     error, band = value / scale - x, c["band"] / scale
     beyond = (ca.fabs(error) - band) / (JUMP_EDGE * (band + 1e-9)) - log(JUMPS_BY)
     moves = (1 + ca.tanh(beyond / 2)) / 2
-    rate, way = JUMPS_BY / interval * moves, error - c["rest"] / scale * error / (ca.fabs(error) + 1e-12)
+    rest = ca.fmin(c["rest"] / scale, LARGEST_REST * band)
+    rate, way = JUMPS_BY / interval * moves, error - rest * error / (ca.fabs(error) + 1e-12)
     m.own_derivative("position", rate * way + CREEPS / interval * error, decay=-rate)
     return value + c["amplitude"] * ((x + moves * way) * scale - value)
 

@@ -32,11 +32,12 @@ def _values(search: Search, told: Told, site: str) -> dict[str, float]:
     }
 
 
-def test_an_element_that_sticks_is_told_with_its_band() -> None:
+def test_an_element_with_play_is_told_with_its_size() -> None:
     told, words, search = _told("hysteresis")
     assert [(h.site, h.kind) for h in told.certain] == [("element", "hysteresis")], (told.word, words)
-    assert _values(search, told, "element")["band"] == pytest.approx(BAND, rel=0.15)
-    assert "stays until it is asked to move by more than" in words
+    values = _values(search, told, "element")
+    assert values.get("rest", values["band"]) == pytest.approx(BAND, rel=0.05)
+    assert "Element has play: it stays up to" in words
 
 
 def test_an_element_that_idles_about_zero_is_told_with_its_zone() -> None:
