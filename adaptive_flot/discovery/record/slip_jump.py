@@ -19,7 +19,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 
 BANDS = np.geomspace(0.02, 0.6, 25)
 """Bands that are tried, as shares of the range of what is asked: each is 15 % wider than the last."""
-RESTS = (0.0, 0.4, 0.7, 0.97)
+RESTS = (0.0, 0.4, 0.7, 0.95)
 """Rests that are tried, as shares of the band. With one nearly as large it is dragged along: it has play."""
 PLAY = 0.9
 """A rest of at least this share of the band is play."""
@@ -74,7 +74,8 @@ def jumping(v: FloatArray) -> Iterator[tuple[float, float, FloatArray]]:
                 continue
             least, largest = same_jumps(v, float(band), rest)
             middle = (max(least, rest) + largest) / 2
-            position = jumped(v, float(band), rest)
+            rest = min(rest, RESTS[-1] * middle)
+            position = jumped(v, middle, rest)
             if not np.isfinite(middle) or np.count_nonzero(np.diff(position)) < LEAST_JUMPS:
                 break
             yield middle, rest, position

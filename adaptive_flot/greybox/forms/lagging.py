@@ -99,7 +99,7 @@ JUMPS_BY = 1000.0
 """Rate of a jump, times the sampling interval: a step that is a fiftieth of it leaves nothing of the jump (2e-9)."""
 
 LARGEST_REST = 0.97
-"""A rest is at most this share of the band: a larger one would leave it in the rounding of the band, where it creeps."""
+"""Largest rest, as a share of the band: with a larger one it stays in the rounding of the band and creeps."""
 CREEPS = 1e-9
 """Share of the way that it creeps in an interval, so that a record begins with what was asked."""
 
