@@ -7,6 +7,7 @@ record tells the band as a range, and a fit finds no slope between two bands: th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -64,8 +65,15 @@ def _asked_from_outside(model: Model) -> frozenset[str]:
 def jumping(v: FloatArray) -> Iterator[tuple[float, float, FloatArray]]:
     """Yield bands, rests, and the positions (N,) behind a demand (N,).
 
-    Each band is in the middle of those with the same positions. Only bands with at least LEAST_JUMPS jumps.
+    Each band is in the middle of those with the same positions. Only bands with at least LEAST_JUMPS jumps. They are
+    kept for the next search: what is asked from outside is the same there.
     """
+    yield from _tried(np.ascontiguousarray(v, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=16)
+def _tried(demand: bytes) -> tuple[tuple[float, float, FloatArray], ...]:
+    v, tried = np.frombuffer(demand), []
     for share in RESTS:
         largest = 0.0
         for band in BANDS * float(np.ptp(v)):
@@ -78,7 +86,8 @@ def jumping(v: FloatArray) -> Iterator[tuple[float, float, FloatArray]]:
             position = jumped(v, middle, rest)
             if not np.isfinite(middle) or np.count_nonzero(np.diff(position)) < LEAST_JUMPS:
                 break
-            yield middle, rest, position
+            tried.append((middle, rest, position))
+    return tuple(tried)
 
 
 def band_ranges(
