@@ -81,7 +81,7 @@ def with_cause(
         notes = (*notes, SIZES_OPEN)
     said, (first, _, _) = ", ".join(c.words for c in error), compared.verdict.reason.partition(". ")
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
-    alone = f"Free runs over the whole record do not show it, as the process wanders too much. They say: {first}."
+    alone = f"Free runs over the whole record, without process noise, do not tell it. They say: {first}."
     return replace(
         compared,
         verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*notes, alone)),
