@@ -105,8 +105,8 @@ def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:
     if site.name not in asked_from_outside(responses.fit.model):
         return
     settings = {"scale": scale, "interval_s": responses.problem.record.dt}
-    for band, rest, position in jumping(v):
-        profile, chosen = TimeProfile(site.name, position - v, True), {"band": band, "rest": rest}
+    for jump in jumping(v):
+        profile, chosen = TimeProfile(site.name, jump.position - v, True), {"band": jump.band, "rest": jump.rest}
         effect = Effect(site.name, "lag", "slip_jump", chosen, settings)
         yield Variant(effect, (profile,), ("amplitude",), tuple(chosen.items()))
 

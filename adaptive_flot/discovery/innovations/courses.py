@@ -23,7 +23,7 @@ from adaptive_flot.discovery.hypotheses.families import (
     turned,
 )
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
-from adaptive_flot.discovery.record.slip_jump import asked_from_outside, jumping, same_jumps
+from adaptive_flot.discovery.record.slip_jump import asked_from_outside, jumping
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
@@ -217,12 +217,12 @@ def _sticks_or_idles(site: str, v: FloatArray, size: float, dt: float) -> Iterat
 def _jumps(site: str, v: FloatArray, size: float, dt: float) -> Iterator[Suspect]:
     """An actuator that stays until it is asked to move by more than a band, and then jumps to what is asked."""
     scale, settings = MATTERS * float(np.ptp(v)), {"scale": size or 1.0, "interval_s": dt}
-    for band, rest, position in jumping(v):
-        free = ("band", "rest") if rest else ("band",)
-        effect = Effect(site, "lag", "slip_jump", {"amplitude": 1.0, "band": band, "rest": rest}, settings)
-        limits = {"band": same_jumps(v, band, rest)}
+    for jump in jumping(v):
+        free = ("band", "rest") if jump.rest else ("band",)
+        told = {"amplitude": 1.0, "band": jump.band, "rest": jump.rest}
+        effect, limits = Effect(site, "lag", "slip_jump", told, settings), {"band": jump.bands}
         hypothesis = Hypothesis(site, "lag", "hysteresis", effect, free, ({},), limits, dict.fromkeys(free, scale))
-        yield Suspect(hypothesis, (position - v)[:, None], (), len(free))
+        yield Suspect(hypothesis, (jump.position - v)[:, None], (), len(free))
 
 
 def _wrong_scale(site: str, v: FloatArray) -> Iterator[Suspect]:

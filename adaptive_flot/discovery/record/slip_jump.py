@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -62,8 +63,17 @@ def _asked_from_outside(model: Model) -> frozenset[str]:
     return frozenset(site.name for i, site in enumerate(model.sites) if i not in rows)
 
 
-def jumping(v: FloatArray) -> Iterator[tuple[float, float, FloatArray]]:
-    """Yield bands, rests, and the positions (N,) behind a demand (N,).
+class Jump(NamedTuple):
+    """A band, a rest, the range of bands with the same positions, and these positions (N,)."""
+
+    band: float
+    rest: float
+    bands: tuple[float, float]
+    position: FloatArray
+
+
+def jumping(v: FloatArray) -> Iterator[Jump]:
+    """Yield what a part may do behind a demand (N,) that jumps.
 
     Each band is in the middle of those with the same positions. Only bands with at least LEAST_JUMPS jumps. They are
     kept for the next search: what is asked from outside is the same there.
@@ -72,7 +82,7 @@ def jumping(v: FloatArray) -> Iterator[tuple[float, float, FloatArray]]:
 
 
 @lru_cache(maxsize=16)
-def _tried(demand: bytes) -> tuple[tuple[float, float, FloatArray], ...]:
+def _tried(demand: bytes) -> tuple[Jump, ...]:
     v, tried = np.frombuffer(demand), []
     for share in RESTS:
         largest = 0.0
@@ -86,7 +96,7 @@ def _tried(demand: bytes) -> tuple[tuple[float, float, FloatArray], ...]:
             position = jumped(v, middle, rest)
             if not np.isfinite(middle) or np.count_nonzero(np.diff(position)) < LEAST_JUMPS:
                 break
-            tried.append((middle, rest, position))
+            tried.append(Jump(middle, rest, same_jumps(v, middle, rest), position))
     return tuple(tried)
 
 

@@ -48,9 +48,9 @@ def test_all_bands_of_the_range_draw_the_same_jumps_and_its_end_does_not(
 def test_each_set_of_jumps_is_tried_once(v: np.ndarray) -> None:
     tried = list(jumping(v))
     assert all(np.count_nonzero(np.diff(position)) >= LEAST_JUMPS for *_, position in tried)
-    assert len({(rest, position.tobytes()) for _, rest, position in tried}) == len(tried)
-    assert all(band > rest for band, rest, _ in tried)
-    without = [(band, position.tobytes()) for band, rest, position in tried if not rest]
+    assert len({(rest, position.tobytes()) for _, rest, _, position in tried}) == len(tried)
+    assert all(band > rest for band, rest, *_ in tried)
+    without = [(band, position.tobytes()) for band, rest, _, position in tried if not rest]
     assert without == sorted(without, key=lambda each: each[0])
     assert len({position for _, position in without}) == len(without)
 
