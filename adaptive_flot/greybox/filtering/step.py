@@ -62,7 +62,7 @@ def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequen
     )
     ahead = ca.vertcat(x_next, walked)
     results = [after, carried, ahead, ca.densify(F), predicted, variance, likelihood]
-    return ca.Function("filter_step", [z, P, t, u, p, Q, r, y, there], results, *names, {"cse": True})
+    return ca.Function("filter_step", [z, P, t, u, p, Q, r, y, there], results, *names)
 
 
 def first_correction(model: Model, outputs: Sequence[int], walking: Sequence[str], nu: float) -> ca.Function:

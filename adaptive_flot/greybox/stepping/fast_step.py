@@ -105,11 +105,13 @@ def fast_step_along(
 
     # steps of unknown length may be long, and what jumps decays far within any step
     far = tuple(jumps or not isinstance(h, float) for jumps in model.jumping)
+    held, w = _has_held_decay(model), None
     end = Moving(x, moved)
     for i in range(substeps):
         start = t + i * h
         slope, _, decay = rates(start, end)
-        w = _weights(decay, h, far)
+        if w is None or not held:
+            w = _weights(decay, h, far)
         n1 = slope - decay * end
         halfway = w.half * end
         a = halfway + w.half_slope * n1
@@ -120,6 +122,12 @@ def fast_step_along(
         n4 = remainder(start + h, c, decay)
         end = w.whole * end + w.first * n1 + w.middle * (n2 + n3) + w.last * n4
     return end, rates(t + dt, end)[1]
+
+
+def _has_held_decay(model: Model) -> bool:
+    """Whether decay rates are the same all through an interval: then the weights are worked out once for all steps."""
+    t, x, u, p, z = model.decay.sx_in()
+    return not ca.depends_on(model.decay(t, x, u, p, z), ca.vertcat(t, x, z))
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,6 @@ def ordered(function: ca.Function, carried: Mapping[str, str]) -> ca.Function:
         [ca.densify(results[n]) for n in told],
         names,
         told,
-        {"cse": True},
     )
 
 

@@ -82,19 +82,19 @@ def step(model: Model, interval: Interval) -> ca.Function:
 
 def one_step_gradient(model: Model, interval: Interval, wrt: tuple[str, ...]) -> ca.Function:
     """`(x, t, u, p) -> (x_next (nx,), y (ny,), dy_dtheta (ny, q))` for the q parameters `wrt`; x is held."""
-    x, t, u, p = _symbols(model, interval)
-    end, y = _along(model, interval, ca.SX(x.numel(), len(wrt)), _parameter_seeds(model, wrt))
+    x, t, u, p = symbols = _symbols(model, interval)
+    end, y = _along(model, interval, symbols, ca.SX(x.numel(), len(wrt)), _parameter_seeds(model, wrt))
     names = ["x", "t", "u", "p"], ["x_next", "y", "dy_dtheta"]
     return ca.Function("one_step_gradient", [x, t, u, p], [end.value, y.value, y.along], *names, interval.options)
 
 
 def one_step_jacobians(model: Model, interval: Interval, wrt: tuple[str, ...]) -> ca.Function:
     """`(x, t, u, p) -> (x_next, y, dx_dx, dx_dtheta, dy_dx, dy_dtheta)`, exact, in forward mode."""
-    x, t, u, p = _symbols(model, interval)
+    x, t, u, p = symbols = _symbols(model, interval)
     nx, q = x.numel(), len(wrt)
     moved = ca.horzcat(ca.SX.eye(nx), ca.SX(nx, q))
     seeds = ca.horzcat(ca.DM(p.numel(), nx), _parameter_seeds(model, wrt))
-    end, y = _along(model, interval, moved, seeds)
+    end, y = _along(model, interval, symbols, moved, seeds)
     blocks = [m.along[:, columns] for m in (end, y) for columns in (slice(0, nx), slice(nx, nx + q))]
     names = ["x", "t", "u", "p"], ["x_next", "y", "dx_dx", "dx_dtheta", "dy_dx", "dy_dtheta"]
     return ca.Function("one_step_jacobians", [x, t, u, p], [end.value, y.value, *blocks], *names, interval.options)
@@ -105,10 +105,10 @@ def sensitivity_step(model: Model, interval: Interval, wrt: tuple[str, ...], unk
 
     The q `unknowns` are the parameters `wrt`, followed by further ones that act through the state alone.
     """
-    x, t, u, p = _symbols(model, interval)
+    x, t, u, p = symbols = _symbols(model, interval)
     sensitivity = ca.SX.sym("S", x.numel(), unknowns)
     seeds = ca.horzcat(_parameter_seeds(model, wrt), ca.DM(p.numel(), unknowns - len(wrt)))
-    end, y = _along(model, interval, sensitivity, seeds)
+    end, y = _along(model, interval, symbols, sensitivity, seeds)
     results = [end.value, ca.densify(end.along), y.value, ca.densify(y.along)]
     names = ["x", "S", "t", "u", "p"], ["x_next", "S_next", "y", "dy"]
     # a search runs the step of varying length some thousand times: looking for common terms takes longer
@@ -145,12 +145,14 @@ def sensitivity_steps(model: Model, interval: Interval, wrt: tuple[str, ...], un
 def _symbols(model: Model, interval: Interval) -> Symbols:
     if interval.accurate:
         raise ModelError("exact sensitivities are those of the fast step; build the stepper with accurate=False")
-    x, t, u, p = model.derived(step, interval).sx_in()
-    return x, t, u, p
+    if interval.dt is not None:
+        check_interval(model, interval.dt, interval.substeps)
+    t, x, u, p = model.ode.sx_in()
+    return x, t, u if interval.dt is not None else ca.vertcat(u, ca.SX.sym("dt")), p
 
 
-def _along(model: Model, interval: Interval, moved: ca.SX, seeds: ca.DM) -> tuple[Moving, Moving]:
-    x, t, u, p = _symbols(model, interval)
+def _along(model: Model, interval: Interval, symbols: Symbols, moved: ca.SX, seeds: ca.DM) -> tuple[Moving, Moving]:
+    x, t, u, p = symbols
     if interval.dt is None:
         return fast_step_along(model, u[-1], interval.substeps, (x, t, u[:-1], p), moved, seeds)
     return fast_step_along(model, interval.dt, interval.substeps, (x, t, u, p), moved, seeds)

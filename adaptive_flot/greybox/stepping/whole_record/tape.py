@@ -130,10 +130,7 @@ def tape_of(function: ca.Function, held: Sequence[int] = ()) -> Tape:
     results = (arguments[-1] + np.concatenate([[0], np.cumsum(made)])).astype(np.int64)
     once, steps, numbers, left = _steps(function, arguments, results, held)
     first = int(results[-1]) + len(numbers)  # of the places that the function itself works in
-    held_code, code = (
-        np.array([(kind, *(_place(at, first, left) for at in places)) for kind, *places in part], dtype=np.int64)
-        for part in (once, steps)
-    )
+    held_code, code = (_placed(np.array(part, dtype=np.int64), first, left) for part in (once, steps))
     places = max(int(code[:, 1:].max(initial=0)), first + left) + 1
     if places > MOST_PLACES:
         raise CompileError(f"{name} is too large: {places} places")
@@ -194,8 +191,8 @@ def _steps(
     return [*once, end], [*steps, end], numbers, left
 
 
-def _place(at: int, first: int, left: int) -> int:
-    """The place in memory: after numbers that begin before `first` come `left` held values, then intermediate ones."""
-    if at >= HELD:
-        return first + at - HELD
-    return at if at >= 0 else first + left - 1 - at
+def _placed(code: NDArray[np.int64], first: int, left: int) -> NDArray[np.int64]:
+    """Operations with places in memory: numbers end before `first`, then come `left` held values, then others."""
+    at = code[:, 1:]
+    code[:, 1:] = np.where(at >= HELD, first + at - HELD, np.where(at >= 0, at, first + left - 1 - at))
+    return code
