@@ -56,7 +56,7 @@ def noise_of(
 
 
 def search_noise(
-    costs: Costs, start: tuple[float, float] | None = None, cost: float | None = None
+    costs: Costs, start: tuple[float, float] | None = None, cost: float | None = None, *, near: bool = False
 ) -> tuple[tuple[float, float], float]:
     """Find theta and rho that minimise a cost: steps of Newton in their logarithms, by differences.
 
@@ -72,6 +72,8 @@ def search_noise(
         Where to begin; default the best of a grid.
     cost
         The cost there, where it is known.
+    near
+        Do not look all over first: for a search that is called again after something else has moved.
 
     Returns
     -------
@@ -84,10 +86,10 @@ def search_noise(
     else:
         middle = search.inside(np.log(start))
         search.seen.update({middle: cost} if cost is not None else {})
-    looked, gain = np.inf, np.inf
+    looked, gain = middle[1] if near else np.inf, np.inf
     for _ in range(ROUNDS):
         if abs(middle[1] - looked) > ELSEWHERE:
-            looked, middle = middle[1], search.least_of([middle, *((theta, middle[1]) for theta in np.log(THETAS))])
+            looked, middle = middle[1], search.least_of([middle, *_all_over(middle)])
         elif gain < ENOUGH:
             break
         before, at = search.seen[middle], search.off_the_ends(middle)
@@ -95,6 +97,14 @@ def search_noise(
         middle = search.least_of(search.steps_from(at))
         gain = before - search.seen[middle]
     return (float(np.exp(middle[0])), float(np.exp(middle[1]))), search.seen[middle]
+
+
+def _all_over(middle: Point) -> list[Point]:
+    """All of theta at the same rho and at another one; but for the size nearest to the middle itself."""
+    thetas = np.log(THETAS)
+    others = np.delete(thetas, np.argmin(np.abs(thetas - middle[0])))
+    elsewhere = np.log(RHOS[-1] if middle[1] < np.log(RHOS[1]) else RHOS[0])
+    return [*((theta, middle[1]) for theta in others.tolist()), *((theta, elsewhere) for theta in thetas.tolist())]
 
 
 class _Search:

@@ -129,7 +129,8 @@ class Refitter:
 
     def fit(self, p: FloatArray, size: tuple[float, float] | None = None, *, hold_noise: bool = False) -> Refit:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
-        p, first = p.copy(), p[self._where].copy()
+        p = p.copy()
+        p[self._where] = first = np.clip(p[self._where], self._lower, self._upper)
         if size is None or not hold_noise:
             size, best = search_noise(self._costs_of_noise(p, first), size)
         else:
@@ -141,14 +142,23 @@ class Refitter:
             if hold_noise and gain < ENOUGH:
                 break
             if not hold_noise and (gain < LARGE or i % 2):
-                again, value = search_noise(self._costs_of_noise(p, first), size, best)
-                improved = best - value
-                if improved > 0:
-                    size, best = again, value
-                if gain < ENOUGH and improved < ENOUGH:
+                improved = 0.0
+                for near in (True, False):  # all over again only where all else has come to rest
+                    again, value = search_noise(self._costs_of_noise(p, first), size, best, near=near)
+                    if value < best:
+                        improved, size, best = improved + best - value, again, value
+                    if gain >= ENOUGH or improved >= ENOUGH:
+                        break
+                else:
                     break
         noise = self.noise(size)
         return Refit(p, noise, size, self.run(p, noise), -best)
+
+    def costs(self, points: FloatArray, size: tuple[float, float]) -> FloatArray:
+        """Costs (k,) at several parameters (k, np), each in range, with factors of the noise."""
+        inside = points.copy()
+        inside[:, self._where] = np.clip(points[:, self._where], self._lower, self._upper)
+        return np.array(self._costs([(p, size) for p in inside], inside[0, self._where]))
 
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""

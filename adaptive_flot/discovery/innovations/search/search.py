@@ -25,6 +25,8 @@ SLOW = ("lag", "store")
 """Kinds of effects that the fit of the model as it is hides in its constants: its stores have become larger."""
 FURTHEST = 4.0
 """Largest factor by which a fit of an effect starts: beyond, its first guess is a poor one."""
+STARTS = (1.0, 0.6, 0.35, 0.2, 0.1, 0.05, 0.02, 0.005)
+"""Shares of a first guess from which the best is taken: a regression that moves the constants far, too, misleads."""
 
 
 @dataclass(frozen=True)
@@ -191,9 +193,14 @@ class Search:
         return found
 
     def added(self, start: Explanation, h: Hypothesis, p: FloatArray) -> Explanation:
-        """The explanation with an effect more, fitted from parameters of the model with it (np,)."""
+        """The explanation with an effect more, fitted from parameters of the model with it (np,), or a share of it."""
         model = model_with(self.model_of(start), h)
-        fit = self.fitter(model, (*start.free, *h.parameters)).fit(p, start.fit.size)
+        fitter = self.fitter(model, (*start.free, *h.parameters))
+        if h.kind not in SLOW:  # a time constant that starts short stays short
+            shares = np.ones((len(STARTS), len(p)))
+            shares[:, list(model.indices("parameters", h.parameters))] = np.array(STARTS)[:, None]
+            p = p * shares[np.argmin(fitter.costs(p * shares, start.fit.size))]
+        fit = fitter.fit(p, start.fit.size)
         return Explanation((*start.hypotheses, h), fit, start.numbers + numbers_of(h))
 
     def of_effects(self, effects: Sequence[Effect], fitted: Model, names: Sequence[str]) -> Explanation | None:
