@@ -212,4 +212,4 @@ def _usual_losses(calibration: Calibration) -> UsualLoss:
     blocks = blocks_of(rows, errors)
     sums = blocks.sums([loss.sum(axis=1) for loss in rows.losses(errors)])
     lengths = np.array([b - a for _, a, b in blocks.edges])
-    return UsualLoss(sums / lengths, len(calibration.constants.names), rows.count, calibration.usual.overall)
+    return UsualLoss(sums / lengths, len(calibration.constants.names), rows.count, calibration.usual.rms)

@@ -70,7 +70,7 @@ def verdict_of(
     error = tuple(
         OutputChange(
             model.outputs[c].name, model.outputs[c].unit, float(old[j]), float(new[j]),
-            float((calibration.usual.overall if reference else calibration.noise)[j]),
+            float((calibration.usual.rms if reference else calibration.noise)[j]),
             (r.low, r.high),
         )
         for j, c in enumerate(rows.columns)

@@ -119,7 +119,7 @@ def _is_there_few_times(h: Hypothesis) -> bool:
 def _explains(compared: Comparison, further: Search, explanation: Explanation) -> bool:
     """Whether free runs get better by a change at a place, on stretches that did not fit it."""
     rows, constants = compared.rows, further.known or compared.calibration.constants
-    model, usual = further.model, compared.calibration.usual.overall
+    model, usual = further.model, compared.calibration.usual.rms
     first = fit_all_rows(model, rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
     hypothesis = further.started(explanation, explanation.hypotheses[-1])

@@ -72,7 +72,7 @@ def with_searched_effect(
         return compared  # a search that was cut short tells another effect on another machine
     usual = {
         calibration.model.outputs[c].name: float(s)
-        for c, s in zip(compared.rows.columns, calibration.usual.overall, strict=True)
+        for c, s in zip(compared.rows.columns, calibration.usual.rms, strict=True)
     }
     # an instrument may have become noisier: such errors are no model's
     error = tuple(replace(c, noise=max(usual[c.output], c.noise)) for c in verdict.error if c.output in usual)

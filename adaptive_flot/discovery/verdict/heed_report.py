@@ -26,6 +26,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     last_report_rows,
     made_worse,
     noise_from_row_to_row,
+    rests_on_memory,
     surely_better,
     unexplained,
 )
@@ -71,6 +72,8 @@ def heed_report(state: State) -> State:
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
     if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
+    elif judgement.word == "none":
+        certain = rests_on_memory(error, np.hypot(noise, unknown))
     by_likelihood = likelier if surely and not against and not surely_better(error) else 0.0
     state = replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
     return replace(_with_rows_said(state, whole, problem), likelihood=by_likelihood)

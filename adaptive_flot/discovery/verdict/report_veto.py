@@ -32,6 +32,8 @@ WORSE_ON_FEW_ROWS = 0.5
 FAR_FROM_NOISE = 5.0
 """An error of so many times the noise is not explained, whatever the noise model says. Noise that is allowed to be
 coloured has up to three times what its differences show."""
+WELL_ABOVE = 2.0
+"""An error of so many times the noise is said to be above it where nothing is told to be missing."""
 
 
 def contradiction(
@@ -120,9 +122,26 @@ def unexplained(changes: Sequence[OutputChange], noise: FloatArray) -> str:
     A record is not explained because its noise model has swallowed what is wrong: the noise by differences knows no
     model. Arguments are as in `contradiction`; the noise takes in what the background leaves unknown.
     """
-    far = [(c, s) for c, s in zip(changes, noise, strict=True) if s > 0 and c.after > FAR_FROM_NOISE * s]
-    said = ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({c.after / s:.0f} times)" for c, s in far)
-    return f"The error is far above the noise from row to row: {said}." if far else ""
+    said = _above(changes, noise, FAR_FROM_NOISE)
+    return f"The error is far above the noise from row to row: {said}." if said else ""
+
+
+def rests_on_memory(changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """What `none` rests on where an error is well above the noise from row to row, in words; empty where none is.
+
+    Noise with a memory is that large, and what is missing may be. Arguments are as in `unexplained`.
+    """
+    said = _above(changes, noise, WELL_ABOVE)
+    if not said:
+        return ""
+    above = f"above the noise from row to row are {said}"
+    return f"That rests on noise with a memory, and something may be missing: {above}."
+
+
+def _above(changes: Sequence[OutputChange], noise: FloatArray, factor: float) -> str:
+    """Outputs whose error after is so many times their noise, in words."""
+    far = [(c, s) for c, s in zip(changes, noise, strict=True) if s > 0 and c.after > factor * s]
+    return ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({c.after / s:.2g} times)" for c, s in far)
 
 
 def explains_little(changes: Sequence[OutputChange], noise: FloatArray) -> str:

@@ -140,7 +140,7 @@ def test_a_dependence_is_told_as_new_where_the_reference_does_not_have_it() -> N
 def test_errors_that_are_usual_on_the_reference_are_no_change() -> None:
     """The reference is said to err as much: the search finds the same effect, and it is not told."""
     before = compared()
-    usual = replace(before.calibration.usual, overall=100.0 * before.calibration.usual.overall)
+    usual = replace(before.calibration.usual, rms=100.0 * before.calibration.usual.rms)
     found = replace(before, calibration=replace(before.calibration, usual=usual))
     assert searched(found) is found
 

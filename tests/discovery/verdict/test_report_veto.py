@@ -17,6 +17,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     explains_little,
     last_report_rows,
     noise_from_row_to_row,
+    rests_on_memory,
     unexplained,
 )
 from adaptive_flot.greybox import Effect
@@ -163,6 +164,12 @@ def test_none_asks_for_a_residual_at_the_level_of_a_noise_that_no_model_has_fitt
     far, near = _change(5.77, 5.4, 0.0, 0.1), _change(0.2, 0.2, 0.0, 0.1)
     assert "5.4 K (54 times)" in unexplained([far], NOISE)
     assert unexplained([near], NOISE) == "" == unexplained([far], np.array([0.0]))
+
+
+def test_none_says_that_it_rests_on_noise_with_a_memory_where_errors_are_well_above_that_from_row_to_row() -> None:
+    """A cell whose cooling had failed was said to be explained, beside an error of 2.7 times its noise."""
+    assert "0.3 K (3 times)" in rests_on_memory([_change(0.3, 0.3, 0.0, 0.1)], NOISE)
+    assert rests_on_memory([_change(0.19, 0.19, 0.0, 0.1)], NOISE) == ""
 
 
 def test_what_leaves_nearly_all_of_a_large_error_is_no_name() -> None:

@@ -35,7 +35,9 @@ class UsualErrors:
     magnitudes
         Absolute errors of these rows (n, m).
     overall
-        Their root mean square over all rows (m,).
+        Their root mean square over all rows (m,), without the few largest: what an error counts by.
+    rms
+        The same with the largest (m,): what root mean square errors of other records are compared with.
     low, width
         Range of the inputs (nu,).
     """
@@ -43,6 +45,7 @@ class UsualErrors:
     tree: KDTree
     magnitudes: FloatArray
     overall: FloatArray
+    rms: FloatArray
     low: FloatArray
     width: FloatArray
 
@@ -91,4 +94,7 @@ def usual_errors(
     every = np.concatenate([inputs, *(r.inputs for r in others)])
     low, width = every.min(axis=0), np.ptp(every, axis=0)
     width = np.where(width > 0, width, 1.0)
-    return UsualErrors(KDTree((inputs - low) / width), magnitudes, overall_sizes(rows, errors, floor), low, width)
+    overall = overall_sizes(rows, errors, floor)
+    with np.errstate(all="ignore"):
+        together = np.maximum(np.nan_to_num(np.sqrt(np.nanmean(magnitudes**2, axis=0))), overall)
+    return UsualErrors(KDTree((inputs - low) / width), magnitudes, overall, together, low, width)

@@ -81,7 +81,7 @@ def with_cause(
         notes = (*notes, SIZES_OPEN)
     said, (first, _, _) = ", ".join(c.words for c in error), compared.verdict.reason.partition(". ")
     reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
-    alone = f"Free runs over the whole record, without process noise, do not tell it. They say: {first}."
+    alone = f"Free runs over the whole record, without process noise, {_as_well(compared, told)}: {first}."
     return replace(
         compared,
         verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*notes, alone)),
@@ -90,6 +90,15 @@ def with_cause(
         tested=(*found, *compared.tested),
         judged=judged,
     )
+
+
+def _as_well(compared: Comparison, told: Told) -> str:
+    """Whether free runs tell the same part, another one, or none."""
+    verdict = compared.verdict
+    if verdict.word not in WITH_A_NAME:
+        return "do not tell it. They say"
+    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
+    return "say so, too" if sites & {h.site for h in told.effects} else "say something else"
 
 
 def _too_many_parts(compared: Comparison, told: Told) -> bool:

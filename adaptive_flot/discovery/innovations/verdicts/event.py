@@ -61,10 +61,10 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     shown = tuple(c for c in verdict.error if c.output in reached)
     if all(c.before <= ABOVE_USUAL * c.noise for c in shown) or hardly_explained(shown, ABOVE_USUAL):
         return compared
-    if worse_outputs(rows, blocks, null, found[0], compared.calibration.usual.overall):
+    if worse_outputs(rows, blocks, null, found[0], compared.calibration.usual.rms):
         return compared
     said = compared.verdict.word in WITH_A_NAME  # what is not told over the whole record says nothing beside it
-    over_all = (f"Over the whole record: {compared.verdict.reason}",) if said else ()
+    over_all = (f"One change over the whole record would be told so: {compared.verdict.reason}",) if said else ()
     return replace(
         compared,
         verdict=replace(verdict, notes=(*verdict.notes, *over_all)),

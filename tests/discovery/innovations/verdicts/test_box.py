@@ -51,4 +51,4 @@ def test_an_event_is_not_told_where_no_error_is_unusual(share: float, monkeypatc
     )
     verdict = find_changes(model(), [record(seed=3)], [record((), seed=2)]).verdict
     assert all(e.effect.form != "switch" for e in verdict.effects)
-    assert not any(note.startswith("Over the whole record") for note in verdict.notes)
+    assert not any(note.startswith("One change over the whole record") for note in verdict.notes)
