@@ -95,7 +95,8 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     possible = [e for e in found if not _beyond(search, e)]
     matters = found[0].criterion - base.criterion >= LEAST_GAIN
     if matters and found[0] not in possible and (not possible or told_apart(search, base, found[0], possible[0])):
-        return Told("abstain", found[0], (), (), (found[0],), TOO_LARGE)
+        alone = _event_alone(search, base, found)
+        return alone or Told("abstain", found[0], (), (), (found[0],), TOO_LARGE)
     found = possible or found
     given_up, everything = list[Hypothesis](), found
     while found[0].criterion - base.criterion >= LEAST_GAIN:
@@ -119,6 +120,30 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
         return Told("abstain", base, (), (), (base,), why)
     return Told("abstain", found[0], (), (), _alike(search, base, found), why)
+
+
+def _event_alone(search: Search, base: Explanation, found: Sequence[Explanation]) -> Told | None:
+    """The event of the best explanation, whose other effect would have to be too large; None where it is not certain.
+
+    Something else is wrong with the model then, and that effect takes it up. The event is certain where every
+    explanation without it is told from the best one, and from it every other effect alone; and where it predicts
+    stretches that did not fit it.
+    """
+    events = [h for h in found[0].hypotheses if h.kind in EVENTS and not _rests_at_edge(search, found[0], h)]
+    if len(found[0].hypotheses) != 2 or len(events) != 1:
+        return None
+    without = [e for e in found if not _has(e, events[0])]
+    singles = [e for e in found if len(e.hypotheses) == 1]
+    own = next((e for e in singles if _has(e, events[0])), None)
+    if own is None or own.criterion - base.criterion < LEAST_GAIN or _beyond(search, own):
+        return None
+    rivals = [e for e in without if e in singles]
+    sure = all(told_apart(search, base, found[0], e) for e in without)
+    if not sure or not all(told_apart(search, base, own, e) for e in rivals):
+        return None
+    if _contradicted(search, own, {own.hypotheses[0].label: base}):
+        return None
+    return Told("named", own, own.hypotheses, (), (own,), "")
 
 
 def _without_each(search: Search, explanation: Explanation) -> dict[str, Explanation]:
@@ -233,9 +258,14 @@ def _follows_an_input(search: Search, event: Hypothesis) -> bool:
 
 def _beyond(search: Search, explanation: Explanation) -> bool:
     """Whether one of its effects rests at the end of what such a fault can be."""
-    ranged = [h for h in explanation.hypotheses if h.limits]
-    value = {q.name: q.value for q in search.model_of(explanation).parameters} if ranged else {}
-    return any(rests_at_edge(h, value.__getitem__) for h in ranged)
+    return any(_rests_at_edge(search, explanation, h) for h in explanation.hypotheses)
+
+
+def _rests_at_edge(search: Search, explanation: Explanation, h: Hypothesis) -> bool:
+    if not h.limits:
+        return False
+    value = {q.name: q.value for q in search.model_of(explanation).parameters}
+    return rests_at_edge(h, value.__getitem__)
 
 
 def _told(

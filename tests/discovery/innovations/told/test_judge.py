@@ -130,6 +130,25 @@ def test_nothing_is_missing_where_no_explanation_gains() -> None:
     assert told(Given((lag("sensor"),), 5.0, 0.1)).word == "none"
 
 
+@pytest.mark.parametrize(
+    ("hull", "indicator", "fresh", "word"),
+    [(480.0, 300.0, 0.5, "named"), (None, 300.0, 0.5, "abstain"), (480.0, 300.0, -0.5, "abstain")],
+)
+def test_an_event_is_told_without_a_partner_that_would_have_to_be_too_large(
+    hull: float | None, indicator: float, fresh: float, word: str
+) -> None:
+    """Measured: a rudder lost force, and a span of the gyro at its limit took up what else the model lacks.
+
+    The event must be found alone, and must predict fresh rows.
+    """
+    force = event("rudder", (800.0, 1200.0))
+    pair, other = Given((force, SPAN), 600.0, 0.7, slope=0.3), Given((lag("indicator"),), indicator, 0.3)
+    alone = [Given((force,), hull, fresh)] if hull else []
+    said = told(pair, *alone, other, Given((SPAN,), 100.0, 0.1, slope=0.3))
+    assert said.word == word, said.why
+    assert [h.site for h in said.certain] == (["rudder"] if word == "named" else [])
+
+
 @pytest.mark.parametrize(("slope", "word"), [(-0.1, "named"), (-0.2999, "abstain"), (0.3, "abstain")])
 def test_a_fault_at_the_end_of_its_range_is_no_explanation(slope: float, word: str) -> None:
     """Though it predicts fresh rows and fits best: the record asks for more than such a fault can give."""
