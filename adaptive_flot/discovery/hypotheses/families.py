@@ -170,6 +170,8 @@ def _at_site(
         yield _gain(site)
     if site.role in ("sensor", "actuator") and (spread > 0 or size > 0):
         yield _offset(site, spread or size)
+    elif site.mode == "offset" and low < 0 < high:  # an amount is no factor of what goes both ways
+        yield constant_amount(site, spread)
     if site.role in ("process", "flow", "feed"):
         for name, d in drivers.items():
             if np.quantile(d, ENDS[1]) - np.quantile(d, ENDS[0]) > LEAST_MOVE * float(np.median(np.abs(d))):

@@ -136,22 +136,25 @@ def _moved(calibration: Calibration, after: Tested) -> tuple[str, ...]:
 def _beyond(calibration: Calibration, rows: Rows, null: Tested) -> tuple[str, ...]:
     """Where the plant is beyond all that the reference has shown, in a share of the new rows.
 
-    By its inputs, and by its outputs as the model has them: a gauge that is off brings no plant anywhere.
+    By its inputs; and by its outputs, both as measured and as the model has them. A gauge that is off brings no plant
+    anywhere, and a free run that leaves the plant is no plant.
     """
     model, columns = calibration.model, list(rows.columns)
     names = [q.name.replace("_", " ") for q in (*model.inputs, *(model.outputs[c] for c in columns))]
     old = np.concatenate([np.hstack([r.inputs, r.outputs[:, columns]]) for r in calibration.rows.records])
-    new = np.concatenate(
+    seen = np.concatenate([np.hstack([r.inputs, r.outputs[:, columns]]) for r in rows.records])
+    had = np.concatenate(
         [np.hstack([r.inputs, r.outputs[:, columns] - e]) for r, e in zip(rows.records, null.fresh, strict=True)]
     )
     notes = []
-    for name, was, now in zip(names, old.T, new.T, strict=True):
-        was, now = was[np.isfinite(was)], now[np.isfinite(now)]
+    for name, was, both in zip(names, old.T, np.stack([seen, had], axis=-1).transpose(1, 0, 2), strict=True):
+        was, now = was[np.isfinite(was)], both[np.isfinite(both).all(axis=1)]
         if not len(was) or not len(now):
             continue
         low, high = np.quantile(was, SEEN)
         apart = WIDER * (high - low)
-        for share, where in ((np.mean(now > high + apart), "higher"), (np.mean(now < low - apart), "lower")):
+        above, below = now.min(axis=1) > high + apart, now.max(axis=1) < low - apart
+        for share, where in ((np.mean(above), "higher"), (np.mean(below), "lower")):
             if share > BEYOND:
                 notes.append(f"{name} is {where} in {100 * share:.0f} % of the rows than in the reference")
     if not notes:

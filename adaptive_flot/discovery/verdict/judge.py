@@ -164,6 +164,15 @@ def first_that_stands(problem: Problem, result: SearchResult) -> SearchResult:
     return result
 
 
+def leads_by_far(result: SearchResult, judged: Judgement) -> bool:
+    """Whether rivals are near the best one only for what that leaves unexplained: by its lead it is told from all."""
+    best, checked = judged.best, result.verification
+    if best is None or not judged.rivals or checked is None or not checked.confirmed:
+        return False
+    close = any(a.near(best, LEAST_MARGIN * result.rows_per_effective_sample) for a in judged.rivals)
+    return not close and any(a.near(best, judged.margin) for a in judged.rivals)
+
+
 def undecided_rivals(result: SearchResult) -> tuple[Alternative, ...]:
     """Rivals that are near the best, where some are so only for what the best leaves unexplained; else none."""
     if not result.alternatives or result.verification is None or not result.verification.confirmed:

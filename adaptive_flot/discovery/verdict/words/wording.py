@@ -9,7 +9,7 @@ import numpy as np
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Alternative, Judgement, NamedEffect, SearchResult
-from adaptive_flot.discovery.verdict.judge import same_signal, same_site
+from adaptive_flot.discovery.verdict.judge import leads_by_far, same_signal, same_site
 from adaptive_flot.discovery.verdict.words.sizes import spaced, words_alone, words_each
 from adaptive_flot.greybox.forms.form import CoefficientRole
 
@@ -98,6 +98,13 @@ def reason_words(
     if judgement.word == "unnamed":
         evidence = f"{beside_a_part(judgement)}{evidence}.{_still_wrong(wrong)}"
         return f"{said}. The model lacks this, and it has no name. {evidence}"
+    best = judgement.best
+    if best and leads_by_far(result, judgement):
+        others = ", ".join("+".join(_brief(a)) for a in judgement.rivals[:3])
+        return (
+            f"Something is missing. {' with '.join(_brief(best))} fits the record best by far, and is not told: it "
+            f"leaves more than its lead over others ({others}), so that a further cause may turn that over. {evidence}."
+        )
     close = ", ".join("+".join(_brief(a)) for a in (judgement.best, *judgement.rivals[:3]) if a)
     return (
         "Something is missing, but the record does not say what: too many alternatives explain it about as well, or "
