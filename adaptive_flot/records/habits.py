@@ -21,6 +21,8 @@ LONG_RUN = 30
 """So many equal values, where a signal else changes, are a frozen sensor (as in discovery's data screening)."""
 NICE = (1, 2, 3, 5, 6, 10, 12, 15, 20, 30, 60, 120, 300, 600, 900, 1800, 3600)
 """Steps [s] for tags that are stored as they change."""
+SURE, NEARLY = 3.0, 1e-3
+"""A step is a round one within so many standard errors of the mean, and within such a share."""
 REGULAR = 0.5
 """Largest deviation of a step from the usual one, as a share, that is no hole."""
 
@@ -100,7 +102,8 @@ def _freezes(values: FloatArray) -> bool:
 def period(signal: Signal) -> tuple[float, bool]:
     """Usual time between two values [s], and whether the signal is regular.
 
-    Of a regular signal it is the mean step without holes: 3.04 s, where stamps are in whole seconds.
+    Of a regular signal it is the mean step without holes: 3.04 s, where stamps are in whole seconds. It is 60 s where
+    stamps jitter by some seconds, and the mean of some thousand is 59.99 s.
 
     Raises
     ------
@@ -116,7 +119,11 @@ def period(signal: Signal) -> tuple[float, bool]:
     if near.mean() < 0.8:
         return middle, False
     mean = float(np.mean(steps[near]))
-    return (middle if abs(mean - middle) < 1e-4 * middle else mean), True
+    if abs(mean - middle) < 1e-4 * middle:
+        return middle, True
+    # stamps that jitter tell the step no better than this
+    unsure = min(SURE * float(np.std(steps[near])) / np.sqrt(near.sum()), NEARLY * mean)
+    return next((float(n) for n in NICE if abs(mean - n) <= unsure), mean), True
 
 
 def _grid(export: Export, model: Model, known: TagMap) -> TagMap:

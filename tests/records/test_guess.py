@@ -170,6 +170,16 @@ def test_the_step_of_a_logger_in_whole_seconds_is_its_mean_one() -> None:
     assert regular and step == pytest.approx(3.04, rel=1e-3)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_clock_that_jitters_about_a_minute_has_a_step_of_a_minute(seed: int) -> None:
+    """Else two records of one logger have two steps, and can not be compared."""
+    rng = np.random.default_rng(seed)
+    time = np.delete(60.0 * np.arange(1700) + rng.normal(0.0, 2.5, 1700), rng.choice(1700, 6, replace=False))
+    stamps = (np.round(time) * 1e9).astype(np.int64)
+    step, regular = period(Signal("a", "", "", stamps, np.ones(len(stamps)), np.arange(len(stamps))))
+    assert regular and step == 60.0
+
+
 def test_a_hole_does_not_change_the_step() -> None:
     time = (np.delete(10.0 * np.arange(500), range(100, 300)) * 1e9).astype(np.int64)
     assert period(Signal("a", "", "", time, np.ones(300), np.arange(300))) == (10.0, True)

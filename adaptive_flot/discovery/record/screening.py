@@ -115,7 +115,7 @@ def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ..
             for a, b in runs_of(~np.isfinite(outputs[:, j]), FROZEN_ROWS if is_dense(outputs[:, j]) else len(before))
         ]
     for q, u in zip(model.inputs, record.inputs.T, strict=True):
-        stopped = _frozen(u) & (u > u.min()) & (u < u.max())  # a valve may stay shut
+        stopped = _frozen(u) & (u > u.min()) & (u < u.max()) & (u != 0)  # a valve may stay shut, a battery at rest
         for a, b in runs_of(stopped, FROZEN_ROWS) if stopped.mean() < MOST_FROZEN else ():
             suspects.append(Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} stands still"))
             notes.append(f"{suspects[-1]}, where it else changes from row to row: a sensor that had stopped?")

@@ -72,6 +72,17 @@ def test_the_same_record_given_twice_is_refused(
     assert not (tmp_path / "r").exists()
 
 
+def test_records_of_different_steps_are_refused_before_anything_is_fitted(
+    call: Call, records: tuple[Path, Path], tmp_path: Path
+) -> None:
+    table = pd.read_csv(records[1])
+    table.assign(time_s=1.0002 * table["time_s"]).to_csv(tmp_path / "other.csv", index=False)
+    result = call("discover", "new.csv", "--reference", "other.csv", "--model", MODEL, "--out", "r")
+    assert result.code == 2 and len(result.err.splitlines()) == 1
+    assert result.err.startswith("adaptive-flot: other.csv: one row every ") and "'grid: {step: " in result.err
+    assert not (tmp_path / "r").exists()
+
+
 def judged_with_holes(call: Call, records: tuple[Path, Path], tmp_path: Path, *kept: slice) -> str:
     """The page on the new record with some rows lost, in which the draught is named all the same."""
     new, old = records

@@ -49,6 +49,15 @@ def test_what_is_frozen_missing_or_stands_still_becomes_a_suspect_part() -> None
     assert np.isnan(cleaned.outputs[101:160, 0]).all() and any("had stopped?" in n for n in notes)
 
 
+def test_an_input_that_rests_at_zero_between_both_signs_is_no_suspect() -> None:
+    """A battery at rest has no current, and its sensor has not stopped."""
+    record = tank_record(Truth(exponent=0.0), 600)
+    u = record.inputs.copy()
+    u[:, 1] = np.random.default_rng(0).standard_normal(600)
+    u[400:440, 1] = 0.0
+    assert clean_outputs(replace(record, inputs=u), heated_tank())[2] == ()
+
+
 def test_a_few_rows_that_were_lost_are_a_suspect_part_and_many_are_not() -> None:
     """What begins just there may be the logger."""
     record = tank_record(Truth(exponent=0.0), 600)
