@@ -208,7 +208,8 @@ def _with_words_on_data(compared: Comparison, model: Model, records: Sequence[Da
         said += [f"{r.name}: {n}." for r, e in swings for n in swing_notes(model, r, compared.rows.columns, e)]
     if referred and len(records) > 1:
         said.append("Events in time were not looked for: that takes one record without a gap, and a reference.")
-    if referred and len(records) == 1 and not is_short_since_reference(records[0], compared.calibration.model):
+    asked = replace(model, max_step_s=compared.calibration.model.max_step_s)  # without what was found, which has states
+    if referred and len(records) == 1 and not is_short_since_reference(records[0], asked):
         said.append(f"Events in time were not looked for row by row: {len(records[0])} rows are many for this model.")
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, *said))) if said else compared
 
