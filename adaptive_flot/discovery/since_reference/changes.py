@@ -37,6 +37,7 @@ from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.places import with_what_is_nearest, with_words_without_a_site
 from adaptive_flot.discovery.since_reference.process_noise import with_process_noise
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
+from adaptive_flot.discovery.since_reference.step import with_step
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
 from adaptive_flot.discovery.since_reference.taken_back import (
     leaves_more,
@@ -113,6 +114,7 @@ def _found(
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, SPENT)))
         if short and judged.verdict.word in WITH_A_NAME:
             return taken_back(judged, NOT_ASKED)
+    judged = with_step(judged, processes, ends)
     why = why_not_new(judged, confirmed)
     return taken_back(judged, why, said="No change is told") if why else unless_much_is_left(judged)
 

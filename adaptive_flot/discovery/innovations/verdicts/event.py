@@ -6,7 +6,9 @@ event, like those of any other hypothesis.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +19,9 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
     model_with,
     test_on_stretches,
 )
-from adaptive_flot.discovery.hypotheses.judgement import Judged
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
+from adaptive_flot.discovery.hypotheses.judgement import Judged, WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
 from adaptive_flot.discovery.innovations.judge import Told
@@ -25,6 +29,7 @@ from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results.words import WITH_A_NAME
+from adaptive_flot.greybox.model import Model
 
 
 def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
@@ -41,20 +46,42 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
     search, told
         The search in innovations form, and what was judged: events, and nothing else.
     """
-    model, rows = search.model, compared.rows
+    events = [(told.best, h) for h in told.certain] or list(told.open)
+    word: Literal["named", "class"] = "class" if told.word == "class" else "named"
+    hypotheses = tuple(search.started(e, h) for e, h in events)
     constants = search.known or compared.calibration.constants
+    return with_hypotheses(compared, search.model, constants, hypotheses, word, told.beside)
 
+
+def with_hypotheses(
+    compared: Comparison,
+    model: Model,
+    constants: Constants,
+    hypotheses: Sequence[Hypothesis],
+    word: Literal["named", "class"],
+    beside: WithoutSite | None,
+) -> Comparison:
+    """The comparison with events told, the best first; unchanged as `with_event` says.
+
+    Parameters
+    ----------
+    compared
+        The comparison of the whole record.
+    model, constants
+        The model beside them, and what is known of its constants.
+    hypotheses, word, beside
+        The events, and what they are told as.
+    """
+    rows = compared.rows
     first = fit_all_rows(model, rows, None, constants, None)
     assert first is not None  # the model as it is can be simulated
     null = test_on_stretches(model, rows, first, hold_constants=True)
-    events = [(told.best, h) for h in told.certain] or list(told.open)
-    hypotheses = (search.started(e, h) for e, h in events)
     tested = (fitted_and_tested(model, rows, h, constants, first.fit) for h in hypotheses)
     found = [t for t in tested if t is not None]
     if not found or not np.nanmean(rms(rows, found[0].fresh) / rms(rows, null.fresh)) < 1:
         return compared
-    word = "class" if told.word == "class" and len(found) > 1 else "named"
-    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"), told.beside)  # type: ignore[arg-type]
+    word = "class" if word == "class" and len(found) > 1 else "named"
+    judged = Judged(word, found[0], tuple(found[1:]), "", float("nan"), beside)
     calibration, blocks = replace(compared.calibration, model=model), blocks_of(rows, null.fresh)
     verdict = verdict_of(calibration, rows, blocks, null, judged, True, compared.verdict.seconds)
     reached = set(outputs_in_reach(model, model_with(model, found[0].hypothesis)))
