@@ -85,7 +85,10 @@ def search_noise(
         middle = search.least_of(np.log(list(product(THETAS, RHOS))))
     else:
         middle = search.inside(np.log(start))
-        search.seen.update({middle: cost} if cost is not None else {})
+        if cost is not None:
+            search.seen[middle] = cost
+        elif near:
+            search.least_of([middle])
     looked, gain = middle[1] if near else np.inf, np.inf
     for _ in range(ROUNDS):
         if abs(middle[1] - looked) > ELSEWHERE:

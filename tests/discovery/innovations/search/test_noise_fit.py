@@ -46,6 +46,13 @@ def test_the_least_cost_is_found_to_less_than_what_counts(log_theta: float, log_
     assert cost.calls <= 12
 
 
+def test_a_search_that_is_called_again_looks_near_and_ends_where_the_other_does() -> None:
+    again, anew = Likelihood(0.1, 1.0), Likelihood(0.1, 1.0)
+    near, far = search_noise(again.all, (0.11, 0.95), near=True), search_noise(anew.all, (0.11, 0.95))
+    assert near[1] == pytest.approx(far[1], abs=0.3)
+    assert again.calls < anew.calls
+
+
 @pytest.mark.parametrize("start", [None, (1e-6, 1.0), (10.0, 10.0)])
 def test_sizes_stay_in_their_range(start: tuple[float, float] | None) -> None:
     (theta, rho), _ = search_noise(lambda sizes: [100 * (np.log(t) + np.log(r)) for t, r in sizes], start)
