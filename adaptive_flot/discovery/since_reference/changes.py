@@ -114,7 +114,7 @@ def _found(
         judged = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, SPENT)))
         if short and judged.verdict.word in WITH_A_NAME:
             return taken_back(judged, NOT_ASKED)
-    judged = with_step(judged, processes, ends)
+    judged = with_step(judged, processes, ends) if short else judged
     why = why_not_new(judged, confirmed)
     return taken_back(judged, why, said="No change is told") if why else unless_much_is_left(judged)
 

@@ -35,8 +35,8 @@ LEAST = 3.0
 """An error so many times its usual one, in the model as it is, asks for a step."""
 EDGES, ROUNDS = 12, 4
 """Times at which a step is tried at first, and halvings of their distance about the best one."""
-FOLLOWED = 4
-"""Sites whose times are looked for more closely, and all others that come as near."""
+FOLLOWED = 4.0
+"""The time of a step is looked for more closely where at first it leaves so many times the usual errors, or less."""
 
 
 @dataclass(frozen=True)
@@ -85,16 +85,21 @@ def with_step(compared: Comparison, processes: int, ends: float) -> Comparison:
     alike = [s for s in tried if s.worst <= FAR_ABOVE and s.site.name != best.site.name]
     alike = [s for s in alike if not is_same_part(own, s.site.name, best.site.name)]
     words = "; or as if ".join(_in_words(compared, model, s) for s in alike if s.site.name in places)
-    if all(s.site.name in places for s in alike) and len(alike) < LARGEST_CLASS:
+    elsewhere = [s for s in alike if s.site.name not in places]
+    if not elsewhere and len(alike) < LARGEST_CLASS:
         beside = WithoutSite(alike[0].site.name, "time", words) if alike else None
         told = with_hypotheses(compared, own, constants, (best.hypothesis,), "named", beside)
         if told is not compared:
             return told
-    said = words_of(own, best.hypothesis, lambda name: best.size)
+    said = "; or ".join(_at_site(own, s) for s in (best, *elsewhere))
     also = f"; or as if {words}" if words else ""
     left = f"It leaves {best.worst:.2g} times the usual errors"
     note = f"One step in time comes near, and is not told: {said}{also}. {left}."
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, note)))
+
+
+def _at_site(model: Model, step: _Step) -> str:
+    return words_of(model, step.hypothesis, lambda name: step.size)
 
 
 def _in_words(compared: Comparison, model: Model, step: _Step) -> str:
@@ -133,9 +138,7 @@ def _tried(compared: Comparison, model: Model, first: JointFit, processes: int, 
         return step
 
     steps = [s for s in parallel_map(lambda site: best_of(site, coarse), model.sites, processes) if s is not None]
-    steps.sort(key=lambda s: s.worst)
-    level = max((s.worst for s in steps[:FOLLOWED]), default=0.0)
-    followed = [s for s in steps if s.worst <= level]
+    followed = [s for s in steps if s.worst <= FOLLOWED]
     return sorted(parallel_map(closer, followed, processes), key=lambda s: s.worst)
 
 
