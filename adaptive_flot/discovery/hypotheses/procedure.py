@@ -22,7 +22,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import (
     worth_testing,
 )
 from adaptive_flot.discovery.hypotheses.families import STRUCTURE, Hypothesis, hypotheses
-from adaptive_flot.discovery.hypotheses.joint.fit import JointFit
+from adaptive_flot.discovery.hypotheses.joint.fit import JointFit, check_intervals
 from adaptive_flot.discovery.hypotheses.joint.known_before import first_states, loose_constants, scattered_starts
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, measured_columns, noise_floor, rows_of
 from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, judge
@@ -119,7 +119,7 @@ def compare(
     Raises
     ------
     ModelError
-        No site.
+        No site, or records of different sampling intervals.
     DataError
         No common output, or a record that the model can not simulate.
     """
@@ -127,6 +127,7 @@ def compare(
     if not model.sites:
         raise ModelError(f"model '{model.name}' has no sites; pass its physical quantities through Scope.site")
     free = model.expand_parameters(adapted or [p.name for p in model.parameters if p.role == "estimated"])
+    check_intervals((*records, *references))
     columns = measured_columns(model, (*records, *references))
     model = _with_steps_for(model, (*references, *records), columns)
     progress("fit the constants")

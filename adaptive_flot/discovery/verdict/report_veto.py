@@ -141,7 +141,11 @@ def rests_on_memory(changes: Sequence[OutputChange], noise: FloatArray) -> str:
 def _above(changes: Sequence[OutputChange], noise: FloatArray, factor: float) -> str:
     """Outputs whose error after is so many times their noise, in words."""
     far = [(c, s) for c, s in zip(changes, noise, strict=True) if s > 0 and c.after > factor * s]
-    return ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({c.after / s:.2g} times)" for c, s in far)
+    return ", ".join(f"{c.output} {c.after:.3g} {c.unit}".rstrip(" -") + f" ({_times(c.after / s)})" for c, s in far)
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.0f} times" if ratio >= 10 else f"{ratio:.2g} times"
 
 
 def explains_little(changes: Sequence[OutputChange], noise: FloatArray) -> str:

@@ -20,8 +20,6 @@ from adaptive_flot.provenance import values_hash
 from adaptive_flot.records.importing import is_record
 from adaptive_flot.records.tag_map import TagMap
 
-SAME_INTERVAL = 1e-6
-"""Share by which sampling intervals of records may differ."""
 MOST_ROWS = 0.5
 """Share of the rows from which the longest stretch stands for a record."""
 
@@ -63,7 +61,6 @@ def discover_records(
     alone = bool(references)  # events in time take one record, and a short stretch adds little but a start of its own
     groups = [[(_called(s), _read(s, model, tag_map, alone)) for s in group] for group in (sources, references)]
     _check_once([record for group in groups for record in group])
-    _check_intervals([record for group in groups for record in group])
     new, old = ([part for _, parts in group for part in parts] for group in groups)
     return find_changes(model, new, old, processes=processes, progress=progress, budget=budget)
 
@@ -98,23 +95,6 @@ def _check_once(records: Sequence[tuple[str, Sequence[Dataset]]]) -> None:
         if values in seen:
             raise DataError(f"{name}: the same record as {seen[values]}; give each once")
         seen[values] = name
-
-
-def _check_intervals(records: Sequence[tuple[str, Sequence[Dataset]]]) -> None:
-    """Refuse records of different sampling intervals before anything is fitted.
-
-    Raises
-    ------
-    DataError
-        Two of them differ by more than a millionth.
-    """
-    (first, parts), *others = records
-    for name, own in others:
-        if any(abs(r.dt - parts[0].dt) > SAME_INTERVAL * parts[0].dt for r in own):
-            raise DataError(
-                f"{name}: one row every {own[0].dt:g} s, and {first} has one every {parts[0].dt:g} s; import both with "
-                f"the same step, as 'grid: {{step: {max(own[0].dt, parts[0].dt):.3g} s}}' in the map of tags"
-            )
 
 
 def _read(source: Source | Dataset, model: Model, tag_map: TagMap | None, alone: bool) -> list[Dataset]:

@@ -79,7 +79,8 @@ def test_records_of_different_steps_are_refused_before_anything_is_fitted(
     table.assign(time_s=1.0002 * table["time_s"]).to_csv(tmp_path / "other.csv", index=False)
     result = call("discover", "new.csv", "--reference", "other.csv", "--model", MODEL, "--out", "r")
     assert result.code == 2 and len(result.err.splitlines()) == 1
-    assert result.err.startswith("adaptive-flot: other.csv: one row every ") and "'grid: {step: " in result.err
+    assert result.err.startswith("adaptive-flot: ") and "one row every " in result.err and "other" in result.err
+    assert "'grid: {step: " in result.err
     assert not (tmp_path / "r").exists()
 
 

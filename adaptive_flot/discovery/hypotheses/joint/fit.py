@@ -19,9 +19,12 @@ from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, fir
 from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, Rows
 from adaptive_flot.discovery.hypotheses.joint.unknowns import JointUnknowns
 from adaptive_flot.errors import ModelError
+from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 
+SAME_INTERVAL = 1e-6
+"""Share by which sampling intervals of records may differ."""
 MOST_EVALUATIONS = 15
 MOST_TIMES, STILL_FALLS = 6, 1e-3
 """Fits one after the other from a far start, as long as the criterion falls by this share."""
@@ -63,6 +66,24 @@ class JointFit:
         return self.values[name]
 
 
+def check_intervals(records: Sequence[Dataset]) -> None:
+    """Refuse records of different sampling intervals, which differ by more than a millionth.
+
+    Raises
+    ------
+    ModelError
+        Two of them do.
+    """
+    first, *others = records
+    for r in others:
+        if abs(r.dt - first.dt) > SAME_INTERVAL * first.dt:
+            step = float(f"{max(r.dt, first.dt):.3g}")
+            raise ModelError(
+                f"{r.name}: one row every {r.dt:g} s, and {first.name} has one every {first.dt:g} s; import both with "
+                f"the same step, as 'grid: {{step: {step:g} s}}' in the map of tags"
+            )
+
+
 class JointFitter:
     """Fits of one model structure (the model and its effects) to the same records.
 
@@ -95,15 +116,10 @@ class JointFitter:
     ) -> None:
         if not rows.records:
             raise ModelError("a joint fit needs a record; give at least one")
-        intervals = [record.dt for record in rows.records]
-        if max(intervals) - min(intervals) > 1e-6 * max(intervals):
-            raise ModelError(
-                f"records are sampled every {min(intervals):g} s and every {max(intervals):g} s; "
-                "resample them to one interval"
-            )
+        check_intervals(rows.records)
         self.model, self.rows, self.constants, self.coefficients = model, rows, constants, tuple(coefficients)
         self._last: tuple[FloatArray, tuple[FloatArray, ...]] | None = None
-        self._simulator = RecordSimulator(model, intervals[0])
+        self._simulator = RecordSimulator(model, rows.records[0].dt)
         self.unknowns = JointUnknowns(
             model, constants, self.coefficients, tuple(initial) or first_states(model, rows.records)
         )
