@@ -11,6 +11,7 @@ events           When something was switched, or stuck.
 screening.py     Which further effects are worth a refit.
 search           A few effects together.
 telling_apart.py Whether the record tells one explanation from another.
+given_up.py      What draws only what is left of a wrong model.
 judge.py         What is certain, and what predicts rows that did not fit it.
 in_words.py      What is told, in words.
 places           Names beside what acts where the model has no site.

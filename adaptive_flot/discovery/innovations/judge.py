@@ -10,26 +10,19 @@ from typing import Literal
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
-from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, STRUCTURE, Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
-from adaptive_flot.discovery.innovations.events.switching import chance_of_edges
 from adaptive_flot.discovery.innovations.filter.refit import Refitter
+from adaptive_flot.discovery.innovations.given_up import at_steps_of_an_input, overlapping, why_given_up
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import low_end, told_apart
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
-from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 
 SMALL = 0.15
 """An effect beside another one, that brings less than this share of the gain, is not told."""
-OWN = 0.8
-"""Share of the gain that is lost without an event beside another effect, at least."""
-BY_ITSELF = 0.5
-"""Share of the gain that an event has alone, and beside the other effect, from which it stands by itself."""
-BESIDE = 0.02
-"""Share of a record at its ends in which a change is none."""
 SAME_LAG = 0.8
 """Share of the gain from which a lag at another place is not told apart."""
 SAME_DEAD_TIME = 0.4
@@ -37,8 +30,6 @@ SAME_DEAD_TIME = 0.4
 lags for it, which smooths what wanders: a tank whose gauge is late keeps 56 % of the gain by its pump there."""
 TOO_LARGE = "what fits best would have to be larger than such a fault can be"
 FOLDS = 5
-BY_CHANCE = 1e-3
-"""Probability below which the times of an event are those of an input: then it is no event."""
 
 Word = Literal["none", "named", "class", "abstain"]
 
@@ -102,7 +93,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
         without = _without_each(search, best) if len(best.hypotheses) > 1 else {best.hypotheses[0].label: base}
-        failed = _at_steps_of_an_input(search, best) or _overlapping(search, base, best, without)
+        failed = at_steps_of_an_input(search, best) or overlapping(search, base, best, without)
         failed = failed or _contradicted(search, best, without)
         if not failed:
             told = _told(search, base, found, without)
@@ -116,7 +107,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
         found = [e for e in found if all(_name(h) != _name(failed[0]) for h in e.hypotheses)]
     if not given_up:
         return Told("none", base, (), (), (base,), "constants and process noise explain it")
-    why = _why(search, given_up)
+    why = why_given_up(search, given_up)
     if found[0].criterion - base.criterion < LEAST_GAIN:  # nothing is left beside what was given up
         return Told("abstain", base, (), (), (base,), why)
     return Told("abstain", found[0], (), (), _alike(search, base, found), why)
@@ -176,84 +167,6 @@ def _unless_given_up(
         return told
     why = f"{better.hypotheses[0].label} explains more, and is not certain"
     return replace(told, word="abstain", certain=(), open=(), why=why)
-
-
-def _why(search: Search, given_up: Sequence[Hypothesis]) -> str:
-    """Why effects were given up."""
-    events = [h for h in given_up if h.kind in EVENTS and _follows_an_input(search, h)]
-    others = [h for h in given_up if h not in events]
-    why = [f"{', '.join(h.label for h in events)}: at steps of an input, so it is no event"] if events else []
-    if others:
-        said = ", ".join(h.label for h in others)
-        why.append(f"{said} predict{'s' if len(others) == 1 else ''} no rows that did not fit it")
-    return "; ".join(why)
-
-
-def _at_steps_of_an_input(search: Search, explanation: Explanation) -> tuple[Hypothesis, ...]:
-    """Events beside another effect that begin and end where an input steps, more often than by chance.
-
-    One alone may well come with an input: guests when those who are counted go.
-    """
-    beside = explanation.hypotheses if len(explanation.hypotheses) > 1 else ()
-    return tuple(h for h in beside if h.kind in EVENTS and _follows_an_input(search, h))
-
-
-def _overlapping(
-    search: Search, base: Explanation, best: Explanation, without: Mapping[str, Explanation]
-) -> tuple[Hypothesis, ...]:
-    """An event beside another effect that explains much of the same: it draws what is left of a wrong model.
-
-    Nothing else draws an event that is there. So without it most of the gain is lost (OWN). Not so beside a constant
-    error at its site: that and the event are the level before and after. Nor is it given up where it explains most of
-    it (OWN) alone: it is the other effect, then, that draws what is left. Nor where it stands by itself, see
-    `stands_by_itself`. Since a reference, what a plant has or has not does not come between two records: it is then
-    enough that the event explains more alone than that.
-    """
-    if len(best.hypotheses) < 2:
-        return ()
-    most = OWN * (best.criterion - base.criterion)
-    levels = {h.site for h in best.hypotheses if h.driver == "constant"}
-    events = [h for h in best.hypotheses if h.kind in EVENTS and h.site not in levels]
-
-    def is_needed(event: Hypothesis) -> bool:
-        others = [h for h in best.hypotheses if h is not event]
-        alone, rest = max(without[h.label].criterion for h in others), without[event.label].criterion
-        structure = search.since_reference and all(h.kind in STRUCTURE for h in others)
-        leads = structure and alone - rest >= LEAST_GAIN
-        by_itself = happens_once(event, search.record) and stands_by_itself(best.criterion, base.criterion, alone, rest)
-        return leads or by_itself or best.criterion - rest >= most or alone - base.criterion >= most
-
-    return tuple(h for h in events if not is_needed(h))
-
-
-def happens_once(event: Hypothesis, record: Dataset) -> bool:
-    """Whether an event is one change that stays: what a wrong model leaves comes and goes with the inputs.
-
-    A change within a share BESIDE of the record of its ends is none.
-    """
-    first, last = float(record.time[0]), float(record.time[-1])
-    margin = BESIDE * (last - first)
-    edges = [t for begin, long in event.pulses for t in (begin, begin + long)]
-    return sum(first + margin < t < last - margin for t in edges) == 1
-
-
-def stands_by_itself(both: float, neither: float, alone: float, without: float) -> bool:
-    """Whether an event has most of the gain of two effects (BY_ITSELF) with and without the other one.
-
-    Then the other one explains something else, and draws nothing of it. By criteria: of both effects, of neither, of
-    the event alone, of the other one alone.
-    """
-    least = BY_ITSELF * (both - neither)
-    return alone - neither >= least and both - without >= least
-
-
-def _follows_an_input(search: Search, event: Hypothesis) -> bool:
-    record, edges = search.record, list[float]()
-    for begin, long in event.pulses:
-        edges += [begin, begin + long] if long < FOREVER else [begin]
-    rows = np.searchsorted(record.time, np.array(edges) - record.dt / 4)
-    inside = rows[(rows > 0) & (rows < len(record))]
-    return chance_of_edges(inside, record.inputs) < BY_CHANCE
 
 
 def _beyond(search: Search, explanation: Explanation) -> bool:

@@ -10,7 +10,8 @@ from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
-from adaptive_flot.discovery.innovations.judge import Told, happens_once, stands_by_itself
+from adaptive_flot.discovery.innovations.given_up import happens_once, stands_by_itself
+from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import has_short_pause
 from adaptive_flot.discovery.innovations.search.search import Search

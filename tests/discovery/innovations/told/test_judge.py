@@ -322,7 +322,7 @@ def test_a_lag_elsewhere_with_something_more_is_no_other_explanation(monkeypatch
     """Lags commute: a late amplifier, or a late tachometer and a load, are a lag, and a lag with a load."""
     monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
     one, two, load = lag("amplifier"), lag("tachometer"), event("load", (100.0, 300.0))
-    monkeypatch.setattr(judging, "_at_steps_of_an_input", lambda search, e: ())
+    monkeypatch.setattr(judging, "at_steps_of_an_input", lambda search, e: ())
     said = told(Given((one,), 500.0, 0.9), Given((two, load), 505.0, 0.9), Given((two,), 490.0, 0.8))
     assert said.word == "class" and [h.site for _, h in said.open] == ["amplifier", "tachometer"]
 
