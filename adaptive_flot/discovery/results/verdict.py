@@ -97,6 +97,11 @@ class Verdict:
     experiment: Experiment | None = None
     seconds: float = 0.0
 
+    @property
+    def sites(self) -> frozenset[str]:
+        """Sites of what is named, and of every member of a class."""
+        return frozenset(e.effect.site for e in self.effects) | frozenset(site for site, _ in self.members)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the machine-readable verdict."""
         return {

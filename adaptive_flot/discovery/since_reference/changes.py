@@ -226,11 +226,10 @@ def _of_another_shape(
     """
     if left <= 0 or unless_much_is_left(compared) is compared:
         return compared
-    nearest = {e.effect.site for e in compared.verdict.effects} | {site for site, _ in compared.verdict.members}
     searched = with_searched_effect(compared, record, processes, progress, left)
-    told = {e.effect.site for e in searched.verdict.effects} | {site for site, _ in searched.verdict.members}
     usual = all(c.after <= ABOVE_USUAL * c.noise for c in searched.verdict.error)
-    return searched if usual and told and told <= nearest else compared
+    told = searched.verdict.sites
+    return searched if usual and told and told <= compared.verdict.sites else compared
 
 
 def _has_event(told: Told) -> bool:

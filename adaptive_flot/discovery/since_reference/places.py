@@ -26,7 +26,7 @@ from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.innovations.verdicts.rivals import explains_too_little
 from adaptive_flot.discovery.results.words import WITH_A_NAME
-from adaptive_flot.discovery.since_reference.taken_back import sites_told, taken_back
+from adaptive_flot.discovery.since_reference.taken_back import taken_back
 
 REFITTED = 12
 """Changes at further places that are refitted, the best by a regression."""
@@ -66,7 +66,7 @@ def with_words_without_a_site(compared: Comparison, vetoed: Told, why: str) -> C
     What free runs tell at a site of what is `vetoed` with process noise is taken back.
     """
     verdict = compared.verdict
-    elsewhere = sites_told(verdict) - {h.site for h in vetoed.effects}
+    elsewhere = verdict.sites - {h.site for h in vetoed.effects}
     if elsewhere or verdict.word not in ("abstain", *WITH_A_NAME):
         return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, f"With process noise it is {why}.")))
     alone = f"By single faults of the whole record: {verdict.reason}"

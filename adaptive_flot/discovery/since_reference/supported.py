@@ -17,7 +17,7 @@ from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.results.words import WITH_A_NAME
-from adaptive_flot.discovery.since_reference.taken_back import leaves_more, sites_told, taken_back
+from adaptive_flot.discovery.since_reference.taken_back import leaves_more, taken_back
 
 LATE = "lag"
 SMALL_SHARE = 0.5
@@ -43,7 +43,7 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     verdict, best = compared.verdict, compared.judged.best
     if verdict.word not in WITH_A_NAME or best is None:
         return compared
-    sites = sites_told(verdict)
+    sites = verdict.sites
     # an event there, or a part that is late, is another cause: it does not speak for one that is there all the time
     found = (e for e in told.alike if sites & {h.site for h in e.hypotheses if h.kind not in (*EVENTS, LATE)})
     if any(e.criterion - base.criterion > SUPPORT for e in found):
@@ -63,7 +63,7 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     return taken_back(compared, why)
 
 
-def _is_elsewhere(e: Explanation, sites: set[str]) -> bool:
+def _is_elsewhere(e: Explanation, sites: frozenset[str]) -> bool:
     """Whether an explanation is one part alone, at another site, that is off all the time."""
     h = e.hypotheses[0]
     return len(e.hypotheses) == 1 and h.site not in sites and h.kind not in (*EVENTS, *STRUCTURE, LATE)
@@ -106,7 +106,7 @@ def unless_alike(compared: Comparison, told: Told) -> Comparison:
     verdict = compared.verdict
     if verdict.word not in WITH_A_NAME or not _wanders(compared):
         return compared
-    sites = sites_told(verdict)
+    sites = verdict.sites
     single = [(e.hypotheses[0], e.criterion) for e in told.alike if len(e.hypotheses) == 1]
     lasting = [(h, c) for h, c in single if h.kind not in (*EVENTS, *STRUCTURE, LATE)]
     own = max((c for h, c in lasting if h.site in sites), default=float("inf"))

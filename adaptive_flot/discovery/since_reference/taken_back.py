@@ -31,11 +31,6 @@ def leaves_more(verdict: Verdict) -> bool:
     return verdict.word == "abstain" or (verdict.word in WITH_A_NAME and left)
 
 
-def sites_told(verdict: Verdict) -> set[str]:
-    """Sites of what is named, and of every member of a class."""
-    return {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
-
-
 def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     """The comparison, its name taken back where the innovations form does not know it.
 
@@ -44,7 +39,7 @@ def unless_contradicted(compared: Comparison, told: Told) -> Comparison:
     there does not have it either: so little may be what wanders.
     """
     verdict, found = compared.verdict, told.effects
-    sites = sites_told(verdict)
+    sites = verdict.sites
     if verdict.word not in WITH_A_NAME or sites & {h.site for h in found}:
         return compared
     if told.word == "named" and found and leaves_more(verdict):

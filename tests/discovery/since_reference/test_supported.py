@@ -96,7 +96,7 @@ def test_only_what_is_there_all_the_time_speaks_for_a_name(
     """A battery with a hidden load for some hours: "the charger gives 0.1 A too little" had a late charger for it."""
     monkeypatch.setattr(supported, "_gain", lambda *given: 0.0)
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: None)
-    verdict = SimpleNamespace(word="named", effects=(SimpleNamespace(effect=SimpleNamespace(site="pump")),), members=())
+    verdict = SimpleNamespace(word="named", sites=frozenset({"pump"}))
     compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
     base: Any = SimpleNamespace(criterion=10.0)
     there = SimpleNamespace(site="pump", kind=kind)
@@ -125,7 +125,7 @@ def test_another_part_must_not_explain_far_more(
     said: list[str] = []
     monkeypatch.setattr(supported, "_gain", lambda *given: gain)
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: said.append(why))
-    verdict = SimpleNamespace(word="named", effects=(SimpleNamespace(effect=SimpleNamespace(site="pump")),), members=())
+    verdict = SimpleNamespace(word="named", sites=frozenset({"pump"}))
     verdict.error = (SimpleNamespace(after=left, noise=1.0),)
     compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
     base: Any = SimpleNamespace(criterion=10.0)
@@ -158,7 +158,7 @@ def test_a_class_lacks_no_part_that_process_noise_takes_for_as_good(
     What is told has to be among what process noise takes for alike: else another rule has its say.
     """
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: None)
-    verdict = SimpleNamespace(word="class", effects=(), members=(("pump", "constant"), ("draw", "constant")))
+    verdict = SimpleNamespace(word="class", sites=frozenset({"pump", "draw"}))
     calibration = SimpleNamespace(usual=SimpleNamespace(overall=np.array([usual])), noise=np.array([1.0]))
     compared: Any = SimpleNamespace(verdict=verdict, calibration=calibration)
     one, other = (SimpleNamespace(site=s, kind=k, label=s) for s, k in zip(sites, ("gain", kind), strict=True))

@@ -129,8 +129,8 @@ class Refitter:
 
     def fit(self, p: FloatArray, size: tuple[float, float] | None = None, *, hold_noise: bool = False) -> Refit:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
-        p = p.copy()
-        p[self._where] = first = np.clip(p[self._where], self._lower, self._upper)
+        p = self._in_range(p)
+        first = p[self._where].copy()
         if size is None or not hold_noise:
             size, best = search_noise(self._costs_of_noise(p, first), size)
         else:
@@ -156,9 +156,14 @@ class Refitter:
 
     def costs(self, points: FloatArray, size: tuple[float, float]) -> FloatArray:
         """Costs (k,) at several parameters (k, np), each in range, with factors of the noise."""
-        inside = points.copy()
-        inside[:, self._where] = np.clip(points[:, self._where], self._lower, self._upper)
+        inside = self._in_range(points)
         return np.array(self._costs([(p, size) for p in inside], inside[0, self._where]))
+
+    def _in_range(self, p: FloatArray) -> FloatArray:
+        """Parameters (..., np), the free ones each within its range."""
+        inside = p.copy()
+        inside[..., self._where] = np.clip(p[..., self._where], self._lower, self._upper)
+        return inside
 
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""

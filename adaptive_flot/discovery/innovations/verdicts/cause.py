@@ -97,8 +97,7 @@ def _as_well(compared: Comparison, told: Told) -> str:
     verdict = compared.verdict
     if verdict.word not in WITH_A_NAME:
         return "do not tell it. They say"
-    sites = {e.effect.site for e in verdict.effects} | {site for site, _ in verdict.members}
-    return "say so, too" if sites & {h.site for h in told.effects} else "say something else"
+    return "say so, too" if verdict.sites & {h.site for h in told.effects} else "say something else"
 
 
 def _too_many_parts(compared: Comparison, told: Told) -> bool:
