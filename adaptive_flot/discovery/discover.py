@@ -13,6 +13,7 @@ from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.innovations.places.constants import with_constants_alike
 from adaptive_flot.discovery.innovations.places.free_run import compare_with_what_has_no_site
+from adaptive_flot.discovery.innovations.search.least_shown import tell_least_shown
 from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
 from adaptive_flot.discovery.later_inputs import with_later_inputs
 from adaptive_flot.discovery.record.screening import Screening
@@ -203,6 +204,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     compare_with_what_has_no_site,
     with_constants_alike,
     none_at_noise,
+    tell_least_shown,
     plan_test,
     conclude,
 )

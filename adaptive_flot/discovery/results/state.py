@@ -13,6 +13,7 @@ from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results.alternatives import FirstRound, Judgement, SearchResult
 from adaptive_flot.discovery.results.evidence import Detection, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
+from adaptive_flot.discovery.results.least_shown import LeastShown
 from adaptive_flot.discovery.results.verdict import Discovery, Verdict
 from adaptive_flot.discovery.results.words import TELLING
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -81,6 +82,8 @@ class State:
         What the innovations form names, in words; empty where it has not decided.
     experiment
         Input moves that would tell the leading alternatives apart.
+    least_shown
+        The smallest change at each site that the record shows.
     """
 
     model: Model
@@ -115,6 +118,7 @@ class State:
     background: str = ""
     sentence: str = ""
     experiment: Experiment | None = None
+    least_shown: tuple[LeastShown, ...] = ()
 
     @property
     def known_problem(self) -> Problem:

@@ -12,6 +12,7 @@ from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult
 from adaptive_flot.discovery.results.evidence import Detection, Location, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
+from adaptive_flot.discovery.results.least_shown import LeastShown
 from adaptive_flot.discovery.results.words import Word
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
@@ -75,6 +76,8 @@ class Verdict:
         Why the record says too little, one by one; empty where it was judged.
     experiment
         Input moves that would tell the leading alternatives apart; None where there is but one.
+    least_shown
+        The smallest change at each site that the record shows, where it is `none`.
     seconds
         Wall-clock time.
     """
@@ -95,6 +98,7 @@ class Verdict:
     detection: Detection | None = None
     location: Location | None = None
     experiment: Experiment | None = None
+    least_shown: tuple[LeastShown, ...] = ()
     seconds: float = 0.0
 
     @property
@@ -129,6 +133,7 @@ class Verdict:
             "absorbed": dict(self.absorbed),
             "notes": list(self.notes),
             "experiment": self.experiment.as_dict() if self.experiment else None,
+            "least_shown": [s.as_dict() for s in self.least_shown],
             "seconds": round(self.seconds, 2),
         }
 

@@ -28,10 +28,14 @@ from adaptive_flot.discovery.innovations.filter.thinning import is_short_since_r
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
+from adaptive_flot.discovery.innovations.search.explanation import Explanation
+from adaptive_flot.discovery.innovations.search.least_shown import least_shown
+from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.cause import with_cause
 from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend, unless_hardly_off
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
+from adaptive_flot.discovery.results.least_shown import what_is_hidden, what_is_shown
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.places import with_what_is_nearest, with_words_without_a_site
@@ -160,7 +164,19 @@ def _row_by_row(
         kept = unless_contradicted(compared, told)
         kept = kept if kept is not compared else unless_unsupported(compared, search, base, told)
         kept = kept if kept is not compared else unless_alike(compared, told)
-        return with_what_is_nearest(kept, search, base, [told.best, *known.single])
+        kept = with_what_is_nearest(kept, search, base, [told.best, *known.single])
+        return _with_least_shown(kept, search, base)
+
+
+def _with_least_shown(compared: Comparison, search: Search, base: Explanation) -> Comparison:
+    """The comparison with how small a change the record would have shown, where it shows none."""
+    verdict = compared.verdict
+    if verdict.word != "none":
+        return compared
+    found = least_shown(search.fitter(search.model, ()), base.fit)
+    reason = " ".join(filter(None, (verdict.reason, what_is_hidden(found))))
+    notes = (*verdict.notes, *what_is_shown(found))
+    return replace(compared, verdict=replace(verdict, reason=reason, notes=notes, least_shown=found))
 
 
 def _is_structure(told: Told) -> bool:

@@ -17,6 +17,7 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.discovery.record.slip_jump import band_ranges
 from adaptive_flot.discovery.results import Judgement, NamedEffect, OutputChange, SearchResult, State, Verdict
+from adaptive_flot.discovery.results.least_shown import what_is_hidden, what_is_shown
 from adaptive_flot.discovery.results.words import NORMAL95, TELLING
 from adaptive_flot.discovery.verdict.locate import locate
 from adaptive_flot.discovery.verdict.report_veto import much_better
@@ -86,10 +87,12 @@ def conclude(state: State) -> Verdict:
         + _common_nuisance_note(result)
         + ((SIZES_WITH_PROCESS_NOISE,) if state.sizes else ())
         + suspect_notes([e.effect for e in effects], state.screening.suspects, problem.record.dt)
-        + (_swings(problem, before) if judgement.word == "abstain" else ()),
+        + (_swings(problem, before) if judgement.word == "abstain" else ())
+        + what_is_shown(state.least_shown),
         detection=state.detection,
         location=locate(state.detection, result.rounds[0].scores) if state.detection else None,
         experiment=state.experiment,
+        least_shown=state.least_shown,
     )
 
 
@@ -105,8 +108,9 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         told = words_of_effects(state.told.model, effects, _curves(state, effects)) if effects else ""
         said = reason_words(state.judged, state.searched[1], effects, drift, state.contradiction, wrong, told)
         likelier = beside_words(state.likelihood, much_better(state.error))
+        hidden = what_is_hidden(state.least_shown)
         part = _part_of_record(state.screening.notes)
-        return " ".join(filter(None, (said, likelier, state.certain, state.background, part)))
+        return " ".join(filter(None, (said, likelier, state.certain, hidden, state.background, part)))
     errors = ", ".join(c.words for c in state.error)
     told = f"{state.sentence} Error of the free run on held-out rows: {errors}."
     left = still_wrong_or_wandering(wrong) if state.judged.word in TELLING else ""

@@ -8,7 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from adaptive_flot.discovery.hypotheses.families import hypotheses
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.greybox import Dataset, Model, Scope
 from tests.discovery.hypotheses.tank import DT, NOISE, ROWS, tank
@@ -50,3 +52,26 @@ def test_a_load_since_the_reference_is_among_what_is_told() -> None:
     assert verdict.word in ("named", "class"), verdict.reason
     assert ("load", "constant") in told, verdict.reason
     assert f"{LOAD / 100:.0f}" in verdict.reason and "too much" in verdict.reason
+
+
+def cell_with_a_feed(model: Model) -> Model:
+    """The tank, whose power is a feed that may go either way: a current into and out of a battery."""
+
+    def equations(m: Scope) -> None:
+        temperature = m.state("temperature")
+        feed = m.site("feed", m.input("power"), "feed", "offset", unit="W")
+        m.derivative("temperature", (feed - m.parameter("loss") * (temperature - 293.0)) / 1.0e5)
+        m.output("temperature", m.site("thermometer", temperature, "sensor", "offset", unit="K"))
+
+    return replace(model, equations=equations)
+
+
+@pytest.mark.parametrize(("low", "found"), [(-800.0, True), (0.0, False), (100.0, False)])
+def test_a_feed_that_goes_both_ways_may_have_a_constant_amount(low: float, found: bool) -> None:
+    """A current sensor that shows 0.25 A too little had no hypothesis: a factor is none of what goes both ways."""
+    model = cell_with_a_feed(tank())
+    feed = np.linspace(low, 900.0, ROWS)
+    seen = {"feed": feed, "thermometer": np.linspace(293.0, 310.0, ROWS)}
+    all_of_them = hypotheses(model, seen, {"power": feed, "temperature": seen["thermometer"]}, DT, DT * ROWS)
+    amounts = [h for h in all_of_them if h.site == "feed" and h.driver == "constant" and h.effect.mode == "offset"]
+    assert bool(amounts) == found, [h.label for h in all_of_them if h.site == "feed"]

@@ -46,3 +46,10 @@ def test_what_is_beyond_is_told_with_its_share(temperature: FloatArray, fan: Flo
 
 def test_a_gauge_that_is_off_brings_no_plant_anywhere() -> None:
     assert not _said(np.linspace(310.0, 330.0, ROWS), np.full(ROWS, 9.0), np.linspace(0.0, 15.0, ROWS)[:, None])
+
+
+def test_a_free_run_that_leaves_the_plant_brings_no_plant_anywhere() -> None:
+    """What was measured is where the reference was, and the model is 15 K above it."""
+    errors = -np.linspace(0.0, 15.0, ROWS)[:, None]
+    assert not _said(np.linspace(302.0, 319.0, ROWS), np.full(ROWS, 9.0), errors)
+    assert "temperature is higher" in _said(np.linspace(312.0, 339.0, ROWS), np.full(ROWS, 9.0), errors)

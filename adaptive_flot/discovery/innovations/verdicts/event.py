@@ -37,7 +37,8 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
 
     Of the outputs that the event can change: where no error without it is above what is usual on the reference, there
     is nothing to explain. Where one keeps more than half of what its squared error is above that, there is more than
-    the event explains, and its name would be a guess. So it is where the error of any output grows.
+    the event explains, and its name would be a guess. So it is where the error of any
+    output grows to more than what is usual.
 
     Parameters
     ----------
@@ -88,7 +89,8 @@ def with_hypotheses(
     shown = tuple(c for c in verdict.error if c.output in reached)
     if all(c.before <= ABOVE_USUAL * c.noise for c in shown) or hardly_explained(shown, ABOVE_USUAL):
         return compared
-    if worse_outputs(rows, blocks, null, found[0], compared.calibration.usual.rms):
+    usual, left = compared.calibration.usual.rms, rms(rows, found[0].fresh)
+    if any(left[j] > ABOVE_USUAL * usual[j] for j in worse_outputs(rows, blocks, null, found[0], usual)):
         return compared
     said = compared.verdict.word in WITH_A_NAME  # what is not told over the whole record says nothing beside it
     over_all = (f"One change over the whole record would be told so: {compared.verdict.reason}",) if said else ()
