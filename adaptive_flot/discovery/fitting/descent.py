@@ -17,7 +17,7 @@ import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
 from adaptive_flot.discovery.fitting.normal_equations import NormalEquations
-from adaptive_flot.discovery.fitting.unknowns import Unknowns
+from adaptive_flot.discovery.fitting.unknowns import DIRECTION_PRIOR, Unknowns
 from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import BoolArray, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
@@ -143,16 +143,46 @@ class Descent:
 
     def _telling_directions(self) -> FloatArray:
         """Directions (nx, r) of the initial state, in scales of the states, that the record tells most about."""
-        scale = np.array([s.scale for s in self.model.states])
-        self.unknowns.turn(np.diag(scale))
+        spread, prior = np.diag([s.scale for s in self.model.states]), DIRECTION_PRIOR
+        if not (self.model.starts_steady or self.problem.record.initial_state is not None):
+            spread, prior = self._start_at_first_row(), 1.0
+        self.unknowns.turn(spread)
         _, slope = self._jacobian(self.unknowns.centre)
         weighted = slope[:, :, self.unknowns.q :] / (self.problem.weights * self._white_std())[:, :, None]
-        rows = weighted[self.rows].reshape(-1, len(scale))
+        rows = weighted[self.rows].reshape(-1, len(spread))
         if not np.isfinite(rows).all():
-            return np.zeros((len(scale), 0))
+            return np.zeros((len(spread), 0))
         strength, turned = np.linalg.eigh(rows.T @ rows)
         telling = [i for i in np.argsort(-strength)[:MOST_DIRECTIONS] if strength[i] > TELLING**2]
-        return cast(FloatArray, scale[:, None] * turned[:, telling])
+        return cast(FloatArray, spread @ turned[:, telling] * prior / DIRECTION_PRIOR)
+
+    def _start_at_first_row(self) -> FloatArray:
+        """Move the first guess to where the first row has it, and return what stays open of it, as a root (nx, nx).
+
+        Where much is missing, a fit of the start alone may come to an absurd one, and all fits that begin there stay.
+        The guess x of a process that does not start at rest may be as far off as its states move, P = diag(d^2). With
+        the outputs y of the first row, their derivatives H = dh/dx, and R of their noise or, as a sensor may be off, of
+        their scale, it is as in a Kalman filter::
+
+            K = P H' (H P H' + R)^-1      x + K (y - h(x))      P - K H P
+        """
+        record, columns = self.problem.record, list(self.problem.columns)
+        p, x0 = self.unknowns.unpack(self.unknowns.centre)
+        scale = np.array([s.scale for s in self.model.states])
+        moved = np.std(self.simulator.states(record, x0, p), axis=0)
+        spread = np.where(np.isfinite(moved), np.maximum(scale, moved), scale)
+        y, H = self.simulator.first_outputs(record, x0, p)
+        error, H = record.outputs[0, columns] - y[columns], H[columns]
+        there = np.isfinite(error) & np.isfinite(H).all(axis=1)
+        if not there.any():
+            return np.diag(spread)
+        sizes = np.array([self.model.outputs[c].scale for c in columns])
+        noise = np.maximum(self._white_std() * self.problem.weights[0], sizes)
+        H, error = H[there] * spread, error[there]  # in units of the spread: P is the identity
+        K = np.linalg.solve(H @ H.T + np.diag(noise[there] ** 2), H).T
+        self.unknowns.x0 = self.unknowns.first_guess = x0 + spread * (K @ error)
+        values, vectors = np.linalg.eigh(np.eye(len(spread)) - K @ H)
+        return cast(FloatArray, spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
     def _white_std(self) -> FloatArray:
         """Noise by differencing: it needs no model."""
@@ -305,6 +335,7 @@ class Descent:
             self.unknowns.directions,
             background,
             inverse[first:, first:],
+            self.unknowns.first_guess,
         )
 
 

@@ -76,6 +76,8 @@ class Fit:
     """Components u (k,) of the background; empty without. What they do is part of `predicted`."""
     background_covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """Their covariance (k, k): the part of (J'J + P^-1)^-1 that is theirs."""
+    first_guess: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """Where the first row has the initial state (nx,), which is expected there; empty where a fit starts at rest."""
 
     def residual(self, problem: Problem) -> FloatArray:
         """Measured minus predicted (N, m)."""

@@ -58,6 +58,7 @@ class Unknowns:
             start = {**{p.name: p.value for p in like.model.parameters}, **start}
         self.base = np.array([start.get(p.name, p.value) for p in model.parameters])
         self.x0 = self._first_state(like)
+        self.first_guess = self._first_guess(like)
         self.q = len(self.names)
         sized = coefficient_scales(model, problem.site_sizes, problem.record.dt)
         self.scale = np.array([sized.get(p.name, p.scale) for p in parameters])
@@ -79,7 +80,10 @@ class Unknowns:
         self.lower = np.concatenate([self._range[0], np.full(r + k, -np.inf)])
         self.upper = np.concatenate([self._range[1], np.full(r + k, np.inf)])
         self.prior = np.concatenate([self._prior, np.full(r, DIRECTION_PRIOR), np.ones(k)])
-        self.prior_centre = np.concatenate([self._prior_centre, np.zeros(r + k)])
+        expected: FloatArray = np.zeros(r)
+        if len(self.first_guess) and r:
+            expected[:] = np.linalg.lstsq(directions, self.first_guess - self.x0, rcond=None)[0]
+        self.prior_centre = np.concatenate([self._prior_centre, expected, np.zeros(k)])
         start = np.concatenate([self.base[self.where] / self.scale, np.zeros(r), self._background])
         self.centre = np.clip(start, self.lower, self.upper)
 
@@ -96,6 +100,16 @@ class Unknowns:
             return steady_state(self.model, record.inputs[0], self.base).state
         except RangeError:
             return guess
+
+    def _first_guess(self, like: Fit | None) -> FloatArray:
+        """Where the initial state (nx,) is expected: as in a fit, and where it starts of states that this has beside.
+
+        Empty where it is expected where it starts, in each fit anew.
+        """
+        if like is None or not len(like.first_guess):
+            return np.zeros(0)
+        known = dict(zip(like.model.names("states"), like.first_guess, strict=True))
+        return np.array([known.get(name, x) for name, x in zip(self.model.names("states"), self.x0, strict=True)])
 
     def _first_background(self, like: Fit | None) -> FloatArray:
         """The background u (k,) of a fit, or none; empty where the problem has none."""

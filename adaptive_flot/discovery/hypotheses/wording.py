@@ -42,6 +42,16 @@ def clock(time: float) -> str:
     return f"{time:.0f}" if abs(time) >= 100 else short(time)
 
 
+def last_digit(time: float) -> float:
+    """What one step of the last digit is in which `clock` tells a time [s].
+
+    >>> last_digit(1036888.0), last_digit(47.8)
+    (1.0, 0.1)
+    """
+    size = abs(time)
+    return 1.0 if size >= 100 or not size else float(f"{10 ** (np.floor(np.log10(size)) - 2):.0e}")
+
+
 def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
     """One sentence without its full stop: what is the matter and by how much.
 

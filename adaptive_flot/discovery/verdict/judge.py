@@ -46,10 +46,12 @@ def judge(result: SearchResult) -> Judgement:
     close = [a for a in close if not any(_only_adds_to(a, b) for b in close)]
     named = [a for a in close if all(a.known)]
     rivals = _others(result, best)
-    # a drift of what is adapted is the ordinary explanation: what is hardly better does not replace it
+    # a drift of what is adapted is the ordinary explanation: what is hardly better does not replace it. Where the model
+    # does not say that it drifts, a ramp is a change like any other; a curve follows whatever wanders
     alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * result.rows_per_effective_sample)
     drifting = next((a for a in alike if _only_drift(a, result)), None)
-    if drifting:  # all there is, unless something else had to be added to all
+    if drifting and (_may_drift(result) or any(e.family.is_curve for e in drifting.effects)):
+        # all there is, unless something else had to be added to all
         return Judgement(
             "abstain" if result.common_nuisance else "none", drifting, (), _others(result, drifting), margin
         )
@@ -214,6 +216,12 @@ def _only_adds_to(a: Alternative, b: Alternative) -> bool:
     (site, driver), (where, constant) = other[0]
     signal = driver not in STATELESS_DRIVERS
     return site == where and constant == "constant" and signal and b.fit.loss - a.fit.loss < LEAST_MARGIN
+
+
+def _may_drift(result: SearchResult) -> bool:
+    """Whether the model says of all that is adapted that it drifts."""
+    fitted = {p.name: p for p in result.base.model.parameters}
+    return all(fitted[name].drifts for name in result.base.names)
 
 
 def _only_drift(a: Alternative, result: SearchResult) -> bool:

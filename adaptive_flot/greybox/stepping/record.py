@@ -65,10 +65,20 @@ class RecordSimulator:
         y0 = self._first(x0, record.time[0], record.inputs[0], p)[0]
         return self._spread(np.vstack([y0, run.outputs]))
 
+    def first_outputs(self, record: Dataset, x0: FloatArray, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Outputs (ny,) at the first row, of the state x0 (nx,) itself, and their derivatives by it (ny, nx)."""
+        y0, by_x, _ = self._first(x0, record.time[0], record.inputs[0], p)
+        return np.ravel(y0), by_x.reshape(y0.size, -1)
+
+    def states(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
+        """States (K, nx) of the free run at the rows, or nodes, after the first."""
+        run = self.stepper.simulate(x0, self._inputs(record), p, float(record.time[0]))
+        return np.asarray(run.states, dtype=np.float64)
+
     def last_state(self, record: Dataset, x0: FloatArray, p: FloatArray) -> FloatArray:
         """State (nx,) at the last row of the free run."""
-        run = self.stepper.simulate(x0, self._inputs(record), p, float(record.time[0]))
-        return np.array(run.states[-1])
+        last: FloatArray = self.states(record, x0, p)[-1].copy()
+        return last
 
     def sensitivities(
         self, record: Dataset, x0: FloatArray, p: FloatArray, wrt: Sequence[str], x0_gradient: FloatArray

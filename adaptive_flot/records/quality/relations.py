@@ -13,6 +13,8 @@ MOST_LAGS = 60
 FEWEST = 50
 """Rows from which a relation can be judged."""
 FEEDBACK_LAGS = 5
+ROWS_PER_LAG = 10
+"""Fewest rows for each lag of the input itself."""
 LEAST_SHARE = 0.05
 """Share of an input's one-step variance that an output must explain to count as feedback."""
 SIGNIFICANCE = 1e-3
@@ -74,25 +76,28 @@ def correlation(one: str, other: str, a: FloatArray, b: FloatArray, lags: int = 
 def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback | None:
     """Whether past outputs predict an input (N,) beyond its own past; None where it can not be told.
 
-    Two regressions on p lags, with and without the output; the output is held where it is missing::
+    Two regressions on q lags of the input, with and without p of the output, which is held where it is missing::
 
         u[k] = sum_i a_i u[k-i] + c + e0,      u[k] = sum_i a_i u[k-i] + sum_i b_i y[k-i] + c + e1
-        share = 1 - RSS1 / RSS0,               F = (RSS0 - RSS1) / p / (RSS1 / (n - 2 p - 1))
+        share = 1 - RSS1 / RSS0,               F = (RSS0 - RSS1) / p / (RSS1 / (n - p - q - 1))
+
+    An input of some frequencies only is told by its own far past, and an output remembers that. So q is larger than p.
 
     Granger, *Econometrica* 37 (1969) 424; as a test of feedback Caines & Chan, *IEEE Trans. Autom. Control* 20 (1975)
-    498. Where lags depend on each other, the ranks of the regressions stand for p and 2 p. A feedback that acts
+    498. Where lags depend on each other, the ranks of the regressions stand for q and p + q. A feedback that acts
     within a row is not seen.
     """
     held = _held(y)
     first = int(np.argmax(np.isfinite(held))) if np.isfinite(held).any() else len(held)
     u, held = u[first:], held[first:]
     p = FEEDBACK_LAGS
-    n = len(u) - p
+    q = max(p, min(MOST_LAGS, len(u) // ROWS_PER_LAG))
+    n = len(u) - q
     if n < FEWEST or _still(u) or _still(held):
         return None
-    own = np.column_stack([u[p - i : len(u) - i] for i in range(1, p + 1)])
-    other = np.column_stack([held[p - i : len(u) - i] for i in range(1, p + 1)])
-    own, other, target = (_scaled(a) for a in (own, other, u[p:]))
+    own = np.column_stack([u[q - i : len(u) - i] for i in range(1, q + 1)])
+    other = np.column_stack([held[q - i : len(u) - i] for i in range(1, p + 1)])
+    own, other, target = (_scaled(a) for a in (own, other, u[q:]))
     rss0, rank0 = _residual(own, target)
     rss1, rank1 = _residual(np.column_stack([own, other]), target)
     if rss0 <= 1e-20 * n or rank1 == rank0:

@@ -101,17 +101,32 @@ def test_the_word(draught: Discovery, found: list[tuple[tuple[str, str], bool, f
     assert all(rival is not judged.best for rival in judged.rivals)
 
 
-@pytest.mark.parametrize(("nuisance", "word"), [(None, "none"), (("heating", "time"), "abstain")])
-def test_a_drift_is_all_there_is_only_where_nothing_was_added_beside_it(
-    draught: Discovery, nuisance: tuple[str, str] | None, word: str
+RAMP = Effect("heat_loss", "time", "ramp", {"amplitude": 0.2, "onset": 0.0, "duration": 9000.0})
+COURSE = Effect(
+    "heat_loss", "time", "curve", {f"value_{k}": 0.1 * k for k in (1, 2, 3)}, {"knots": (0.0, 9000.0, 18000.0)}
+)
+
+
+@pytest.mark.parametrize(
+    ("nuisance", "drifts", "drift", "word"),
+    [
+        (None, True, RAMP, "none"),
+        (("heating", "time"), True, RAMP, "abstain"),
+        # a catalyst that had lost 38 % of its activity was `none`, with errors 13 times as small
+        (None, False, RAMP, "class"),
+        (None, False, COURSE, "none"),  # a curve follows whatever wanders
+    ],
+)
+def test_a_drift_is_all_there_is_where_the_model_says_so_and_nothing_was_added_beside_it(
+    draught: Discovery, nuisance: tuple[str, str] | None, drifts: bool, drift: Effect, word: str
 ) -> None:
     found = _search(draught, (BY_TIME, True, 0.0), (BY_FAN, True, 5.0))
-    drift = Effect("heat_loss", "time", "ramp", {"amplitude": 0.2, "onset": 0.0, "duration": 9000.0})
-    own = found.alternatives[0]
+    own, tank = found.alternatives[0], found.base.model
+    says = replace(tank, parameters=tuple(replace(p, drifts=drifts) for p in tank.parameters))
     model = heated_tank().with_effects([drift])
     alternatives = (replace(own, fit=replace(own.fit, model=model)), found.alternatives[1])
     found = replace(found, alternatives=alternatives, common_nuisance=nuisance, adapted_sites=("heat_loss",))
-    judged = judge(found)
+    judged = judge(replace(found, base=replace(found.base, model=says)))
     assert judged.word == word and judged.best is alternatives[0]
 
 

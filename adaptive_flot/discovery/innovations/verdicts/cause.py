@@ -14,18 +14,19 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.calibration import excluded_by
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, fitted_and_tested
+from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import SIZES_OPEN, Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
-from adaptive_flot.discovery.innovations.in_words import told_in_words
+from adaptive_flot.discovery.innovations.in_words import told_in_words, words_at
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, usual_over_folds
-from adaptive_flot.discovery.results import Judgement
-from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
+from adaptive_flot.discovery.results import Judgement, NamedEffect
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, NORMAL95, WITH_A_NAME
 from adaptive_flot.discovery.verdict.report_veto import contradiction
 
 JUDGED_ON = "held-out stretches, each from the state of the filter before it"
@@ -84,11 +85,31 @@ def with_cause(
     alone = f"Free runs over the whole record, without process noise, {_as_well(compared, told)}: {first}."
     return replace(
         compared,
-        verdict=replace(verdict, reason=reason, error=error, split=JUDGED_ON, notes=(*notes, alone)),
+        verdict=replace(
+            verdict,
+            reason=reason,
+            effects=tuple(_with_sizes_told(search, told, e) for e in verdict.effects),
+            error=error,
+            split=JUDGED_ON,
+            notes=(*notes, alone),
+        ),
         model=search.model_of(told.best),
         calibration=calibration,
         tested=(*found, *compared.tested),
         judged=judged,
+    )
+
+
+def _with_sizes_told(search: Search, told: Told, named: NamedEffect) -> NamedEffect:
+    """The effect with the sizes of the sentence, which are those of the innovations form, and their intervals."""
+    explanation, h = _told_effects(told)[0]
+    effect = search.model_of(explanation).fitted_effects()[-1]
+    values, P = search.sizes(explanation)
+    std = dict(zip(values, np.sqrt(np.diag(P)), strict=True))
+    around = {c: (v, NORMAL95 * std[name]) for c in h.free for name in [effect.parameter(c)] for v in [values[name]]}
+    own = {c: (v - reach, v + reach) for c, (v, reach) in around.items()}
+    return replace(
+        named, effect=effect, meaning=words_at(search, explanation, h), interval95={**named.interval95, **own}
     )
 
 
@@ -109,9 +130,14 @@ def _too_many_parts(compared: Comparison, told: Told) -> bool:
     return len(parts) > LARGEST_CLASS and not parts <= {h.site for h in told.effects}
 
 
+def _told_effects(told: Told) -> list[tuple[Explanation, Hypothesis]]:
+    """What is told, each with the explanation that has it."""
+    return [(told.best, h) for h in told.certain] if told.word == "named" else list(told.open)
+
+
 def _tested(compared: Comparison, search: Search, told: Told) -> list[Tested]:
     """The effects that are told, one by one in free runs; none where there is more than one beside another."""
-    effects = [(told.best, h) for h in told.certain] if told.word == "named" else list(told.open)
+    effects = _told_effects(told)
     alone = not (told.certain and told.open) and max((len(e.hypotheses) for e, _ in effects), default=0) == 1
     if told.word not in WITH_A_NAME or not alone:
         return []

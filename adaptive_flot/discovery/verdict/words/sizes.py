@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adaptive_flot.discovery.hypotheses.wording import clock, sticks
+from adaptive_flot.discovery.hypotheses.wording import clock, last_digit, sticks
 from adaptive_flot.discovery.results import Alternative, NamedEffect
 from adaptive_flot.discovery.results.words import short
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve
@@ -66,7 +66,7 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
         (begin,), (long,) = effect.values(CoefficientRole.ONSET), effect.values(CoefficientRole.DURATION)
         verb, asked = ("showed", "") if site.role == "sensor" else ("stayed at", ", whatever was asked")
         said = f"{name} {verb} {short(level[0])}{_unit(site)} from {clock(begin)} s to {clock(begin + long)} s{asked}"
-    elif curve is not None and effect.family.is_event and _ends(effect) > curve.driver[-1]:
+    elif curve is not None and effect.family.is_event and _may_end(told) > curve.driver[-1]:
         # what has happened until then is told, without the interval of all that would
         return f"{name} {_until_the_end(site, curve)}" + (f" ({told.meaning})" if told.meaning else "")
     elif effect.family.is_event:
@@ -114,11 +114,19 @@ def _always(site: Site, effect: Effect) -> str:
     return f"is {_amount(site, effect, level)} {'more' if level > 0 else 'less'} than {where}"
 
 
-def _ends(effect: Effect) -> float:
-    """Time [s] at which an event is over, an exponential approach but for a twentieth; its last onset where at once."""
-    onsets, durations = effect.values(CoefficientRole.ONSET), effect.values(CoefficientRole.DURATION)
-    settled = SETTLED * max(effect.values(CoefficientRole.TIME_CONSTANT), default=0.0)
-    return max(onsets) + max(durations, default=0.0) + settled
+def _may_end(told: NamedEffect) -> float:
+    """Time [s] at which an event may be over, an exponential approach but for a twentieth; its last onset where at once.
+
+    By the upper ends of the 95 % intervals: of a fall that lasts, a record may know how fast it is, and not how long.
+    """
+    effect = told.effect
+    onsets, roles = effect.values(CoefficientRole.ONSET), (CoefficientRole.DURATION, CoefficientRole.TIME_CONSTANT)
+    lasting, settles = (
+        [told.interval95.get(n, (0.0, effect.coefficients[n]))[1] for n in effect.names(role)] for role in roles
+    )
+    if not effect.family.passes:
+        return max(onsets) + max(lasting, default=0.0) + SETTLED * max(settles, default=0.0)
+    return max(onsets) + max(effect.values(CoefficientRole.DURATION), default=0.0)
 
 
 def _event(site: Site, effect: Effect) -> str:
@@ -132,7 +140,8 @@ def _event(site: Site, effect: Effect) -> str:
         when = f"from {clock(onset)} s to {clock(end)} s"
         return f"{verb} {_amount(site, effect, level)} {stood} {when} than before and after"
     lasts = [*durations, *(SETTLED * t for t in effect.values(CoefficientRole.TIME_CONSTANT))]
-    when = f"from {clock(onset)} s to {clock(onset + lasts[0])} s" if lasts else f"at {clock(onset)} s"
+    gradual = lasts and lasts[0] > last_digit(onset)
+    when = f"from {clock(onset)} s to {clock(onset + lasts[0])} s" if gradual else f"at {clock(onset)} s"
     factor = float(np.exp(level)) if _is_factor(site, effect) else None
     return f"{_moved(site, _amount(site, effect, level), rises=level > 0, factor=factor)} {when}"
 
