@@ -287,7 +287,10 @@ def plan_test(state: State) -> State:
     needed = least_separation(result, problem, TEST_ROWS)
     experiment = plan_experiment(problem, compared, needed, state.limits, state.processes, held)
     if experiment is None:
-        said = "no test of the inputs is proposed: none may be moved, or none moves in this record"
+        said = (
+            "no test of the inputs is proposed: none may be moved, none moves in this record, or each would bring an "
+        )
+        said += "output far beyond where it has been"
         said += f"; left alone: {held_words(held)}" if held else ""
         state = replace(state, screening=replace(state.screening, notes=(*state.screening.notes, said)))
     return replace(state, experiment=experiment)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.records.quality.excitation import excitation
@@ -33,6 +34,17 @@ def test_a_controller_is_seen_and_an_open_loop_is_not_taken_for_one(seed: int) -
     closed, free = feedback("u", "y", *loop(0.8, seed)), feedback("u", "y", *loop(0.0, seed))
     assert closed is not None and closed.closed
     assert free is not None and not free.closed
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_input_of_some_frequencies_is_no_feedback(seed: int) -> None:
+    """Its own far past tells it, and a resonant output remembers that: a multisine was "left alone: in feedback"."""
+    rng = np.random.default_rng(seed)
+    tones, phases = np.arange(20, 300) / 4096, rng.uniform(0, 2 * np.pi, 280)
+    u = np.cos(2 * np.pi * np.arange(N)[:, None] * tones + phases).sum(axis=1)
+    y = lfilter([1.0], [1.0, -1.9, 0.95], u) + rng.standard_normal(N)
+    found = feedback("u", "y", u, y)
+    assert found is not None and not found.closed
 
 
 def test_a_slow_analyser_is_held_between_its_values() -> None:

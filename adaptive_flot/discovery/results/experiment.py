@@ -100,10 +100,12 @@ class Experiment:
         alone = f" Left alone: {', '.join(f'{n} ({why})' for n, why in self.held)}." if self.held else ""
         pair = f"{_words(closest.one)} and {_words(closest.other)}"
         if max(self.power) < HARDLY:
+            each = ", or ".join(_words(n) for n in self.compared)
+            length, apart = self.dt * len(self.inputs), closest.separation
             return (
-                f"No test tried would tell any of these apart: {', or '.join(_words(n) for n in self.compared)}. With the "
-                f"best, {self.name}, {self.dt * len(self.inputs):g} s, the closest two would differ by about "
-                f"{closest.separation:.0f} in their criterion, where {self.needed:.0f} is needed.{alone}"
+                f"No test tried would tell any of these apart: {each}. With the best, {self.name}, {length:g} s, the "
+                f"closest two would differ by about {apart:.0f} in their criterion, where {self.needed:.0f} is needed."
+                f"{alone}"
             )
         return (
             f"{said}. Simulated with each alternative as the truth, it tells the right one: {told}. The closest two, "

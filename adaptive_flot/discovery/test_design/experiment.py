@@ -14,7 +14,7 @@ from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import SURE, Alternative, Experiment, Pair, Tried
 from adaptive_flot.discovery.test_design.power import power
-from adaptive_flot.discovery.test_design.separation import predictions, separation
+from adaptive_flot.discovery.test_design.separation import predictions, separation, stays_near
 from adaptive_flot.discovery.test_design.signals import candidate_tests, input_range, watching
 
 TEST_ROWS = 900
@@ -58,7 +58,8 @@ def plan_experiment(
     Returns
     -------
     Experiment or None
-        None with fewer than two alternatives, without an input that may move, or when no test can be simulated.
+        None with fewer than two alternatives, without an input that may move, when no test can be simulated, or when by
+        some alternative each would bring an output where the process has never been (`stays_near`).
 
     Raises
     ------
@@ -83,9 +84,12 @@ def plan_experiment(
     )
     pairs = list(combinations(range(len(compared)), 2))
     table = np.array([[separation(runs[a][k], runs[b][k]) for a, b in pairs] for k in range(len(tests))])
-    closest = np.where(np.isfinite(table).all(axis=1), table.min(axis=1), -np.inf)
+    stays = np.array(
+        [all(stays_near(problem, compared[0].fit.model, run[k].outputs) for run in runs) for k in range(len(tests))]
+    )
+    closest = np.where(np.isfinite(table).all(axis=1) & stays, table.min(axis=1), -np.inf)
     order = [int(k) for k in np.argsort(-closest, kind="stable") if np.isfinite(closest[k])]
-    moved = [k for k in order if k != len(tests) - 1]
+    moved = [k for k in order if k != len(tests) - 1 and stays[k]]
     if not moved:
         return None
     best = moved[0]

@@ -24,11 +24,10 @@ def held_inputs(model: Model, record: Dataset, allowed: Collection[str] = ()) ->
         if not q.movable:
             held[q.name] = "only measured"
             continue
-        for output, y in zip(model.outputs, record.outputs.T, strict=True):
-            found = feedback(q.name, output.name, u, y) if np.isfinite(y).any() else None
-            if found is not None and found.closed:
-                held[q.name] = f"in feedback: it follows {output.name}"
-                break
+        seen = [(o.name, y) for o, y in zip(model.outputs, record.outputs.T, strict=True) if np.isfinite(y).any()]
+        found = [f for name, y in seen if (f := feedback(q.name, name, u, y)) is not None and f.closed]
+        if found:
+            held[q.name] = f"in feedback: it follows {max(found, key=lambda f: f.share).output}"
     return held
 
 

@@ -28,6 +28,8 @@ RUN_AWAY = 1e9
 """Standard deviations beyond which a simulated test says nothing: the model has left its range."""
 LONG_AGO = 1e6
 """Time [s] before a test of the step that stands for a held effect."""
+SEEN, BEYOND = (0.005, 0.995), 1.0
+"""Quantiles between which a record has been, and how far beyond a test may bring an output, as a share of that."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,19 @@ def predictions(problem: Problem, fit: Fit, noise: Noise, tests: Sequence[FloatA
         slopes = noise.whiten(s.gradient[:, columns] / weight[:, None])[measured]
         predicted.append(Prediction(y, white, slopes @ root))
     return predicted
+
+
+def stays_near(problem: Problem, model: Model, outputs: FloatArray) -> bool:
+    """Whether outputs (N, m) stay in their physical range, and within the width of the record about it.
+
+    A force held at its high end drives an axis out of its rail, though no input leaves its range.
+    """
+    quantities = [model.outputs[c] for c in problem.columns]
+    physical = np.array([(q.lower, q.upper) for q in quantities]).T
+    least, most = np.nanquantile(problem.measured, SEEN, axis=0)
+    beyond = BEYOND * (most - least)
+    low, high = np.maximum(physical[0], least - beyond), np.minimum(physical[1], most + beyond)
+    return bool(np.all((outputs >= low) & (outputs <= high)))
 
 
 def hold_time(model: Model, time: float) -> Model:

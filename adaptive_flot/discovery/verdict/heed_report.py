@@ -15,8 +15,8 @@ from adaptive_flot.discovery.background.fitting import taken_up
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
-from adaptive_flot.discovery.results.words import WITH_A_NAME
-from adaptive_flot.discovery.verdict.conclude import report_errors
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
+from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, report_errors
 from adaptive_flot.discovery.verdict.judge import constants_told
 from adaptive_flot.discovery.verdict.outputs import certain_words
 from adaptive_flot.discovery.verdict.report_veto import (
@@ -67,6 +67,8 @@ def heed_report(state: State) -> State:
         against = _at_the_end(judgement, whole, state.problem_after or whole, before, after, surely)
     if not against and told:
         against = explains_little(error, np.hypot(noise, unknown))
+    if not against and judgement.word == "class" and _many_and_none(judgement, error):
+        against = "several other sets of effects do about as well, and none comes near the noise"
     if against:
         judgement = replace(judgement, word="abstain", members=(), part=())
     certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
@@ -77,6 +79,22 @@ def heed_report(state: State) -> State:
     by_likelihood = likelier if surely and not against and not surely_better(error) else 0.0
     state = replace(state, error=error, judgement=judgement, contradiction=against, certain=certain)
     return replace(_with_rows_said(state, whole, problem), likelihood=by_likelihood)
+
+
+def _many_and_none(judgement: Judgement, error: Sequence[OutputChange]) -> bool:
+    """Whether a class has more sets of several effects than a reader can try, and its best leaves much.
+
+    They then stand in for one thing that has no form here. A hysteresis was told as six sets of three effects.
+    """
+    assert judgement.best is not None  # a class has a best member
+    sets = {frozenset(a.names) for a in (judgement.best, *judgement.rivals) if judgement.near(a)}
+    several = min(len(names) for names in sets) > 1
+    return (
+        not judgement.part
+        and several
+        and len(sets) > LARGEST_CLASS
+        and any(c.after > STILL_WRONG * c.noise for c in error)
+    )
 
 
 def _few_rows(problem: Problem, after: Fit, error: Sequence[OutputChange]) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ FEWEST = 50
 FEEDBACK_LAGS = 5
 ROWS_PER_LAG = 10
 """Fewest rows for each lag of the input itself."""
-LEAST_SHARE = 0.05
+LEAST_SHARE = 0.01
 """Share of an input's one-step variance that an output must explain to count as feedback."""
 SIGNIFICANCE = 1e-3
 
@@ -76,12 +77,14 @@ def correlation(one: str, other: str, a: FloatArray, b: FloatArray, lags: int = 
 def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback | None:
     """Whether past outputs predict an input (N,) beyond its own past; None where it can not be told.
 
-    Two regressions on q lags of the input, with and without p of the output, which is held where it is missing::
+    An output remembers the far past of an input, and that tells an input of a few frequencies. So only what is new in
+    the output counts, e: what q lags of the input, and p of the output itself, leave of it. Then two regressions, with
+    and without it; the output is held where it is missing::
 
-        u[k] = sum_i a_i u[k-i] + c + e0,      u[k] = sum_i a_i u[k-i] + sum_i b_i y[k-i] + c + e1
+        y[k] = sum_i f_i u[k-i] + sum_i g_i y[k-i] + c + e[k]
+        u[k] = sum_i a_i u[k-i] + c + e0,      u[k] = sum_i a_i u[k-i] + sum_i b_i e[k-i] + c + e1
         share = 1 - RSS1 / RSS0,               F = (RSS0 - RSS1) / p / (RSS1 / (n - p - q - 1))
 
-    An input of some frequencies only is told by its own far past, and an output remembers that. So q is larger than p.
 
     Granger, *Econometrica* 37 (1969) 424; as a test of feedback Caines & Chan, *IEEE Trans. Autom. Control* 20 (1975)
     498. Where lags depend on each other, the ranks of the regressions stand for q and p + q. A feedback that acts
@@ -92,12 +95,12 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
     u, held = u[first:], held[first:]
     p = FEEDBACK_LAGS
     q = max(p, min(MOST_LAGS, len(u) // ROWS_PER_LAG))
-    n = len(u) - q
+    n = len(u) - q - p
     if n < FEWEST or _still(u) or _still(held):
         return None
-    own = np.column_stack([u[q - i : len(u) - i] for i in range(1, q + 1)])
-    other = np.column_stack([held[q - i : len(u) - i] for i in range(1, p + 1)])
-    own, other, target = (_scaled(a) for a in (own, other, u[q:]))
+    inputs, outputs = _lagged(u, q, range(q + 1)), _lagged(held, q, range(1, p + 1))
+    new = _left(_scaled(np.column_stack([inputs, outputs])), _scaled(held[q:]))  # what no input has brought about
+    own, other, target = (_scaled(a) for a in (inputs[p:, 1:], _lagged(new, p, range(1, p + 1)), u[q + p :]))
     rss0, rank0 = _residual(own, target)
     rss1, rank1 = _residual(np.column_stack([own, other]), target)
     if rss0 <= 1e-20 * n or rank1 == rank0:
@@ -107,6 +110,17 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
     ratio = (rss0 - rss1) / more / (max(rss1, 1e-300) / left)
     p_value = float(f_distribution.sf(ratio, more, left))
     return Feedback(name, output, float(share), p_value)
+
+
+def _lagged(values: FloatArray, first: int, lags: Iterable[int]) -> FloatArray:
+    """Values (N,) as they were so many rows before each row from the first on (N - first, lags)."""
+    return np.column_stack([values[first - i : len(values) - i] for i in lags])
+
+
+def _left(design: FloatArray, target: FloatArray) -> FloatArray:
+    """What a regression leaves of a target (n,)."""
+    left: FloatArray = target - design @ np.linalg.lstsq(design, target, rcond=1e-10)[0]
+    return left
 
 
 def _residual(design: FloatArray, target: FloatArray) -> tuple[float, int]:

@@ -1,6 +1,8 @@
 """Protects: how often a test tells each alternative is said in one short sentence, however many there are."""
 
-from adaptive_flot.discovery.results.experiment import _powers
+import numpy as np
+
+from adaptive_flot.discovery.results.experiment import Experiment, Pair, _powers
 
 
 def sites(count: int) -> list[tuple[tuple[str, str], ...]]:
@@ -20,3 +22,15 @@ def test_of_many_those_that_are_hardly_told_count_together() -> None:
 def test_where_none_is_told_that_is_said_once() -> None:
     assert _powers(sites(6), (0.0,) * 6) == "each of all 6 in at most 0 %"
     assert _powers(sites(6), (0.9,) * 5 + (0.0,)).count("site_") == 6
+
+
+def test_a_test_that_tells_nothing_is_not_praised() -> None:
+    """Twice "in 0 %", and "would differ by about 0": two names of one thing. It says so."""
+    one, other = sites(2)
+    test = Experiment(
+        "step of force", 1.0, np.zeros((45, 1)), (("force", "N"),), (), (one, other), np.ones(1),
+        (Pair(one, other, 0.2),), (), 10.0, (0.0, 0.0),
+    )  # fmt: skip
+    said = str(test)
+    assert said.startswith("No test tried would tell any of these apart: site_0 by time, or site_1 by time.")
+    assert "differ by about 0" in said and "in 0 %" not in said

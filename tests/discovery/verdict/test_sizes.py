@@ -109,6 +109,33 @@ def test_a_dependence_is_told_between_the_extremes_of_its_curve() -> None:
     assert rising == "heat loss depends on fan speed: 4.5 times as much at fan speed 19.5 1/s as at 0.5 1/s"
 
 
+def test_a_fall_of_which_the_record_does_not_know_how_long_it_lasts_is_told_as_far_as_it_goes() -> None:
+    """A catalyst that decays all the time "fell by 38 % (95 %: -99 % to +3024 %)": its rate alone was known."""
+    effect = told("heat_loss", "time", "ramp", amplitude=-0.478, onset=342.0, duration=9565.0)
+    unknown = replace(effect, interval95={"amplitude": (-4.4, 3.4), "duration": (2.6, 3.4e7)})
+    time = np.linspace(0.0, 10000.0, 161)
+    change = np.exp(-0.478 * np.clip((time - 342.0) / 9565.0, 0.0, 1.0))
+    said = words_of_effect(MODEL, unknown, curve(effect, time, change, "s", relative=True))
+    assert said == "heat loss fell by 38 % from 342 s to the end of the record"
+    known = replace(effect, interval95={"amplitude": (-0.5, -0.45), "duration": (9540.0, 9590.0)})
+    over = words_of_effect(MODEL, known, curve(effect, time, change, "s", relative=True))
+    assert over == "heat loss fell by 38 % from 342 s to 9907 s (95 %: 36.2 to 39.3 %)"
+
+
+@pytest.mark.parametrize(
+    ("onset", "duration", "when"),
+    [
+        (1036888.0, 1.0, "at 1036888 s"),  # rows of 900 s: no ramp of a second
+        (1036888.0, 4000.0, "from 1036888 s to 1040888 s"),
+        (12.5, 0.05, "at 12.5 s"),
+        (12.5, 3.0, "from 12.5 s to 15.5 s"),
+    ],
+)
+def test_a_change_within_the_last_digit_of_its_time_is_at_once(onset: float, duration: float, when: str) -> None:
+    effect = told("heat_loss", "time", "ramp", amplitude=0.6, onset=onset, duration=duration)
+    assert words_of_effect(MODEL, effect) == f"heat loss rose by 82 % {when}"
+
+
 def test_an_event_that_is_not_over_is_told_as_far_as_the_record_goes() -> None:
     """A feed that goes on rising: neither a time after the end, nor a size that nobody saw."""
     onset, constant, end = 12000.0, 9000.0, 28800.0

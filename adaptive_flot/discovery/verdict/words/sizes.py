@@ -115,7 +115,7 @@ def _always(site: Site, effect: Effect) -> str:
 
 
 def _may_end(told: NamedEffect) -> float:
-    """Time [s] at which an event may be over, an exponential approach but for a twentieth; its last onset where at once.
+    """Time [s] at which an event may be over, an exponential approach but for a twentieth, or its last onset.
 
     By the upper ends of the 95 % intervals: of a fall that lasts, a record may know how fast it is, and not how long.
     """
