@@ -1,4 +1,4 @@
-"""Events that stop for short pauses only: chance may part one event in two, and no switch stands in for what lasts."""
+"""Short pauses and spells of an event that lasts: chance may part it in two, and an outlier may be told with it."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from adaptive_flot.discovery.innovations.search.search import Search
 SHORT = 0.15
 """Share of the shorter spell beside it below which a pause of an event is short. Of eight right events of several
 spells the shortest pause was a third; of five that stood in for a lasting change 3 to 26 %."""
+BLIP = 2.5
+"""Rows up to which a spell beside one that lasts is a blip: as long as an outlier, and the row that forgets it."""
 ASKED = 12
 """The best explanations whose short pauses are tried to be closed."""
 
@@ -28,18 +30,28 @@ def has_short_pause(h: Hypothesis) -> bool:
     return any(b - (a + long) < SHORT * min(long, after) for (a, long), (b, after) in pairs)
 
 
+def has_blip(h: Hypothesis, dt: float) -> bool:
+    """Whether an event is there for some BLIP rows of `dt` [s] only, and much longer (SHORT) at another time."""
+    spells = [long for _, long in h.pulses] if h.kind == "switch" else []
+    return bool(spells) and min(spells) <= min(BLIP * dt, SHORT * max(spells))
+
+
 def with_pauses_closed(search: Search, found: Sequence[Explanation]) -> list[Explanation]:
-    """Explanations, the best first; short pauses of the best ones' events are closed where they gain little."""
+    """Explanations, the best first; what is short of the best ones' events is left out where it gains little."""
     closed = parallel_map(lambda e: without_short_pauses(search, e), found[:ASKED], search.processes)
     return sorted([*closed, *found[ASKED:]], key=lambda e: -worth(e))
 
 
 def without_short_pauses(search: Search, explanation: Explanation) -> Explanation:
-    """The explanation, its event without pauses that are short and gain less than LEAST_GAIN beside their numbers."""
-    parted = next((h for h in explanation.hypotheses if has_short_pause(h)), None)
+    """The explanation, its event without what is short and gains less than LEAST_GAIN beside its numbers.
+
+    That is a pause, or a blip. An outlier of a gauge was told as a leak of two rows, before the one that stayed.
+    """
+    dt = search.record.dt
+    parted = next((h for h in explanation.hypotheses if has_short_pause(h) or has_blip(h, dt)), None)
     if parted is None or search.time_is_up:
         return explanation
-    whole, rest = _whole(parted), search.without(explanation, parted)
+    whole, rest = _whole(parted, dt), search.without(explanation, parted)
     model, extended = search.model_of(explanation), model_with(search.model_of(rest), whole)
     held = {whole.effect.parameter(c) for c in whole.effect.coefficients} - set(whole.parameters)  # its times
     known = {q.name: q.value for q in model.parameters if q.name not in held}
@@ -48,10 +60,12 @@ def without_short_pauses(search: Search, explanation: Explanation) -> Explanatio
     return again if again.criterion > explanation.criterion - LEAST_GAIN else explanation
 
 
-def _whole(parted: Hypothesis) -> Hypothesis:
-    """The event with its short pauses closed."""
-    spells = [list(parted.pulses[0])]
-    for begin, long in parted.pulses[1:]:
+def _whole(parted: Hypothesis, dt: float) -> Hypothesis:
+    """The event without its blips, and with its short pauses closed."""
+    longest = max(long for _, long in parted.pulses)
+    lasting = [(begin, long) for begin, long in parted.pulses if long > min(BLIP * dt, SHORT * longest)]
+    spells = [list(lasting[0])]
+    for begin, long in lasting[1:]:
         last = spells[-1]
         if begin - sum(last) < SHORT * min(last[1], long):
             last[1] = begin + long - last[0]

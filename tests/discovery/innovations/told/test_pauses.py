@@ -15,7 +15,7 @@ from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
-from adaptive_flot.discovery.innovations.search.pauses import has_short_pause, without_short_pauses
+from adaptive_flot.discovery.innovations.search.pauses import has_blip, has_short_pause, without_short_pauses
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_hardly_off
 from adaptive_flot.greybox.effects import Effect
@@ -53,6 +53,34 @@ def fitted(search: Search, base: Explanation, h: Hypothesis) -> Explanation:
 )
 def test_a_pause_is_short_beside_the_spells_about_it(spells: tuple[tuple[float, float], ...], short: bool) -> None:
     assert has_short_pause(switched(*spells)) == short
+
+
+@pytest.mark.parametrize(
+    ("spells", "blip"),
+    [
+        (((2000.0, 2000.0),), False),
+        (((1000.0, 20.0), (2000.0, 2000.0)), True),  # two rows of ten seconds
+        (((1000.0, 60.0), (2000.0, 2000.0)), False),
+        (((1000.0, 20.0), (2000.0, 20.0)), False),  # nothing that lasts: spikes of a sensor
+        (((1000.0, 20.0), (2000.0, FOREVER)), True),
+    ],
+)
+def test_a_blip_is_as_long_as_an_outlier_beside_a_spell_that_lasts(
+    spells: tuple[tuple[float, float], ...], blip: bool
+) -> None:
+    assert has_blip(switched(*spells), 10.0) == blip
+
+
+def test_an_outlier_is_no_spell_of_an_event() -> None:
+    """A gauge was off in one row: a leak was told "from 7.47 to 7.49 s, and from 8.99 s on"."""
+    whole, _, _ = judged(record(2, probe=PROBE))
+    base = whole.base(whole.model.parameter_values)
+    dt = whole.record.dt
+    lasting, with_blip = ((2000.0, 2000.0),), ((1000.0, 2 * dt), (2000.0, 2000.0))
+    told = without_short_pauses(whole, fitted(whole, base, switched(*with_blip)))
+    assert told.hypotheses[0].pulses == lasting
+    two = fitted(whole, base, switched((1000.0, 6 * dt), *lasting))
+    assert without_short_pauses(whole, two) is two  # too long for an outlier: another rule asks what it gains
 
 
 def test_a_pause_that_is_not_there_is_closed_and_one_that_is_stays() -> None:
