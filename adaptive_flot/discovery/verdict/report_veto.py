@@ -17,7 +17,7 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE, WORSE
 from adaptive_flot.discovery.record.problem import Problem
-from adaptive_flot.discovery.record.robust import noise_by_differences
+from adaptive_flot.discovery.record.robust import noise_beside_motion
 from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -225,14 +225,14 @@ def noise_from_row_to_row(
 
     Where the noise grows with the value, as the weights w of the problem say, its root mean square over these rows::
 
-        s_y / w sqrt(mean of w^2)        with s_y / w the noise of y / w by differences
+        s_y / w sqrt(mean of w^2)        with s_y / w the noise of y / w by differences (`noise_beside_motion`)
 
     A record of its own that reports has no weights.
     """
     if report is not None:
         outputs = report.outputs[:, [model.index("outputs", c.output) for c in changes]]
-        return np.asarray(np.nan_to_num(noise_by_differences(outputs)))
+        return np.asarray(np.nan_to_num(noise_beside_motion(outputs)))
     columns = [problem.columns.index(model.index("outputs", c.output)) for c in changes]
     weights = problem.weights[:, columns]
     size = np.sqrt(np.nanmean(weights[problem.rows("report")] ** 2, axis=0))
-    return np.asarray(np.nan_to_num(noise_by_differences(problem.measured[:, columns] / weights) * size))
+    return np.asarray(np.nan_to_num(noise_beside_motion(problem.measured[:, columns] / weights) * size))
