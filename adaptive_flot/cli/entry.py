@@ -98,7 +98,10 @@ def _end_by(error: BaseException, number: signal.Signals, debug: bool) -> NoRetu
     """End as a signal asks for. Ctrl-C needs no words: who pressed it knows."""
     if number == signal.SIGINT:
         sys.exit(128 + number)
-    _end(error, f"ended by {number.name}", 128 + number, debug)
+    said = f"ended by {number.name}"
+    if "discover" in sys.argv[1:3]:
+        said += "; nothing is told. With --budget SECONDS a search ends by itself, and tells what it has come to"
+    _end(error, said, 128 + number, debug)
 
 
 def _described(error: BaseException) -> str:

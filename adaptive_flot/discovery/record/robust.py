@@ -17,7 +17,7 @@ SPIKE, SPIKE_WINDOW = 6.0, 5
 """A spike is further from the median of so many neighbours than so many standard deviations of such distances."""
 ORDERS = range(1, 7)
 MOTION = 0.7
-"""With a memory of 0.9 in the noise, high orders have 0.73 times the noise of the first; with one of 0.5, 0.82 times."""
+"""With a memory of 0.9 in the noise, high orders have 0.73 times the noise of the first; with 0.5, 0.82 times."""
 FEWEST_PAIRS = 200
 """Consecutive measured pairs that an autoregressive noise model asks for; a sparse assay has white noise."""
 
