@@ -76,8 +76,8 @@ def test_workers_end_with_a_killed_discover(
     else:
         assert process.returncode == 128 + number
         assert err == (
-            f"adaptive-flot: ended by {number.name}; nothing is told. With --budget SECONDS a search ends by itself, and "
-            "tells what it has come to\n"
+            f"adaptive-flot: ended by {number.name}; nothing is told. With --budget SECONDS a search ends by itself, "
+            "and tells what it has come to\n"
         )
     assert {f.name for f in tmp_path.iterdir() if f.name != "__pycache__"} == {"tank.csv", "heated.py"}
 
