@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats.qmc import Halton
 
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import placements, with_nodes
 from adaptive_flot.discovery.record.noise import proportional
 from adaptive_flot.discovery.record.problem import CYCLES, Problem, make_problem, split_names
+from adaptive_flot.discovery.record.robust import noise_beside_motion
 from adaptive_flot.discovery.record.screening import Screening
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -20,6 +22,12 @@ BURN_IN_ROWS = 30
 GUARD_ROWS = 5
 FEWEST_VALUES = 8
 """An output with fewer measurements on any split is left out: it could not be fitted, confirmed or reported."""
+MUCH = 3.0
+"""A fit whose error is so many times the noise may rest in a side minimum."""
+STARTS, SPREAD, WIDTH = 8, 0.3, 3.0
+"""Further starts, how far they spread in the logarithm of a constant, and in scales of one that may be negative."""
+ELSEWHERE = 10.0
+"""Least drop of minus two log-likelihood for which another start is taken."""
 
 
 def split_record(
@@ -68,6 +76,7 @@ def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
         first = Fitter(problem).fit(model, like=start, rounds=1)
     if first is None:
         return None
+    first = _from_elsewhere(problem, start, first)
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
     problem = with_nodes(problem.with_weights(proportional(seen, first.predicted)), first, placed)
     fitter = Fitter(problem)
@@ -75,6 +84,31 @@ def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
     if base is None:
         return None
     return problem, fitter.settled(base)
+
+
+def _from_elsewhere(problem: Problem, start: Fit, first: Fit) -> Fit:
+    """The best of fits from several constants, where one leaves much of a process that does not start at rest.
+
+    A stiffness 12 % off puts an oscillator out of step, and its fit stays in a side minimum. The constants are those
+    of the model times e^(SPREAD x), or plus WIDTH x scales where they may be negative, x a Halton sequence about 0.
+    """
+    rows, model = problem.rows("estimate"), start.model
+    noise = np.maximum(noise_beside_motion(problem.measured), problem.floor)
+    left = np.sqrt(np.nanmean(first.residual(problem)[rows] ** 2, axis=0))
+    if model.starts_steady or not problem.adapted or not np.any(left > MUCH * noise):
+        return first
+    chosen = [model.parameters[i] for i in model.indices("parameters", problem.adapted)]
+    fits = [first]
+    for x in 2 * Halton(len(chosen), scramble=False).random(STARTS + 1)[1:] - 1:
+        away = [
+            p.value * np.exp(SPREAD * v) if p.lower >= 0 else p.value + WIDTH * v * p.scale
+            for p, v in zip(chosen, x, strict=True)
+        ]
+        values = {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in zip(chosen, away, strict=True)}
+        fit = Fitter(problem).fit(model, start=values, like=start, rounds=1)
+        fits += [fit] if fit is not None and _runs_at_every_row(problem, fit) else []
+    best = min(fits, key=lambda f: f.loss)
+    return best if best.loss < first.loss - ELSEWHERE else first
 
 
 def _runs_at_every_row(problem: Problem, fit: Fit) -> bool:
