@@ -108,8 +108,9 @@ def nearest_without_a_site(
         or not _explains(compared, further, rivals[0])
     ):
         return []
-    near = [rivals[0], *(e for e in rivals[1:] if not told_apart(further, base, rivals[0], e))]
-    return [words_at(further, e) for e in near]
+    near = [e for e in rivals[1:] if not told_apart(further, base, rivals[0], e)]
+    # with process noise a constant amount may do as well as a stiffness, and explain nothing of a free run
+    return [words_at(further, e) for e in (rivals[0], *(e for e in near if _explains(compared, further, e)))]
 
 
 def _is_there_few_times(h: Hypothesis) -> bool:

@@ -139,7 +139,7 @@ def hardening(stiffness: float, cube: float, damping: float) -> Model:
 
 @pytest.mark.parametrize(("stiffness", "cube", "damping"), [(44.0, 48.0, 0.025), (60.0, 30.0, 0.02)])
 def test_constants_an_eighth_off_are_no_side_minimum(stiffness: float, cube: float, damping: float) -> None:
-    """An oscillator out of step: one fit stayed at 28 times the noise, and a rise of the spring was told, and confirmed.
+    """An oscillator out of step: a fit stayed at 28 times the noise, and a rise of the spring was told, and confirmed.
 
     The plant has a damping that grows with the speed, so that something is left at the right constants, too.
     """

@@ -1,0 +1,51 @@
+"""Protects: an event is not told to be over from the first row on that no fit has seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.unseen_end import with_unseen_ends
+from adaptive_flot.discovery.record.problem import make_problem
+from adaptive_flot.greybox.effects import Effect
+from tests.discovery.heated import DT, heated_tank, tank_record
+
+ADAPTED = ("efficiency", "loss")
+OFF = 3.0
+
+
+@pytest.mark.parametrize("rows_after", [0, 150])
+def test_an_event_lasts_where_no_fitted_row_has_seen_its_end(rows_after: int) -> None:
+    """The thermometer shows 3 K more; it is right again in rows that were fitted, or the record ends before."""
+    record = tank_record()
+    n = len(record)
+    first = n // 2
+    problem = make_problem(record, heated_tank(), ADAPTED, burn_in=30, guard=5)
+    last_fitted = int(np.flatnonzero(problem.rows("estimate", "confirm"))[-1])
+    end = last_fitted + 1 - rows_after
+    y = record.outputs.copy()
+    y[first : (n if not rows_after else end)] += OFF
+    problem = make_problem(replace(record, outputs=y), heated_tank(), ADAPTED, burn_in=30, guard=5)
+    fitter = Fitter(problem, ("estimate", "confirm"))
+    onset, long = float(record.time[first]), (end - first) * DT
+    event = Effect("thermometer", "time", "switch", settings={"count": 1.0, "width": 0.1 * DT})
+    names = tuple(event.parameter(c.name) for c in event.terms)
+    start = dict(zip(names, (OFF, onset - DT / 2, long), strict=True))
+    base = fitter.fit(heated_tank())
+    assert base is not None
+    fit = fitter.fit(base.model.with_effects([event]), names, start, base)
+    assert fit is not None
+    again = with_unseen_ends(fitter, fit)
+    (told,) = again.model.fitted_effects()
+    over = told.coefficients["on_1"] + told.coefficients["for_1"]
+    if rows_after:
+        assert again is fit and over < record.time[last_fitted] - 100 * DT
+    else:
+        assert over > record.time[-1] and event.parameter("for_1") not in again.names
+        assert told.coefficients["amplitude"] == pytest.approx(OFF, rel=0.05)
+        report = problem.rows("report") & (np.arange(n) > last_fitted + 5)
+        left = [np.sqrt(np.mean(f.residual(problem)[report] ** 2)) for f in (fit, again)]
+        assert not report.any() or left[1] <= left[0] + 1e-9
