@@ -31,12 +31,13 @@ def test_an_event_lasts_where_no_fitted_row_has_seen_its_end(rows_after: int) ->
     problem = make_problem(replace(record, outputs=y), heated_tank(), ADAPTED, burn_in=30, guard=5)
     fitter = Fitter(problem, ("estimate", "confirm"))
     onset, long = float(record.time[first]), (end - first) * DT
-    event = Effect("thermometer", "time", "switch", settings={"count": 1.0, "width": 1.5 * DT})
+    event = Effect("thermometer", "time", "switch", settings={"count": 1.0, "width": DT})
     names = tuple(event.parameter(c.name) for c in event.terms)
     start = dict(zip(names, (OFF, onset - DT / 2, long), strict=True))
     base = fitter.fit(heated_tank())
     assert base is not None
-    fit = fitter.fit(base.model.with_effects([event]), names, start, base)
+    near = {name: (start[name] - DT, start[name] + DT) for name in names[1:]}
+    fit = fitter.fit(base.model.with_effects([event]), names, start, base, near)
     assert fit is not None
     again = with_unseen_ends(fitter, fit)
     (told,) = again.model.fitted_effects()
