@@ -26,6 +26,7 @@ from adaptive_flot.discovery.fitting.base_fit import prepare, split_finer, split
 from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
+from adaptive_flot.discovery.fitting.onsets import with_onset_sought
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.fitting.unseen_end import with_unseen_ends
 from adaptive_flot.discovery.record.even_steps import steps_evenly
@@ -254,7 +255,8 @@ def fit_without_report(state: State) -> State:
 
     def final(beside: Problem, fit: Fit) -> Fit:
         fitter, every = Fitter(beside, splits), Fitter(replace(beside, nodes=None), splits)
-        again = with_unseen_ends(fitter, fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit)
+        again = with_onset_sought(fitter, fitter.fit(fit.model, fit.names, like=fit, rounds=2) or fit)
+        again = with_unseen_ends(fitter, again)
         again = at_every_row(fitter, again, {})
         if beside.background is not None and beside.background.told is not None:
             again = fitter.at_its_constants(again)
