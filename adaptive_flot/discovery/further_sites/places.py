@@ -102,7 +102,12 @@ def loss_size(state: Quantity) -> float:
 
 def further_sites(model: Model) -> tuple[Site, ...]:
     """The further sites of such a model."""
-    return tuple(s for s in model.sites if s.name.startswith((BALANCE, LOSS, DRAG, RATE, READING, AMOUNT)))
+    return tuple(s for s in model.sites if is_further(s.name))
+
+
+def is_further(name: str) -> bool:
+    """Whether a site is one of these, by its name."""
+    return name.startswith((BALANCE, LOSS, DRAG, RATE, READING, AMOUNT))
 
 
 def is_part(place: str, site: str) -> bool:

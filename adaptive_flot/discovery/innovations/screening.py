@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adaptive_flot.discovery.further_sites.places import is_further
 from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, MATTERS, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
@@ -106,7 +107,7 @@ class Screening:
         return max((x for x in found if x is not None), key=lambda x: x.gain, default=None)
 
     def _modes_of_switch(self, site: Site) -> tuple[Mode, ...]:
-        if site.role not in BALANCE:
+        if site.role not in BALANCE or is_further(site.name):  # a balance by a factor is another store, a further site
             return (site.mode,)
         if site.mode == "offset":
             return (site.mode, "factor")
