@@ -34,6 +34,14 @@ def test_noise_with_a_memory_is_as_large_as_from_row_to_row(memory: float) -> No
         assert noise_beside_motion(coloured) == pytest.approx(noise_by_differences(coloured))
 
 
+def test_a_coarse_resolution_is_no_motion() -> None:
+    """Of a grade in steps of its noise, the medians are multiples of a step: a healthy record was `abstain` by that."""
+    for seed in range(10):
+        noise = np.random.default_rng(seed).normal(size=(ROWS, 1))
+        coarse = 2.0 * np.round(noise / 2.0)
+        assert noise_beside_motion(coarse) == pytest.approx(noise_by_differences(coarse))
+
+
 def test_missing_values_and_rare_ones_are_no_obstacle() -> None:
     series = np.random.default_rng(1).normal(size=(ROWS, 2))
     series[::7, 0] = np.nan
