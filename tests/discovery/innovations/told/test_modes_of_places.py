@@ -1,7 +1,7 @@
 """Protects: what acts at a balance without a site is an amount. By a factor it is another store, and that has a place.
 
-A softer oil was told as "what stores pressure were 4 times as large; or as if something takes 1.38 bar/s from the balance
-of pressure": both were the same factor, and the amount was the logarithm of it.
+A softer oil was told as "what stores pressure were 4 times as large; or as if something takes 1.38 bar/s from the
+balance of pressure": both were the same factor, and the amount was the logarithm of it.
 """
 
 from __future__ import annotations
