@@ -46,9 +46,15 @@ class LeastShown:
         kind = {"falls_by": size} if self.by_factor else {"moves_by": size, "unit": self.unit}
         return {"site": self.site, **kind}
 
+    @property
+    def size_text(self) -> str:
+        """The size with its unit; that not even half shows, or nothing."""
+        if self.hidden:
+            return "not by half" if self.by_factor else "nothing"
+        return f"{100 * self.size:.2g} %" if self.by_factor else f"{short(self.size)} {self.unit}".rstrip(" -")
+
     def __str__(self) -> str:
-        size = f"{100 * self.size:.2g} %" if self.by_factor else f"{short(self.size)} {self.unit}".rstrip(" -")
-        return f"{self.site.replace('_', ' ')} {size}"
+        return f"{self.site.replace('_', ' ')} {self.size_text}"
 
 
 def what_is_shown(found: Sequence[LeastShown]) -> tuple[str, ...]:

@@ -127,6 +127,7 @@ def _evidence(
         _measured_against_model(discovery, problem, before, after, album),
         *_curve_pictures(discovery, problem, after, album),
         tables.coefficient_table(discovery) if verdict.effects else None,
+        tables.least_shown_table(discovery),
     )
     return first, sections
 

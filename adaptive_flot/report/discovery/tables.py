@@ -43,6 +43,19 @@ def error_table(discovery: Discovery) -> Table:
     return Table(caption, ("Output", "Unit", "Before", "After", "Noise", "Reduction [%]"), tuple(rows), words=2)
 
 
+def least_shown_table(discovery: Discovery) -> Table | None:
+    """How large a lasting change would have to be to show, site by site; None where nothing is said of it."""
+    found = discovery.verdict.least_shown
+    if not found:
+        return None
+    rows = [(spaced(s.site), "falls by" if s.by_factor else "moves by", s.size_text) for s in found]
+    caption = (
+        "A change that lasts from halfway on, and the size from about which this record would have shown it in four of "
+        "five cases. What is smaller may be there."
+    )
+    return Table(caption, ("Site", "Change", "Shows from"), tuple(rows), words=2)
+
+
 def coefficient_table(discovery: Discovery) -> Table:
     """Coefficients of the effects that the verdict tells, with their intervals.
 

@@ -6,6 +6,7 @@ The size is checked against the gain of changes that were really made, and by ca
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from adaptive_flot.discovery.innovations.search.least_shown import least_shown
 from adaptive_flot.discovery.results.least_shown import LeastShown, what_is_hidden, what_is_shown
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset
+from adaptive_flot.report.discovery.tables import least_shown_table
 from tests.discovery.innovations.box import model, record
 
 FLOOR = np.array([0.04])
@@ -94,6 +96,21 @@ def test_words(found: tuple[LeastShown, ...], shown: str, hidden: str) -> None:
     assert shown in said and bool(said) == bool(shown)
     assert hidden in what_is_hidden(found) and bool(what_is_hidden(found)) == bool(hidden)
     assert not any("meter inf" in s or "fan 8" in s for s in (said, what_is_hidden(found)))
+
+
+def test_the_page_has_them_in_a_table() -> None:
+    found = (
+        LeastShown("hot_valve", True, 0.031, "-"),
+        LeastShown("fan", True, 0.8, "-"),
+        LeastShown("meter", False, 0.2, "m"),
+    )
+    table = least_shown_table(SimpleNamespace(verdict=SimpleNamespace(least_shown=found)))  # type: ignore[arg-type]
+    assert table is not None
+    assert table.rows == (
+        ("hot valve", "falls by", "3.1 %"), ("fan", "falls by", "not by half"), ("meter", "moves by", "0.2 m"),
+    )  # fmt: skip
+    nothing = SimpleNamespace(verdict=SimpleNamespace(least_shown=()))
+    assert least_shown_table(nothing) is None  # type: ignore[arg-type]
 
 
 def test_none_says_so_with_and_without_a_reference() -> None:
