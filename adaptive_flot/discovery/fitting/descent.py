@@ -37,6 +37,8 @@ TOLERANCE = 0.1
 """A step that improves minus two log-likelihood by less ends the search: a fortieth of what any test asks for."""
 SLOW = 2e-3
 """Or one that improves it by less than this share of what the search has gained so far."""
+RUN_AWAY = 1e6
+"""Scales by which a state moves at most: a run that moves it more has left all bounds."""
 FAR_OFF = 0.01
 """A run is far off when no larger a share of the measurements is within what the first steps look at."""
 KEPT, SHAPE_KEPT = 0.5, 0.8
@@ -170,7 +172,7 @@ class Descent:
         p, x0 = self.unknowns.unpack(self.unknowns.centre)
         scale = np.array([s.scale for s in self.model.states])
         moved = np.std(self.simulator.states(record, x0, p), axis=0)
-        spread = np.where(np.isfinite(moved), np.maximum(scale, moved), scale)
+        spread = np.where(moved < RUN_AWAY * scale, np.maximum(scale, moved), scale)
         y, H = self.simulator.first_outputs(record, x0, p)
         error, H = record.outputs[0, columns] - y[columns], H[columns]
         there = np.isfinite(error) & np.isfinite(H).all(axis=1)
