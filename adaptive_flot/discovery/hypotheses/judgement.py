@@ -140,6 +140,16 @@ def has_idle_span(tested: Tested) -> bool:
     return bool(abs(value["slope"]) <= NORMAL95 * spread["slope"])
 
 
+def _offset_of_idle_span(best: Tested, alike: Sequence[Tested], ranked: Sequence[Tested]) -> tuple[Tested, ...]:
+    """The offset at the site of a best hypothesis whose span is idle, where it is not among those alike; else nothing.
+
+    With a slope of zero both are the same, so that only their fits differ: an offset that rests a little beside.
+    """
+    there = (t for t in ranked if t.hypothesis is not None and t.hypothesis.kind == "offset")
+    same = [t for t in there if _site(t) == _site(best) and not any(t is a for a in alike)]
+    return tuple(same[:1]) if has_idle_span(best) else ()
+
+
 def _simplest(best: Tested, alike: tuple[Tested, ...]) -> tuple[Tested, tuple[Tested, ...]]:
     """Of what is not told apart, the hypothesis at the best one's site that is told comes first; see `_first`."""
     same = [best, *(t for t in alike if _site(t) == _site(best))]
@@ -208,7 +218,7 @@ def judge(
     adequate = usual is not None and usual.exceeded(best, count, len(blocks.edges)) is None
     alike = (*beyond, *tied(blocks, null, best, [t for t in ranked if t is not best and t not in beyond], adequate))
     beaten = ranked[0] is not best and not any(t is ranked[0] for t in alike)
-    best, alike = _simplest(best, alike)
+    best, alike = _simplest(best, (*alike, *_offset_of_idle_span(best, alike, ranked)))
     judged = Judged("named", best, alike, "", explained)
     if beaten:
         why = "what fits best makes an output worse, so that something else is the matter"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.hypotheses.judgement import Judged, has_idle_span
+from adaptive_flot.discovery.hypotheses.judgement import Judged, _offset_of_idle_span, has_idle_span
 from adaptive_flot.greybox import Effect
 
 SPAN = Hypothesis(
@@ -35,3 +35,13 @@ def test_a_slope_of_less_than_its_uncertainty_is_none(slope: float, told: Hypoth
     # where no offset comes near, there is no other name for it
     (alone,) = Judged("named", span, (), "", 1.0).parts
     assert alone.hypothesis is SPAN
+
+
+@pytest.mark.parametrize(("slope", "same"), [(0.01, True), (0.03, False)])
+def test_an_offset_whose_fit_rests_a_little_beside_is_the_same_as_an_idle_span(slope: float, same: bool) -> None:
+    """A grade sensor that showed 0.06 too much was told with "a span 0 % larger": its offset rested 3 deviations off."""
+    span = stand_in(SPAN, -1000.0, (0.5, slope), (0.01, 0.01))
+    offset = stand_in(OFFSET, -900.0, (0.47,), (0.01,))
+    assert _offset_of_idle_span(span, (), [span, offset]) == ((offset,) if same else ())
+    assert not _offset_of_idle_span(span, (offset,), [span, offset])  # it is among those alike
+    assert not _offset_of_idle_span(offset, (), [span, offset])
