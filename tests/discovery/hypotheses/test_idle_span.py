@@ -39,7 +39,7 @@ def test_a_slope_of_less_than_its_uncertainty_is_none(slope: float, told: Hypoth
 
 @pytest.mark.parametrize(("slope", "same"), [(0.01, True), (0.03, False)])
 def test_an_offset_whose_fit_rests_a_little_beside_is_the_same_as_an_idle_span(slope: float, same: bool) -> None:
-    """A grade sensor that showed 0.06 too much was told with "a span 0 % larger": its offset rested 3 deviations off."""
+    """A grade sensor that showed 0.06 too much was told with "a span 0 % larger": its offset rested beside."""
     span = stand_in(SPAN, -1000.0, (0.5, slope), (0.01, 0.01))
     offset = stand_in(OFFSET, -900.0, (0.47,), (0.01,))
     assert _offset_of_idle_span(span, (), [span, offset]) == ((offset,) if same else ())

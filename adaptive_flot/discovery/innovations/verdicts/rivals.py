@@ -62,6 +62,14 @@ def unexpected_drift(state: State) -> bool:
     return not all(fitted[name].drifts for name in state.known_problem.adapted)
 
 
+def one_of_them_drifts(state: State) -> bool:
+    """Whether the best of a class is a gradual change in time of what is fitted: row by row it may be told apart."""
+    best = state.judged.best if state.judged.word == "class" else None
+    if best is None or state.search is None:
+        return False
+    return all(site in state.search.adapted_sites and driver == "time" for site, driver in best.names)
+
+
 def unconfirmed(state: State) -> bool:
     """Whether a `none` rests on a search whose best alternative explains much (see MUCH), and was not confirmed.
 

@@ -41,6 +41,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     late_as_well,
     leaves_too_much,
     not_two,
+    one_of_them_drifts,
     smaller,
     surely_better,
     surely_worse,
@@ -71,6 +72,12 @@ def second_opinion(state: State) -> State:
     does not surely fall, or the free run has a free curve in time for a rival, that over stretches must (see
     `errors_over_stretches`). A curve in time follows what wanders, so that no other cause has a smaller error.
     """
+    if one_of_them_drifts(state):  # row by row a change of what is fitted may be told from the others of a class
+        drift = replace(state, judgement=replace(state.judged, word="abstain", members=(), part=()))
+        alone = second_opinion(drift)
+        best = alone.judged.best if alone.judged.word in WITH_A_NAME else None
+        of_them = {site for site, _ in state.judged.members}
+        return alone if best is not None and {site for site, _ in best.names} <= of_them else state
     problem, (before, _) = state.known_problem, state.refitted
     given = replace(problem.record, initial_state=before.initial_state)
     asked_for = is_asked(state) and ONE_CAUSE not in state.contradiction
