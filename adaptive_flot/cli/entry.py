@@ -99,7 +99,7 @@ def _end_by(error: BaseException, number: signal.Signals, debug: bool) -> NoRetu
     if number == signal.SIGINT:
         sys.exit(128 + number)
     said = f"ended by {number.name}"
-    if "discover" in sys.argv[1:3]:
+    if next((word for word in sys.argv[1:] if not word.startswith("-")), "") == "discover":
         said += "; nothing is told. With --budget SECONDS a search ends by itself, and tells what it has come to"
     _end(error, said, 128 + number, debug)
 

@@ -65,7 +65,7 @@ class Screening:
         self.model, self._response = model, response
         slopes, told = known if known is not None else (np.empty((0, response.by_constants.shape[1])), np.empty(0))
         self._further = len(told)
-        self._basis = _span(np.vstack([response.by_constants, slopes]))
+        self._basis = span(np.vstack([response.by_constants, slopes]))
         innovations = np.concatenate([response.innovations, told])
         self._left = innovations - self._basis @ (self._basis.T @ innovations)
         self._total = float(self._left @ self._left)
@@ -296,7 +296,7 @@ class Screening:
         return left
 
 
-def _span(X: FloatArray) -> FloatArray:
+def span(X: FloatArray) -> FloatArray:
     """Orthonormal columns that span those of X (n, r)."""
     length = np.linalg.norm(X, axis=0)
     U, s, _ = np.linalg.svd(X[:, length > 0] / length[length > 0], full_matrices=False)

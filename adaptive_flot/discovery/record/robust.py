@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -49,6 +51,13 @@ def noise_by_differences(series: FloatArray) -> FloatArray:
     return np.array(deviations)
 
 
+def least_by_orders(series: FloatArray, orders: Sequence[int]) -> FloatArray:
+    """The least (m,) of the noise of a series (N, m) by differences of some orders; infinite where none is told."""
+    each = [noise_by_differences(np.diff(series, n - 1, axis=0)) * np.sqrt(2 / binom(2 * n, n)) for n in orders]
+    least: FloatArray = np.min(np.where(np.isfinite(each), each, np.inf), axis=0)
+    return least
+
+
 def noise_beside_motion(series: FloatArray) -> FloatArray:
     """The same (m,) of a series (N, m) that may move much from row to row, as an oscillator does.
 
@@ -60,9 +69,7 @@ def noise_beside_motion(series: FloatArray) -> FloatArray:
     Not where more than STILL of the first differences are zero: medians of a coarse resolution are multiples of it, and
     the least of several of them is too small. Gasser, Sroka & Jennen-Steinmetz, *Biometrika* 73 (1986) 625.
     """
-    orders = [noise_by_differences(np.diff(series, n - 1, axis=0)) * np.sqrt(2 / binom(2 * n, n)) for n in ORDERS]
-    first = orders[0]
-    least = np.min(np.where(np.isfinite(orders), orders, np.inf), axis=0)
+    first, least = noise_by_differences(series), least_by_orders(series, ORDERS)
     steps = np.diff(series, axis=0)
     coarse = np.sum(steps == 0, axis=0) > STILL * np.sum(np.isfinite(steps), axis=0)
     found: FloatArray = np.where((least < MOTION * first) & ~coarse, least, first)

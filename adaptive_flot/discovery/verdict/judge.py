@@ -12,6 +12,7 @@ from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.effects import LATE, STATELESS_DRIVERS
+from adaptive_flot.greybox.model import Model
 
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
@@ -50,7 +51,9 @@ def judge(result: SearchResult) -> Judgement:
     # does not say that it drifts, a ramp is a change like any other; a curve follows whatever wanders
     alike = (a for a in close if a.worse_than(best) < LEAST_MARGIN * result.rows_per_effective_sample)
     drifting = next((a for a in alike if _only_drift(a, result)), None)
-    if drifting and (_may_drift(result) or any(e.family.is_curve for e in drifting.effects)):
+    if drifting and (
+        may_drift(result.base.model, result.base.names) or any(e.family.is_curve for e in drifting.effects)
+    ):
         # all there is, unless something else had to be added to all
         return Judgement(
             "abstain" if result.common_nuisance else "none", drifting, (), _others(result, drifting), margin
@@ -218,10 +221,9 @@ def _only_adds_to(a: Alternative, b: Alternative) -> bool:
     return site == where and constant == "constant" and signal and b.fit.loss - a.fit.loss < LEAST_MARGIN
 
 
-def _may_drift(result: SearchResult) -> bool:
-    """Whether the model says of all that is adapted that it drifts."""
-    fitted = {p.name: p for p in result.base.model.parameters}
-    return all(fitted[name].drifts for name in result.base.names)
+def may_drift(model: Model, names: Sequence[str]) -> bool:
+    """Whether a model says of all parameters of these names that they drift."""
+    return all(p.drifts for p in model.parameters if p.name in names)
 
 
 def _only_drift(a: Alternative, result: SearchResult) -> bool:

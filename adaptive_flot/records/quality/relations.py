@@ -99,10 +99,13 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
     if n < FEWEST or _still(u) or _still(held):
         return None
     inputs, outputs = _lagged(u, q, range(q + 1)), _lagged(held, q, range(1, p + 1))
-    new = _left(_scaled(np.column_stack([inputs, outputs])), _scaled(held[q:]))  # what no input has brought about
+    new, _ = _residual(
+        _scaled(np.column_stack([inputs, outputs])), _scaled(held[q:])
+    )  # what no input has brought about
     own, other, target = (_scaled(a) for a in (inputs[p:, 1:], _lagged(new, p, range(1, p + 1)), u[q + p :]))
-    rss0, rank0 = _residual(own, target)
-    rss1, rank1 = _residual(np.column_stack([own, other]), target)
+    e0, rank0 = _residual(own, target)
+    e1, rank1 = _residual(np.column_stack([own, other]), target)
+    rss0, rss1 = float(e0 @ e0), float(e1 @ e1)
     if rss0 <= 1e-20 * n or rank1 == rank0:
         return None
     more, left = rank1 - rank0, n - rank1 - 1
@@ -117,17 +120,10 @@ def _lagged(values: FloatArray, first: int, lags: Iterable[int]) -> FloatArray:
     return np.column_stack([values[first - i : len(values) - i] for i in lags])
 
 
-def _left(design: FloatArray, target: FloatArray) -> FloatArray:
-    """What a regression leaves of a target (n,)."""
-    left: FloatArray = target - design @ np.linalg.lstsq(design, target, rcond=1e-10)[0]
-    return left
-
-
-def _residual(design: FloatArray, target: FloatArray) -> tuple[float, int]:
-    """Sum of squares that a regression leaves, and its rank; all columns are about their means."""
+def _residual(design: FloatArray, target: FloatArray) -> tuple[FloatArray, int]:
+    """What a regression leaves of a target (n,), and its rank; all columns are about their means."""
     coefficients, _, rank, _ = np.linalg.lstsq(design, target, rcond=1e-10)
-    left = target - design @ coefficients
-    return float(left @ left), int(rank)
+    return target - design @ coefficients, int(rank)
 
 
 def block_means(values: FloatArray, size: int) -> FloatArray:

@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import binom
 
-from adaptive_flot.discovery.record.robust import noise_by_differences
+from adaptive_flot.discovery.record.robust import least_by_orders
 from adaptive_flot.errors import DataError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -135,12 +134,7 @@ def noise_floor(records: Sequence[Dataset], columns: Sequence[int]) -> FloatArra
 
     Gasser, Sroka & Jennen-Steinmetz, *Biometrika* 73 (1986) 625.
     """
-    each = []
-    for record in records:
-        y = record.outputs[:, list(columns)]
-        orders = [noise_by_differences(np.diff(y, n - 1, axis=0)) * np.sqrt(2 / binom(2 * n, n)) for n in ORDERS]
-        each.append(np.min(np.where(np.isfinite(orders), orders, np.inf), axis=0))
-    noise = np.median(each, axis=0)
+    noise = np.median([least_by_orders(record.outputs[:, list(columns)], ORDERS) for record in records], axis=0)
     floor: FloatArray = np.maximum(
         np.where(np.isfinite(noise), noise, 0.0), 1e-6 * np.maximum(spread(records, columns), 1e-300)
     )

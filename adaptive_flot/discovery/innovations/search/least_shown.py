@@ -22,6 +22,7 @@ from scipy.stats import norm
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.filter.refit import Refit, Refitter
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
+from adaptive_flot.discovery.innovations.screening import span
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN
 from adaptive_flot.discovery.results import LeastShown, State
 from adaptive_flot.greybox.model import FloatArray
@@ -79,8 +80,6 @@ def _left(constants: FloatArray, response: FloatArray) -> float:
     """Squared length of what a fit of the constants can not explain of a response; tiny where that is all of it."""
     if not (np.isfinite(response).all() and np.isfinite(constants).all()):
         return 1e-300
-    lengths = np.linalg.norm(constants, axis=0)
-    scaled = constants[:, lengths > 0] / lengths[lengths > 0]
-    rest = response - scaled @ np.linalg.lstsq(scaled, response, rcond=1e-10)[0] if scaled.size else response
-    whole = float(response @ response)
+    basis, whole = span(constants), float(response @ response)
+    rest = response - basis @ (basis.T @ response)
     return max(float(rest @ rest) - 1e-12 * whole, 1e-300)

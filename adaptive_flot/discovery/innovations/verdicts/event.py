@@ -37,8 +37,8 @@ def with_event(compared: Comparison, search: Search, told: Told) -> Comparison:
 
     Of the outputs that the event can change: where no error without it is above what is usual on the reference, there
     is nothing to explain. Where one keeps more than half of what its squared error is above that, there is more than
-    the event explains, and its name would be a guess. So it is where the error of any
-    output grows to more than what is usual.
+    the event explains, and its name would be a guess. So it is where the error of any output
+    grows to more than what is usual.
 
     Parameters
     ----------

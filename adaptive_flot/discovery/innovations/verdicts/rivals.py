@@ -19,6 +19,7 @@ from adaptive_flot.discovery.innovations.telling_apart import NEAR
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
 from adaptive_flot.discovery.results import OutputChange, State
 from adaptive_flot.discovery.results.words import TELLING, WITH_A_NAME
+from adaptive_flot.discovery.verdict.judge import may_drift
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray
@@ -57,17 +58,18 @@ def unexpected_drift(state: State) -> bool:
     """Whether a `none` rests on a drift of what is fitted, and the model does not say that it drifts."""
     if state.judged.word != "none" or state.judged.best is None:
         return False
-    before, _ = state.refitted
-    fitted = {p.name: p for p in before.model.parameters}
-    return not all(fitted[name].drifts for name in state.known_problem.adapted)
+    return not may_drift(state.refitted[0].model, state.known_problem.adapted)
 
 
 def one_of_them_drifts(state: State) -> bool:
-    """Whether the best of a class is a gradual change in time of what is fitted: row by row it may be told apart."""
+    """Whether the best of a class is a change in time of what is fitted, and the model does not say that it drifts.
+
+    Row by row it may be told apart.
+    """
     best = state.judged.best if state.judged.word == "class" else None
-    if best is None or state.search is None:
+    if best is None or may_drift(state.refitted[0].model, state.known_problem.adapted):
         return False
-    return all(site in state.search.adapted_sites and driver == "time" for site, driver in best.names)
+    return all(site in state.searched[1].adapted_sites and driver == "time" for site, driver in best.names)
 
 
 def unconfirmed(state: State) -> bool:
