@@ -99,9 +99,8 @@ def feedback(name: str, output: str, u: FloatArray, y: FloatArray) -> Feedback |
     if n < FEWEST or _still(u) or _still(held):
         return None
     inputs, outputs = _lagged(u, q, range(q + 1)), _lagged(held, q, range(1, p + 1))
-    new, _ = _residual(
-        _scaled(np.column_stack([inputs, outputs])), _scaled(held[q:])
-    )  # what no input has brought about
+    # what no input has brought about
+    new, _ = _residual(_scaled(np.column_stack([inputs, outputs])), _scaled(held[q:]))
     own, other, target = (_scaled(a) for a in (inputs[p:, 1:], _lagged(new, p, range(1, p + 1)), u[q + p :]))
     e0, rank0 = _residual(own, target)
     e1, rank1 = _residual(np.column_stack([own, other]), target)
