@@ -50,13 +50,13 @@ def drive() -> Model:
     )
 
 
-def record(dry: float) -> Dataset:
+def record(dry: float, rows: int = ROWS) -> Dataset:
     """A record with a dry friction of so many newtons."""
-    time = DT * np.arange(ROWS, dtype=np.float64)
+    time = DT * np.arange(rows, dtype=np.float64)
     plan = np.interp(time, [0, 1, 2, 4, 5, 7, 8, 9, 11, 12.5], [0, 0.06, 0.06, 0.2, 0.2, 0.1, 0.1, 0.02, 0.18, 0.05])
     position, speed, volts, h = 0.0, 0.0, 0.0, DT / STEPS
-    held, seen = np.zeros((ROWS, 1)), np.zeros((ROWS, 1))
-    for k in range(ROWS):
+    held, seen = np.zeros((rows, 1)), np.zeros((rows, 1))
+    for k in range(rows):
         seen[k], held[k] = position, volts
         volts = float(np.clip(2000.0 * (plan[k] - position) / GAIN - 10.0 * speed, -10.0, 10.0))
         for _ in range(STEPS):
@@ -91,7 +91,7 @@ def test_dry_friction_that_came_since_a_reference_has_changed(monkeypatch: pytes
     shown that it can.
     """
     monkeypatch.setattr(searched_change, "MOST_SECONDS", 600.0)  # a machine under load searches as far
-    verdict = find_changes(drive(), [record(15.0)], [replace(record(0.0), name="old")]).verdict
+    verdict = find_changes(drive(), [record(15.0, 1000)], [replace(record(0.0, 1000), name="old")]).verdict
     assert verdict.word == "named", verdict.reason
     (told,) = verdict.effects
     assert (told.effect.site, told.effect.driver, told.effect.form) == ("friction", "speed", "direction")

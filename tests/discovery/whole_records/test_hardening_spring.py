@@ -75,7 +75,7 @@ def record(cubic: float, rows: int = ROWS) -> Dataset:
 
 def test_inputs_that_act_a_row_later_than_the_record_says_are_no_effect() -> None:
     """A logger writes an input with what was measured when it was given. A drive that "answers late" was told."""
-    there = record(0.0, 300)
+    there = record(0.0, 200)
     logged = replace(there, inputs=np.vstack([there.inputs[1:], there.inputs[-1:]]))
     verdict = discover(oscillator(), logged).verdict
     assert verdict.word == "none", verdict.reason

@@ -14,7 +14,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.calibration import excluded_by
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, fit_all_rows, fitted_and_tested
-from adaptive_flot.discovery.hypotheses.families import Hypothesis
+from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import Judged
 from adaptive_flot.discovery.hypotheses.procedure import SIZES_OPEN, Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of, what_is_left
@@ -28,6 +28,7 @@ from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_f
 from adaptive_flot.discovery.results import Judgement, NamedEffect
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, NORMAL95, WITH_A_NAME
 from adaptive_flot.discovery.verdict.report_veto import contradiction
+from adaptive_flot.discovery.verdict.words.wording import HAS_CHANGED
 
 JUDGED_ON = "held-out stretches, each from the state of the filter before it"
 MOST = 0.8
@@ -81,7 +82,9 @@ def with_cause(
     if excluded_by(compared.calibration, found[0].fit):
         notes = (*notes, SIZES_OPEN)
     said, (first, _, _) = ", ".join(c.words for c in error), compared.verdict.reason.partition(". ")
-    reason = f"{told_in_words(search, told)} Error over held-out stretches, each from the filter's state: {said}."
+    lasting = word == "named" and not any(h.kind in EVENTS for h in told.effects)  # an event has its time beside it
+    changed = f"{told_in_words(search, told)} {HAS_CHANGED if lasting else ''}".rstrip()
+    reason = f"{changed} Error over held-out stretches, each from the filter's state: {said}."
     alone = f"Free runs over the whole record, without process noise, {_as_well(compared, told)}: {first}."
     return replace(
         compared,

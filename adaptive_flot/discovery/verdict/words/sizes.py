@@ -285,7 +285,7 @@ def _interval(site: Site, told: NamedEffect) -> str:
     if _is_factor(site, effect) and np.exp(high) > LARGE:
         return f"95 %: {_apart(np.exp(low), np.exp(high), 2)} times"
     if _is_factor(site, effect):
-        return f"95 %: {_apart(abs(100 * np.expm1(low)), abs(100 * np.expm1(high)))} %"
+        return f"95 %: {_percents(abs(100 * np.expm1(low)), abs(100 * np.expm1(high)))} %"
     return f"95 %: {_apart(abs(low), abs(high))}{_unit(site)}"
 
 
@@ -295,6 +295,16 @@ def _apart(low: float, high: float, digits: int = 3) -> str:
         if f"{low:.{n}g}" != f"{high:.{n}g}":
             return f"{low:.{n}g} to {high:.{n}g}"
     return f"{low:.6g} to {high:.6g}"
+
+
+def _percents(low: float, high: float) -> str:
+    """Two ends of an interval in percent with the digits of a size, rounded outwards: so they hold what is told."""
+
+    def step(percent: float) -> float:
+        return 1.0 if percent >= 10 else 10.0 ** (np.floor(np.log10(max(percent, 1e-9))) - 1)
+
+    ends = np.floor(low / step(low) + 1e-9) * step(low), np.ceil(high / step(high) - 1e-9) * step(high)
+    return " to ".join(f"{end:.0f}" if end >= 10 else f"{end:.2g}" for end in ends)
 
 
 def _unit(site: Site) -> str:

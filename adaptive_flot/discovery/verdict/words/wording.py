@@ -15,6 +15,7 @@ from adaptive_flot.greybox.forms.form import CoefficientRole
 
 LACKS_THIS, LACKS_THESE = "The model lacks this.", "The model lacks these effects."
 LACKS_ONE, LACKS_SEVERAL = "The model lacks one", "The model lacks several effects."
+HAS_CHANGED = "This has changed since the reference."
 
 
 def drift_words(judgement: Judgement, after: Fit) -> tuple[str, ...]:
@@ -40,7 +41,7 @@ def _largest_move(values: list[float]) -> float:
 def since_reference(reason: str, new: bool) -> str:
     """A reason about a model whose reference has said what it lacks: it has changed, where that is known to be new."""
     if new:
-        told = "This has changed since the reference.", "These have changed since the reference."
+        told = HAS_CHANGED, "These have changed since the reference."
         several = "One", "Several things have changed since the reference."
     else:
         told = ("The reference does not show whether it was there.",) * 2
