@@ -104,7 +104,7 @@ def test_an_effect_is_told_with_size_direction_and_time(effect: NamedEffect, sai
 
 @given(st.floats(-2.0, 0.6), st.floats(1e-5, 0.3))
 def test_a_share_is_told_within_its_interval(level: float, half: float) -> None:
-    """A size of "71 %" stood beside "95 %: 70.4 to 70.7 %": each right by its own digits, and a contradiction to who reads."""
+    """A size of "71 %" stood beside "70.4 to 70.7 %": each right by its own digits, and against each other."""
     if abs(level) <= half:
         return
     said = words_of_effect(MODEL, told("heat_loss", "constant", "shift", half=half, amplitude=level))
