@@ -15,8 +15,8 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
 Kind = Literal[
-    "switch", "ramp", "periodic", "stuck", "stuck for a time", "leaks", "gain", "offset", "span", "range", "sign",
-    "lag", "hysteresis", "dead zone", "depends", "turns", "store", "alternative",
+    "switch", "ramp", "periodic", "cycle", "stuck", "stuck for a time", "leaks", "gain", "offset", "span", "range",
+    "sign", "lag", "hysteresis", "dead zone", "depends", "turns", "store", "alternative",
 ]  # fmt: skip
 STRUCTURE = ("depends", "store", "sign")
 """What a plant has or has not: it does not come between a reference record and another one."""

@@ -84,6 +84,8 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         return f"{name} {_grows(h.effect, mode, first, unit, site.role == 'sensor')}"
     if h.kind == "periodic":
         return f"{name} {_swings(float(np.hypot(values['sine'], values['cosine'])), values['period'], mode, unit)}"
+    if h.kind == "cycle":
+        return f"{name} {_cycles(h.effect, mode, first, unit, site.role == 'sensor')}"
     if h.kind == "hysteresis":
         return f"{name} {sticks(first, values.get('rest', 0.0), unit, jumps=h.effect.family.jumps)}"
     if h.kind == "dead zone":
@@ -160,6 +162,27 @@ def _swings(size: float, period: float, mode: str, unit: str) -> str:
     """How far it goes up and down, and how often: `swings by 0.4 K up and down every 900 s`."""
     swing = f"{short(size)}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
     return f"swings by {swing} up and down every {in_seconds(period)} s"
+
+
+def cycle_times(effect: Effect) -> str:
+    """When something is on that is switched in every period: `for 8 h of every 24 h, first at 0-28800 s`."""
+    onset, duration, period = (effect.coefficients[name] for name in ("onset", "duration", "period"))
+    first = f"first at {clock(onset)}-{clock(onset + duration)} s"
+    return f"for {_hours(duration)} of every {_hours(period)}, {first}"
+
+
+def _hours(duration: float) -> str:
+    """A duration [s]: `8 h`, and below two hours `900 s`."""
+    return f"{duration / 3600:.3g} h" if duration >= 7200 else f"{in_seconds(duration)} s"
+
+
+def _cycles(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:
+    """What is switched in every period: `is 47 % larger for 8 h of every 24 h, first at 0-28800 s`."""
+    if mode == "offset":
+        rest = f"{'shows' if sensor else 'is'} {short(abs(size))}{unit} {'more' if size > 0 else 'less'}"
+    else:
+        rest = f"is {_factor(size)}"
+    return f"{rest} {cycle_times(effect)}"
 
 
 def _grows(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:

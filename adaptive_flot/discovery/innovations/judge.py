@@ -287,10 +287,13 @@ def _only_adds(explanation: Explanation, other: Explanation) -> bool:
 
 
 def _one_a_site(pairs: Sequence[tuple[Explanation, Hypothesis]]) -> tuple[tuple[Explanation, Hypothesis], ...]:
+    """One effect a site; where all are at one site, an event and a lasting one: its place is certain then."""
     by_site: dict[str, tuple[Explanation, Hypothesis]] = {}
+    by_kind: dict[bool, tuple[Explanation, Hypothesis]] = {}
     for e, h in pairs:
         by_site.setdefault(h.site, (e, h))
-    return tuple(by_site.values())
+        by_kind.setdefault(h.driver == "time", (e, h))
+    return tuple((by_site if len(by_site) > 1 else by_kind).values())
 
 
 def _name(h: Hypothesis) -> tuple[str, str, str]:

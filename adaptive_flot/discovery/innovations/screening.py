@@ -11,6 +11,7 @@ from adaptive_flot.discovery.further_sites.places import is_further
 from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, MATTERS, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
+from adaptive_flot.discovery.innovations.events.cycling import best_cycle, is_on, possible_periods, refined_period
 from adaptive_flot.discovery.innovations.events.halting import MOST_EDGES as HALTS
 from adaptive_flot.discovery.innovations.events.halting import Halt, best_halt, still_stretch
 from adaptive_flot.discovery.innovations.events.switching import MOST_EDGES, IntArray, Switch, best_switch
@@ -91,7 +92,9 @@ class Screening:
         if events:
             found += [x for site in self.model.sites if (x := self.switch(site)) is not None]
             found += [x for site in self.model.sites if (x := self.halt(site)) is not None]
-            found += [x for site in self.model.sites for x in self._swings(site)]
+            swings = {site.name: self._swings(site) for site in self.model.sites}
+            found += [x for each in swings.values() for x in each]
+            found += [x for site in self.model.sites if (x := self.cycle(site, swings[site.name])) is not None]
         if ramps:
             found += [x for site in self.model.sites if (x := self.ramp(site)) is not None]
         return sorted(found, key=lambda x: -x.gain)
@@ -244,12 +247,48 @@ class Screening:
         """The wave at a site that explains most, or that of a `period` [s]; None where none can be."""
         return max(self._swings(site, period), key=lambda s: s.gain, default=None)
 
+    def cycle(self, site: Site, swings: Sequence[Screened] = (), period: float | None = None) -> Screened | None:
+        """The best switch in every period [s] at a site: as given, of a clock, or about that of some waves there.
+
+        None where the record tells it from no wave with its second harmonic, or says nothing of the site.
+        """
+        record, by = self._response.record, self._course(site, site.mode)
+        if by is None:
+            return None
+        time, dt = record.time[1:] - (record.dt / 2 - _late(site, record.dt)), record.dt
+
+        def respond(courses: FloatArray) -> FloatArray:
+            return self._rest(self._response.respond(site.name, courses))
+
+        periods = possible_periods(len(by) * dt, dt) if period is None else [period]
+        wave = max(swings, key=lambda s: s.gain, default=None)
+        if wave is not None and wave.gain > 0:
+            near = wave.suspect.hypothesis.effect.coefficients["period"]
+            periods.append(refined_period(respond, self._left, by, time, dt, near))
+        found = [c for p in periods if (c := best_cycle(respond, self._left, by, time, dt, p)) is not None]
+        best = max(found, key=lambda c: c.explained, default=None)
+        if best is None:
+            return None
+        turns = 2 * np.pi * np.outer(time, [1.0, 2.0]) / best.period
+        smooth = respond(by[:, None] * np.column_stack([np.sin(turns), np.cos(turns)]))
+        gain, other = (self._gain(left) for left in (self._total - best.explained, self._linear(smooth)[1]))
+        if gain - other < SHARP:
+            return None
+        told = {"amplitude": 0.0, "onset": best.onset, "duration": best.duration, "period": best.period}
+        effect = Effect(site.name, "time", "cycle", told, {"width": EDGE * dt}, mode=site.mode)
+        hypothesis = Hypothesis(site.name, "time", "cycle", effect, ("amplitude",), ({},))
+        course = (by * is_on(time, best.period, best.onset, best.duration))[:, None]
+        suspect = Suspect(hypothesis, course, hypothesis.free, 3)
+        return Screened(suspect, np.array([best.size]), gain - self._charge(suspect))
+
+    def _gain(self, left: float) -> float:
+        """Log-likelihood gained by what leaves so many squares."""
+        return self._count / 2 * float(np.log(self._total / max(left, NOTHING * self._total)))
+
     def _is_sharp(self, site: str, by: FloatArray, switch: Switch) -> bool:
         """Whether the record tells the switch from a slow course: what wanders is not switched."""
         slow = self._rest(self._response.respond(site, (by * switch.slow(len(by)))[:, None]))
-        left = self._linear(slow)[1]
-        gain = self._count / 2 * float(np.log(self._total / max(left, NOTHING * self._total)))
-        return switch.gain - gain >= SHARP
+        return switch.gain - self._gain(self._linear(slow)[1]) >= SHARP
 
     def _best_switch(self, site: str, by: FloatArray, edges: IntArray) -> Switch | None:
         count = len(by)
@@ -271,8 +310,7 @@ class Screening:
                 continue
             none: tuple[FloatArray, float] = (np.empty(0), self._all_or_nothing(x[:, 0]))
             size, left = self._linear(x) if s.coefficients else none
-            gain = self._count / 2 * float(np.log(self._total / max(left, NOTHING * self._total)))
-            found.append(Screened(s, size, gain - self._charge(s)))
+            found.append(Screened(s, size, self._gain(left) - self._charge(s)))
         return found
 
     def _linear(self, x: FloatArray) -> tuple[FloatArray, float]:

@@ -65,8 +65,10 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
 
 def _is_elsewhere(e: Explanation, sites: frozenset[str]) -> bool:
     """Whether an explanation is one part alone, at another site, that is off all the time."""
-    h = e.hypotheses[0]
-    return len(e.hypotheses) == 1 and h.site not in sites and h.kind not in (*EVENTS, *STRUCTURE, LATE)
+    if len(e.hypotheses) != 1:  # the model as it is has none
+        return False
+    (h,) = e.hypotheses
+    return h.site not in sites and h.kind not in (*EVENTS, *STRUCTURE, LATE)
 
 
 def _wanders(compared: Comparison) -> bool:

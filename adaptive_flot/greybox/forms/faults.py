@@ -92,6 +92,19 @@ def _periodic(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     return c["sine"] * ca.sin(angle) + c["cosine"] * ca.cos(angle)
 
 
+def _cycle(driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
+    """A q, q = 1 for `duration` from `onset` on in every `period`, else 0, its edges rounded over `width`.
+
+    The cosine of the phase about the middle is above that of the edges while it is on: smooth, and periodic.
+    """
+    turn, half = 2 * np.pi / c["period"], c["duration"] / 2
+    edge = turn * half
+    away = ca.cos(turn * (driver - c["onset"] - half)) - ca.cos(edge)
+    slope = ca.fmax(turn * ca.sin(edge), 1e-9)  # of the cosine at the edges, so that `away` is in seconds there
+    g: ca.SX = c["amplitude"] * (1 + ca.tanh(away / slope / (2 * number(s, "width")))) / 2
+    return g
+
+
 def _store(m: SiteScope, value: ca.SX, driver: ca.SX, c: Coefs, s: Settings) -> ca.SX:
     """V + exchange (x - h), dh/dt = (x - h) / tau: a store h that exchanges with the state x of the balance."""
     del s
@@ -197,6 +210,22 @@ FAULT_FORMS: tuple[Form, ...] = (
         ("time",),
         {},
         static=_periodic,
+    ),
+    Form(
+        "cycle",
+        "two levels, switched on and off in every period",
+        FormKind.PERIODIC,
+        fixed(
+            Coefficient("amplitude", CoefficientRole.LEVEL, unit="g"),
+            Coefficient("onset", CoefficientRole.PHASE, 0.0, scale=60.0, unit="s"),
+            Coefficient("duration", CoefficientRole.DURATION, 30.0, SHORTEST, scale=60.0, unit="s"),
+            Coefficient("period", CoefficientRole.PERIOD, 60.0, SHORTEST, scale=10.0, unit="s"),
+        ),
+        ("time",),
+        {"width": 2.0},
+        {"width": "s"},
+        static=_cycle,
+        abrupt=True,
     ),
     Form(
         "store",

@@ -45,6 +45,7 @@ class CoefficientRole(Enum):
     POSITION = "value at which a part stays"
     OFFSET = "what is added to the value"
     PERIOD = "time after which a disturbance repeats itself"
+    PHASE = "time at which a part of a period begins"
 
 
 _AMPLITUDES = frozenset(

@@ -10,7 +10,9 @@ from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 DT, ROOM, CAPACITY, LOSS = 10.0, 20.0, 300.0, 2.0
 BAND, ZONE, SWING, PERIOD, LAMP = 6.0, 5.0, 4.0, 700.0, 3.0
-Wrong = Literal["nothing", "hysteresis", "dead zone", "periodic", "lamp"]
+ON, FOR = 150.0, 220.0
+"""When a lamp with a clock is on in each period [s]."""
+Wrong = Literal["nothing", "hysteresis", "dead zone", "periodic", "cycle", "lamp"]
 
 
 def record(wrong: Wrong, rows: int = 500, seed: int = 0) -> Dataset:
@@ -31,7 +33,7 @@ def record(wrong: Wrong, rows: int = 500, seed: int = 0) -> Dataset:
             elif wrong == "dead zone":
                 u -= min(max(u, -ZONE), ZONE)
             other = SWING * np.sin(2 * np.pi * t / PERIOD + 1.0) if wrong == "periodic" else 0.0
-            other += LAMP if wrong == "lamp" else 0.0
+            other += LAMP if wrong == "lamp" or (wrong == "cycle" and (t - ON) % PERIOD < FOR) else 0.0
             room += h * (ROOM - room) / 2000.0 + 0.02 * np.sqrt(h / 60.0) * rng.normal()
             plate += h * (u + other - LOSS * (plate - room)) / CAPACITY
     y += 0.03 * rng.normal(size=rows)

@@ -132,7 +132,8 @@ def test_another_part_must_not_explain_far_more(
     best = SimpleNamespace(
         hypotheses=(SimpleNamespace(site="meter", kind="span", label="meter span"),), criterion=10 + most
     )
-    found: Any = SimpleNamespace(alike=(best,), best=best)
+    as_it_is = SimpleNamespace(hypotheses=(), criterion=10.0)  # may be among what is not told apart, and names nothing
+    found: Any = SimpleNamespace(alike=(best, as_it_is), best=best)
     assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
     assert stays or ("meter span explains" in said[0]) == (gain > supported.SUPPORT)
     assert stays or ("meter span explains far more" in said[0]) == (most > 2 * gain > supported.SUPPORT)

@@ -20,6 +20,7 @@ from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import AT_REST
+from adaptive_flot.discovery.hypotheses.wording import cycle_times
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
@@ -53,7 +54,7 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     places = [
         s for s in further_sites(further.model) if not any(is_same_part(search.model, s.name, site) for site in sites)
     ]
-    period = search.coefficient(told.best, left_out, "period") if left_out.kind == "periodic" else None
+    period = _period(search, told.best, left_out)
     screening = further.screening(rest, [s.name for s in places])
     found = further.all_with(rest, [s for site in places for s in _at(screening, site, left_out, period)])
     changes = ((e, *change_at(further, e)) for e in found)
@@ -104,10 +105,19 @@ def best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
     return list(kept.values())
 
 
+def _period(search: Search, explanation: Explanation, h: Hypothesis) -> float | None:
+    """The period of an effect that repeats itself [s]."""
+    if h.kind == "cycle":
+        return h.effect.coefficients["period"]
+    return search.coefficient(explanation, h, "period") if h.kind == "periodic" else None
+
+
 def _at(screening: Screening, site: Site, told: Hypothesis, period: float | None) -> Sequence[Screened]:
-    """What may act at a further site as what is told does at its own; `period` [s] is that of what swings."""
+    """What may act at a further site as what is told does at its own; `period` [s] is that of what repeats itself."""
     if told.kind == "periodic":
         found = [screening.swing(site, period)]
+    elif told.kind == "cycle":
+        found = [screening.cycle(site, period=period)]
     elif told.kind == "ramp":
         found = [screening.ramp(site)]
     elif told.kind in EVENTS:
@@ -131,5 +141,7 @@ def words_at(further: Search, explanation: Explanation) -> str:
     when = ", ".join(f"from {a:.0f} s on" if long >= FOREVER else f"{a:.0f}-{a + long:.0f} s" for a, long in h.pulses)
     if h.kind == "periodic":
         when = f"up and down every {in_seconds(further.coefficient(explanation, h, 'period'))} s"
+    if h.kind == "cycle":
+        when = cycle_times(h.effect)
     measured = further.known is not None and not further.known.up_to_a_factor()
     return change_in_words(further.model, place, amount, when, measured)

@@ -59,8 +59,8 @@ def worth(explanation: Explanation) -> float:
 
 def numbers_of(h: Hypothesis) -> int:
     """How many numbers a hypothesis was fitted by, those taken from a grid and the times of a switch too."""
-    told = h.effect.coefficients.items() if h.kind in EVENTS else ()
-    times = [c for c, v in told if c.startswith(("on_", "for_", "onset", "duration")) and v < FOREVER]
+    told = h.effect.coefficients.items() if h.kind in (*EVENTS, "cycle") else ()
+    times = [c for c, v in told if c.startswith(("on_", "for_", "onset", "duration", "period")) and v < FOREVER]
     return len(h.free) + len(times)
 
 

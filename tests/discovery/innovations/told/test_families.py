@@ -1,5 +1,7 @@
 """Families of the innovations form, each on a plate with a Peltier element: a process that is not flotation."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from adaptive_flot.discovery.innovations.judge import Told, judge
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
-from tests.discovery.innovations.thermostat import BAND, LAMP, PERIOD, SWING, ZONE, Wrong, model, record
+from tests.discovery.innovations.thermostat import BAND, DT, FOR, LAMP, ON, PERIOD, SWING, ZONE, Wrong, model, record
 
 
 def _told(wrong: Wrong) -> tuple[Told, str, Search]:
@@ -54,6 +56,19 @@ def test_a_disturbance_that_comes_and_goes_is_told_with_its_period() -> None:
     values = _values(search, told, "other_heat")
     assert values["period"] == pytest.approx(PERIOD, rel=0.02)
     assert np.hypot(values["sine"], values["cosine"]) == pytest.approx(SWING, rel=0.1)
+
+
+def test_a_lamp_with_a_clock_is_told_with_its_times() -> None:
+    """Of a house that is aired every night, a wave was told, and a second effect for what a wave leaves."""
+    told, words, search = _told("cycle")
+    assert told.word in ("named", "class"), words
+    (lamp,) = (h for h in told.effects if h.site == "other_heat")
+    assert lamp.kind == "cycle", words
+    assert lamp.effect.coefficients["period"] == pytest.approx(PERIOD, rel=0.005)
+    assert lamp.effect.coefficients["onset"] == pytest.approx(ON, abs=2 * DT)
+    assert lamp.effect.coefficients["duration"] == pytest.approx(FOR, abs=3 * DT)
+    assert _values(search, told, "other_heat")["amplitude"] == pytest.approx(LAMP, rel=0.15)
+    assert re.search(r"W more for 2\d\d s of every (699|70\d) s, first at 1\d\d-3\d\d s", words), words
 
 
 def test_a_constant_heat_where_the_model_has_none_is_told_with_its_size() -> None:

@@ -181,6 +181,14 @@ def test_pairs_that_share_no_effect_are_no_class_of_single_ones(monkeypatch: pyt
     assert judging.judge(search, ranked[-1], ranked).word == "abstain"
 
 
+def test_one_part_that_is_limited_or_has_stopped_is_a_class_of_the_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measured: a heater that gives 55 % at most, and was asked for more from some time on. Its place is certain."""
+    monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
+    said = told(Given((lag("heater"),), 500.0, 0.5), Given((event("heater", (800.0, 1200.0)),), 499.0, 0.5))
+    assert said.word == "class" and said.certain == ()
+    assert [(h.site, h.kind) for _, h in said.open] == [("heater", "lag"), ("heater", "switch")]
+
+
 @pytest.mark.parametrize(("alone", "word", "open_ones"), [(480.0, "named", []), (300.0, "class", ["valve", "duct"])])
 def test_a_small_effect_that_is_one_of_two_is_not_told_either(
     alone: float, word: str, open_ones: list[str], monkeypatch: pytest.MonkeyPatch
