@@ -20,6 +20,7 @@ from adaptive_flot.discovery.search.alternatives import fixed_coefficients, limi
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, FormKind
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.stepper import Stepper
 
 BEAM = 3
 """Alternatives of one round that the next extends."""
@@ -30,6 +31,9 @@ FOLDS = 16
 """Blocks of the cross-validation: events are few, and without many of them nothing could be told."""
 POLISHED = 4
 """Alternatives of a round that are fitted to the end."""
+AFFORDED, LEAST_NAMED = 240_000, 6
+"""Steps of a record times squared states, times the effects that are combined, the best by their scores; at least so
+many effects. Each is fitted in some ten combinations, from four starts."""
 SCATTER = 1.6
 """Adapted parameters start within this factor of the plain fit's."""
 
@@ -55,7 +59,8 @@ class JointFits:
         # laws only: an event in time is found by the search of one effect after the other, and a free curve in time
         # fits whatever the blocks of the record hold
         named = [s for s in scorer.scores() if s.candidate.known]
-        self.named = [s for s in named if s.candidate.driver in scorer.drivers or _zero(s)]
+        laws = [s for s in named if s.candidate.driver in scorer.drivers or _zero(s)]
+        self.named = laws[: max(LEAST_NAMED, AFFORDED // max(cost_of_a_run(problem, base), 1))]
         self.ranges = {k: (float(np.min(v)), float(np.max(v))) for k, v in scorer.drivers.items()}
 
     def rounds(self, most: int, done: Callable[[], None] = lambda: None) -> list[list[Alternative]]:
@@ -144,6 +149,11 @@ class JointFits:
         fit = fitted.with_model(lambda: self._model(effects))
         known = tuple(nameable(fit.model, e, True) for e in fit.model.fitted_effects()[-len(effects) :])
         return Alternative(combination.names, known, fit, self.base.loss - fit.loss, fit.bic - self.base.bic)
+
+
+def cost_of_a_run(problem: Problem, fit: Fit) -> int:
+    """Steps of a record times squared states."""
+    return len(problem.record) * Stepper(fit.model, problem.record.dt).substeps * len(fit.initial_state) ** 2
 
 
 def _zero(score: Score) -> bool:

@@ -22,12 +22,12 @@ from adaptive_flot.discovery.search.joint_fits import (
     LAST_STEPS,
     JointFits,
     correlation_time,
+    cost_of_a_run,
     cross_validated,
     discount,
     discounted,
 )
 from adaptive_flot.discovery.search.rounds import scorer_of, what_is_left
-from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CHEAP = 30_000
 """Steps of a record times squared states up to which hundreds of fits are a matter of a minute."""
@@ -41,9 +41,7 @@ def wants_joint(problem: Problem, result: SearchResult) -> bool:
     if problem.time_is_up or problem.background is not None:
         return False
     best = result.alternatives[0].fit if result.alternatives else result.base
-    steps = len(problem.record) * Stepper(best.model, problem.record.dt).substeps
-    cost = steps * len(best.initial_state) ** 2
-    return cost <= CHEAP and dominated(problem, best)
+    return cost_of_a_run(problem, best) <= CHEAP and dominated(problem, best)
 
 
 def dominated(problem: Problem, fit: Fit) -> bool:
