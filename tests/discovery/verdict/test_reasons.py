@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import has_a_reason
 from adaptive_flot.discovery.verdict.conclude import _meaning
+from adaptive_flot.discovery.verdict.words import wording
 from adaptive_flot.greybox import Effect
 from tests.discovery.hypotheses.test_constants import tank
 
@@ -31,3 +35,15 @@ def test_an_actuator_may_depend_on_its_command_and_a_sensor_on_what_it_measures(
     assert has_a_reason(model, its_site, driver) == named
     said = _meaning(model, Effect(site, driver, "curve", {"value_1": 0.0, "value_2": 0.1}, {"knots": (0.0, 1.0)}))
     assert ("without a name" in said) == (not named)
+
+
+def test_what_comes_as_near_elsewhere_is_not_said_to_be_at_the_same_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measured: an engine's filling or its speed pickup depends on speed, "at the same places: pressure sensor"."""
+    monkeypatch.setattr(wording, "words_alone", lambda a: " depends on ".join(a.names[0]))
+    sets = [SimpleNamespace(names=(name,)) for name in [("filling", "speed"), ("gauge", "speed"), ("filling", "flow")]]
+    judged: Any = SimpleNamespace(
+        best=sets[0], rivals=sets[1:], near=lambda a: True, part=(), beside="", members=(("filling", "speed"),)
+    )
+    said = wording._class_words(judged, ())
+    assert "At the same places it may as well be: filling by flow." in said
+    assert "As near, but without a known reason: gauge by speed." in said

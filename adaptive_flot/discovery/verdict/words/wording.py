@@ -69,7 +69,7 @@ def reason_words(
         fitted = " with ".join(f"{site} by {driver}" for site, driver in judgement.best.names)
         return (
             f"Something is missing, but it is not told: {fitted} fits the record best, and {contradiction}. "
-            "Look for what else has happened there."
+            "Look for what else happened in the record."
         )
     if judgement.word == "none" and drift:
         said = "; ".join(drift).replace("_", " ")
@@ -150,8 +150,11 @@ def _class_words(judgement: Judgement, wrong: Sequence[str]) -> str:
             each[-1] = f"as if {judgement.beside}, and {NO_SITE}"
         members = "; or ".join(each)
         said = f"{LACKS_ONE} of these, which this record can not tell apart: {members}."
-        if alike := ", ".join(" by ".join(name) for name in alone if name not in judgement.members):
+        further, places = [name for name in alone if name not in judgement.members], {s for s, _ in judgement.members}
+        if alike := ", ".join(" by ".join(name) for name in further if name[0] in places):
             said += f" At the same places it may as well be: {alike}."
+        if nameless := ", ".join(" by ".join(name) for name in further if name[0] not in places):
+            said += f" As near, but without a known reason: {nameless}."
         return f"{said} {beside_a_part(judgement)}".rstrip()
     shared = [n for n in judgement.best.names if all(n in a.names for a in sets)]
     either = same_site(shared)
