@@ -99,6 +99,8 @@ class Experiment:
         told = _powers(self.compared, self.power)
         alone = f" Left alone: {', '.join(f'{n} ({why})' for n, why in self.held)}." if self.held else ""
         pair = f"{_words(closest.one)} and {_words(closest.other)}"
+        known = np.isfinite(self.watching)
+        watched = f" Watching without a move would give {self.watching:.0f}." if known else ""
         if max(self.power) < HARDLY:
             each = ", or ".join(_words(n) for n in self.compared)
             length, apart = self.dt * len(self.inputs), closest.separation
@@ -110,12 +112,12 @@ class Experiment:
         return (
             f"{said}. Simulated with each alternative as the truth, it tells the right one: {told}. The closest two, "
             f"{pair}, would differ by about {closest.separation:.0f} in their criterion, where {self.needed:.0f} is "
-            f"needed. Watching without a move would give {self.watching:.0f}.{alone}"
+            f"needed.{watched}{alone}"
         )
 
     @property
     def watching(self) -> float:
-        """Separation of the closest pair when nothing is moved."""
+        """Separation of the closest pair when nothing is moved; NaN where that could not be simulated."""
         return next((t.separation for t in self.tried if t.name == WATCHING), float("nan"))
 
     def as_dict(self) -> dict[str, Any]:

@@ -78,6 +78,8 @@ class State:
         What is certain although the record is not told, in words.
     background
         What is known of a feed that wanders and of constants that are off, in words; empty where neither is.
+    without_a_site
+        As if what acted where the model has no site, by the innovations form, in words; empty where nothing does.
     sentence
         What the innovations form names, in words; empty where it has not decided.
     experiment
@@ -119,6 +121,7 @@ class State:
     sentence: str = ""
     experiment: Experiment | None = None
     least_shown: tuple[LeastShown, ...] = ()
+    without_a_site: str = ""
 
     @property
     def known_problem(self) -> Problem:

@@ -15,7 +15,7 @@ LARGEST_CLASS = 3
 NORMAL95 = 1.96
 """Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 ONE_CAUSE = "One cause that acts at several places looks like that, and the catalogue has none"
-"""Why several changes with one course are not told: an opinion on one of their sites alone would be none on that."""
+"""Why several changes with one course are not told."""
 
 
 def in_seconds(period: float) -> str:

@@ -84,6 +84,7 @@ def conclude(state: State) -> Verdict:
             for k, b, a in zip(labels, before.values[: len(labels)], values, strict=True)
         },
         notes=state.screening.notes
+        + _beside(state)
         + _common_nuisance_note(result)
         + ((SIZES_WITH_PROCESS_NOISE,) if state.sizes else ())
         + suspect_notes([e.effect for e in effects], state.screening.suspects, problem.record.dt)
@@ -94,6 +95,13 @@ def conclude(state: State) -> Verdict:
         experiment=state.experiment,
         least_shown=state.least_shown,
     )
+
+
+def _beside(state: State) -> tuple[str, ...]:
+    """A note on what acts where the model has no site, where something else is told."""
+    if not state.without_a_site or _acts_without_a_site(state):
+        return ()
+    return (f"with process noise it is {state.without_a_site}",)
 
 
 def _swings(problem: Problem, before: Fit) -> tuple[str, ...]:
@@ -110,11 +118,32 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         likelier = beside_words(state.likelihood, much_better(state.error))
         hidden = what_is_hidden(state.least_shown)
         part = _part_of_record(state.screening.notes)
-        return " ".join(filter(None, (said, likelier, state.certain, hidden, state.background, part)))
+        where = ""
+        if _acts_without_a_site(state):
+            where, said = (
+                f"Something is missing. It is {state.without_a_site}.",
+                f"Free runs do not tell it: {_rest(said)}",
+            )
+        return " ".join(filter(None, (where, said, likelier, state.certain, hidden, state.background, part)))
     errors = ", ".join(c.words for c in state.error)
     told = f"{state.sentence} Error of the free run on held-out rows: {errors}."
     left = still_wrong_or_wandering(wrong) if state.judged.word in TELLING else ""
     return " ".join(filter(None, (told, left, state.certain, _part_of_record(state.screening.notes))))
+
+
+def _acts_without_a_site(state: State) -> bool:
+    """Whether nothing is told, but where the model lacks a site: that comes first."""
+    return bool(state.without_a_site) and state.judged.word == "abstain"
+
+
+def _rest(said: str) -> str:
+    """A reason to abstain without its beginning, which is said before."""
+    for begin in (
+        "Something is missing, but it is not told: ",
+        "Something is missing, but the record does not say what: ",
+    ):
+        said = said.removeprefix(begin)
+    return said
 
 
 def _part_of_record(notes: Sequence[str]) -> str:

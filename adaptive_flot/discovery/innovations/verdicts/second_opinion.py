@@ -80,7 +80,7 @@ def second_opinion(state: State) -> State:
         return alone if best is not None and {site for site, _ in best.names} <= of_them else state
     problem, (before, _) = state.known_problem, state.refitted
     given = replace(problem.record, initial_state=before.initial_state)
-    asked_for = is_asked(state) and ONE_CAUSE not in state.contradiction
+    asked_for = is_asked(state)
     record = searchable(given, before.model) if asked_for else None
     if record is None:
         return state
@@ -109,7 +109,9 @@ def second_opinion(state: State) -> State:
         if search.time_is_up:
             return _not_asked(state)
     if on_sites.word != told.word and NO_SITE in on_sites.why:
-        state = _noted(state, on_sites.why)
+        state = replace(state, without_a_site=on_sites.why)
+    if ONE_CAUSE in state.contradiction:  # an opinion on one of several places would be none on what acts at all
+        return state
     told = unless_hardly_off(on_sites)
     asked = _told(state, search, base, told) if told.word in TELLING else _kept(state, told)
     if asked.judged.word in TELLING or time.monotonic() > state.ends:
@@ -121,11 +123,6 @@ def second_opinion(state: State) -> State:
     if among is None or among.word not in TELLING:
         return asked
     return _told(state, search, base, among, among=True)
-
-
-def _noted(state: State, why: str) -> State:
-    """The state with what process noise says among the notes on the record."""
-    return _with_note(state, f"with process noise it is {why}")
 
 
 def _with_hint(state: State, search: Search, told: Told) -> State:
