@@ -16,6 +16,8 @@ OWN = 0.8
 """Share of the gain that is lost without an event beside another effect, at least."""
 BY_ITSELF = 0.5
 """Share of the gain that an event has alone, and beside the other effect, from which it stands by itself."""
+FOR_A_TIME = 0.7
+"""The same of an event that comes once and goes again."""
 BESIDE = 0.02
 """Share of a record at its ends in which a change is none."""
 BY_CHANCE = 1e-3
@@ -53,30 +55,38 @@ def overlapping(
         alone, rest = max(without[h.label].criterion for h in others), without[event.label].criterion
         structure = search.since_reference and all(h.kind in STRUCTURE for h in others)
         leads = structure and alone - rest >= LEAST_GAIN
-        by_itself = happens_once(event, search.record) and stands_by_itself(best.criterion, base.criterion, alone, rest)
+        changes = changes_within(event, search.record)
+        by_itself = stands_by_itself(changes, best.criterion, base.criterion, alone, rest)
         return leads or by_itself or best.criterion - rest >= most or alone - base.criterion >= most
 
     return tuple(h for h in events if not is_needed(h))
 
 
-def happens_once(event: Hypothesis, record: Dataset) -> bool:
-    """Whether an event is one change that stays: what a wrong model leaves comes and goes with the inputs.
-
-    A change within a share BESIDE of the record of its ends is none.
-    """
+def changes_within(event: Hypothesis, record: Dataset) -> int:
+    """How often an event begins or ends within a record: a change within a share BESIDE of it of its ends is none."""
     first, last = float(record.time[0]), float(record.time[-1])
     margin = BESIDE * (last - first)
     edges = [t for begin, long in event.pulses for t in (begin, begin + long)]
-    return sum(first + margin < t < last - margin for t in edges) == 1
+    return sum(first + margin < t < last - margin for t in edges)
 
 
-def stands_by_itself(both: float, neither: float, alone: float, without: float) -> bool:
-    """Whether an event has most of the gain of two effects (BY_ITSELF) with and without the other one.
+def stands_by_itself(changes: int, both: float, neither: float, alone: float, without: float) -> bool:
+    """Whether an event has most of the gain of two effects with and without the other one: BY_ITSELF, or FOR_A_TIME.
 
-    Then the other one explains something else, and draws nothing of it. By criteria: of both effects, of neither, of
-    the event alone, of the other one alone.
+    Then the other one explains something else, and draws nothing of it. What a wrong model leaves comes and goes with
+    the inputs: of an event that comes and goes once more is asked, and one that does so again and again never stands by
+    itself.
+
+    Parameters
+    ----------
+    changes
+        How often the event begins or ends.
+    both, neither, alone, without
+        Criteria: of both effects, of neither, of the event alone, of the other one alone.
     """
-    least = BY_ITSELF * (both - neither)
+    if changes not in (1, 2):
+        return False
+    least = (BY_ITSELF if changes == 1 else FOR_A_TIME) * (both - neither)
     return alone - neither >= least and both - without >= least
 
 

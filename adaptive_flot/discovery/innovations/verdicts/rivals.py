@@ -10,7 +10,7 @@ from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
-from adaptive_flot.discovery.innovations.given_up import happens_once, stands_by_itself
+from adaptive_flot.discovery.innovations.given_up import changes_within, stands_by_itself
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import has_short_pause
@@ -181,12 +181,11 @@ def _event_by_itself(search: Search, base: Explanation, told: Told) -> Explanati
     events = [h for h in told.certain if h.kind in EVENTS]
     if told.word != "named" or len(told.best.hypotheses) != 2 or len(events) != 1:
         return None
-    if not happens_once(events[0], search.record):
-        return None
     (other,) = (h for h in told.best.hypotheses if h is not events[0])
     alone, without = search.without(told.best, other), search.without(told.best, events[0])
-    by_itself = stands_by_itself(told.best.criterion, base.criterion, alone.criterion, without.criterion)
-    return alone if by_itself else None
+    changes = changes_within(events[0], search.record)
+    criteria = (e.criterion for e in (told.best, base, alone, without))
+    return alone if stands_by_itself(changes, *criteria) else None
 
 
 def _of_two(explanation: Explanation) -> bool:
