@@ -52,7 +52,7 @@ def overlapping(
 
     def is_needed(event: Hypothesis) -> bool:
         others = [h for h in best.hypotheses if h is not event]
-        alone, rest = max(without[h.label].criterion for h in others), without[event.label].criterion
+        alone, rest = max(without[h.effect.label].criterion for h in others), without[event.effect.label].criterion
         structure = search.since_reference and all(h.kind in STRUCTURE for h in others)
         leads = structure and alone - rest >= LEAST_GAIN
         changes = changes_within(event, search.record)

@@ -92,7 +92,7 @@ def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> To
     given_up, everything = list[Hypothesis](), found
     while found[0].criterion - base.criterion >= LEAST_GAIN:
         best = found[0]
-        without = _without_each(search, best) if len(best.hypotheses) > 1 else {best.hypotheses[0].label: base}
+        without = _without_each(search, best) if len(best.hypotheses) > 1 else {best.hypotheses[0].effect.label: base}
         failed = at_steps_of_an_input(search, best) or overlapping(search, base, best, without)
         failed = failed or _contradicted(search, best, without)
         if not failed:
@@ -132,16 +132,16 @@ def _event_alone(search: Search, base: Explanation, found: Sequence[Explanation]
     sure = all(told_apart(search, base, found[0], e) for e in without)
     if not sure or not all(told_apart(search, base, own, e) for e in rivals):
         return None
-    if _contradicted(search, own, {own.hypotheses[0].label: base}):
+    if _contradicted(search, own, {own.hypotheses[0].effect.label: base}):
         return None
     return Told("named", own, own.hypotheses, (), (own,), "")
 
 
 def _without_each(search: Search, explanation: Explanation) -> dict[str, Explanation]:
-    """An explanation of several effects without each of them, by its label."""
+    """An explanation of several effects without each of them, by the effect's name: a part may be late in two ways."""
     effects = explanation.hypotheses
     left = parallel_map(lambda k: search.without(explanation, effects[k]), range(len(effects)), search.processes)
-    return {h.label: e for h, e in zip(effects, left, strict=True)}
+    return {h.effect.label: e for h, e in zip(effects, left, strict=True)}
 
 
 def _unless_given_up(
@@ -205,14 +205,14 @@ def _told(
         why = f"{len(alike)} explanations are about as good, and have no effect in common"
         return Told("abstain", best, (), (), alike, why)
     open_one = next(h for h in best.hypotheses if h not in certain)
-    return Told("named", without[open_one.label], certain, (), alike, "")
+    return Told("named", without[open_one.effect.label], certain, (), alike, "")
 
 
 def _without_small_ones(base: Explanation, told: Told, without: Mapping[str, Explanation]) -> Told:
     """A name without an effect that does little beside the other one: it takes up what else is wrong with the model."""
     total = told.best.criterion - base.criterion
-    small = min(told.certain, key=lambda h: told.best.criterion - without[h.label].criterion)
-    rest = without[small.label]
+    small = min(told.certain, key=lambda h: told.best.criterion - without[h.effect.label].criterion)
+    rest = without[small.effect.label]
     if len(told.certain) == 1 or told.best.criterion - rest.criterion >= SMALL * total:
         return told
     return replace(told, best=rest, certain=tuple(h for h in told.certain if h is not small))
@@ -224,7 +224,7 @@ def _certain_alone(search: Search, base: Explanation, told: Told, without: Mappi
     open_ones = [h for h in best.hypotheses if not any(h is c for c in told.certain)]
     if not told.certain or len(open_ones) != 1:
         return told
-    rest = without[open_ones[0].label]
+    rest = without[open_ones[0].effect.label]
     if best.criterion - rest.criterion >= SMALL * (best.criterion - base.criterion):
         return told
     return late_anywhere(search, base, replace(told, word="named", best=rest, open=()))
@@ -316,7 +316,7 @@ def _contradicted(
     fresh = _fresh_rows(search, explanation)
     failed: list[tuple[float, Hypothesis]] = []
     for h in explanation.hypotheses:
-        rest = without[h.label]
+        rest = without[h.effect.label]
         extra = explanation.numbers - rest.numbers - len(h.free)
         if low_end(fresh - _fresh_rows(search, rest), extra) <= 0:
             failed.append((explanation.criterion - rest.criterion, h))

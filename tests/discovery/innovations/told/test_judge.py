@@ -46,13 +46,15 @@ class Stand:
     def __init__(self, *known: Given, since_reference: bool = False) -> None:
         self.since_reference = since_reference
         self.known = {tuple(h.site for h in e.hypotheses): e for e in known}
+        self.known |= {tuple(h.effect.label for h in e.hypotheses): e for e in known}
 
     def model_of(self, explanation: Given) -> Any:
         """A model whose only parameter is the slope of a span."""
         return SimpleNamespace(parameters=[SimpleNamespace(name=SPAN.parameters[0], value=explanation.slope)])
 
     def without(self, explanation: Given, left_out: Hypothesis) -> Given:
-        return self.known[tuple(h.site for h in explanation.hypotheses if h is not left_out)]
+        rest = [h for h in explanation.hypotheses if h is not left_out]
+        return self.known.get(tuple(h.effect.label for h in rest)) or self.known[tuple(h.site for h in rest)]
 
     def late_elsewhere(self, explanation: Given, late: Hypothesis) -> list[Given]:
         """A lag explains half as much at another place."""
@@ -124,6 +126,16 @@ def test_a_small_effect_beside_a_large_one_is_not_told() -> None:
     said = told(Given((one, two), 500.0, 0.9), Given((one,), 480.0, 0.5), Given((two,), 30.0, 0.1))
     assert said.word == "named"
     assert [h.site for h in said.certain] == ["sensor"]
+
+
+def test_a_lag_and_a_dead_time_of_one_part_are_two_effects() -> None:
+    """Measured: a throttle motor. Both are a "throttle_motor lag", and the one for the other was a crash."""
+    slow = lag("motor")
+    late = replace(slow, driver="delay", effect=replace(slow.effect, driver="delay", form="delay"))
+    pair, best = Given((slow, late), 500.0, 0.9), Given((slow,), 490.0, 0.8)
+    said = told(pair, Given((late,), 450.0, 0.5), best)
+    assert said.word == "named" and said.certain == (slow,)
+    assert said.best.criterion == best.criterion
 
 
 def test_nothing_is_missing_where_no_explanation_gains() -> None:
