@@ -33,7 +33,7 @@ from adaptive_flot.discovery.verdict.words.wording import (
 )
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.stretches import LONGEST_IS_USED
-from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.effects import LATE, Effect
 from adaptive_flot.greybox.forms.form import Coefficient, CoefficientRole
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
@@ -48,6 +48,7 @@ SIZES_WITH_PROCESS_NOISE = (
     "sizes are those of the fit with process noise, errors and parameters those of free runs; a disturbance that stays "
     "for most of the record is part of a size, and not of its interval"
 )
+LATE_SENSOR = "A sensor that answers late looks like a store or a transport before it that the model lacks."
 STILL_WRONG = 2.0
 """An output whose error on the report rows is more than so many times its noise is wrong after all."""
 
@@ -124,11 +125,26 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
                 f"Something is missing. It is {state.without_a_site}.",
                 f"Free runs do not tell it: {_rest(said)}",
             )
-        return " ".join(filter(None, (where, said, likelier, state.certain, hidden, state.background, part)))
+        late = _looks_like_a_store(state)
+        return " ".join(filter(None, (where, said, late, likelier, state.certain, hidden, state.background, part)))
     errors = ", ".join(c.words for c in state.error)
     told = f"{state.sentence} Error of the free run on held-out rows: {errors}."
     left = still_wrong_or_wandering(wrong) if state.judged.word in TELLING else ""
-    return " ".join(filter(None, (told, left, state.certain, _part_of_record(state.screening.notes))))
+    late = _looks_like_a_store(state)
+    return " ".join(filter(None, (told, late, left, state.certain, _part_of_record(state.screening.notes))))
+
+
+def _looks_like_a_store(state: State) -> str:
+    """A word on a sensor that answers late, where no reference has shown that the model has all stores before it.
+
+    A first-order lag of an output is the same equation in both cases.
+    """
+    judged = state.judged
+    if state.referred or judged.word not in TELLING or judged.best is None:
+        return ""
+    sensors = {site.name for site in state.model.sites if site.role == "sensor"}
+    told = (*(judged.part or judged.best.names), *judged.members)
+    return LATE_SENSOR if any(site in sensors and driver in LATE for site, driver in told) else ""
 
 
 def _acts_without_a_site(state: State) -> bool:

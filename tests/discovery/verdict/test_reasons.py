@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import has_a_reason
+from adaptive_flot.discovery.verdict import conclude
 from adaptive_flot.discovery.verdict.conclude import _meaning
 from adaptive_flot.discovery.verdict.words import wording
 from adaptive_flot.greybox import Effect
@@ -47,3 +48,22 @@ def test_what_comes_as_near_elsewhere_is_not_said_to_be_at_the_same_places(monke
     said = wording._class_words(judged, ())
     assert "At the same places it may as well be: filling by flow." in said
     assert "As near, but without a known reason: gauge by speed." in said
+
+
+@pytest.mark.parametrize(
+    ("site", "driver", "referred", "said"),
+    [
+        ("thermometer", "lag", False, True),
+        ("thermometer", "delay", False, True),
+        ("thermometer", "lag", True, False),
+        ("thermometer", "time", False, False),
+        ("heater", "lag", False, False),
+    ],
+)
+def test_a_late_sensor_is_said_to_look_like_a_store_before_it(
+    site: str, driver: str, referred: bool, said: bool
+) -> None:
+    """Measured: a healthy wall, whose model has five lumps, was told as a thermometer that answers late."""
+    judged = SimpleNamespace(word="named", best=SimpleNamespace(names=((site, driver),)), part=(), members=())
+    state: Any = SimpleNamespace(referred=referred, judged=judged, model=tank())
+    assert bool(conclude._looks_like_a_store(state)) == said
