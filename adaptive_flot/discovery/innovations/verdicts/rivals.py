@@ -163,23 +163,25 @@ def not_two(search: Search, base: Explanation, told: Told) -> Told:
     """
     levels = {h.site for h in told.certain if h.driver == "constant"}
     kinds = [h.kind for h in told.certain if not (h.kind in EVENTS and h.site in levels)]
-    if told.word == "class" and not told.certain and all(_of_two(e) for e in told.alike):
-        said = f"one of {', '.join(h.label for h in told.effects)}, and a further one"
+    beside = kinds and all(h.kind in EVENTS and h.site in levels for _, h in told.open)
+    if told.word == "class" and all(_of_two(e) for e in told.alike) and not beside:
+        one = f"one of {', '.join(h.label for _, h in told.open)}"
+        said = " and ".join([*(h.label for h in told.certain), one]) if told.certain else f"{one}, and a further one"
     elif len(kinds) < 2 or (kinds.count("store") == 1 and not {"depends", "turns"} & set(kinds)):
         return told
     else:
         said = " and ".join(h.label for h in told.certain)
-        alone = _event_by_itself(search, base, told)
-        if alone is not None:
-            return replace(told, best=alone, certain=alone.hypotheses)
+    alone = _event_by_itself(search, base, told)
+    if alone is not None:
+        return replace(told, word="named", best=alone, certain=alone.hypotheses, open=())
     why = f"two effects are needed, {said}: more likely another one is"
     return replace(told, word="abstain", certain=(), open=(), why=why)
 
 
 def _event_by_itself(search: Search, base: Explanation, told: Told) -> Explanation | None:
-    """The event of a name of two effects without the other one, where it stands by itself; None where it does not."""
+    """The event that is certain of two effects, without the other one, where it stands by itself; else None."""
     events = [h for h in told.certain if h.kind in EVENTS]
-    if told.word != "named" or len(told.best.hypotheses) != 2 or len(events) != 1:
+    if len(told.best.hypotheses) != 2 or len(events) != 1:
         return None
     (other,) = (h for h in told.best.hypotheses if h is not events[0])
     alone, without = search.without(told.best, other), search.without(told.best, events[0])

@@ -310,6 +310,19 @@ def test_a_class_of_events_that_all_need_a_second_effect_is_not_told(alone: bool
     assert asked.word == word and (alone or "one of amplifier switch, load switch" in asked.why)
 
 
+@pytest.mark.parametrize(("alone", "word", "sites"), [(450.0, "named", ["load"]), (200.0, "abstain", [])])
+def test_an_event_with_one_of_a_class_beside_it_is_told_where_it_stands_by_itself(
+    alone: float, word: str, sites: list[str]
+) -> None:
+    """Two effects are needed here, too, whichever the second one is: a healthy wall had a late thermometer so."""
+    load, one, two = event("load", (250.0, 1e7)), lag("sensor"), lag("motor")
+    best: Any = [Given((load, one), 600.0, 0.9), Given((load, two), 598.0, 0.9)]
+    said = judging.Told("class", best[0], (load,), ((best[0], one), (best[1], two)), tuple(best), "")
+    asked = asked_again(said, *best, Given((load,), alone, 0.5), Given((one,), 100.0, 0.5))
+    assert asked.word == word and [h.site for h in asked.effects] == sites
+    assert word == "named" or "load switch and one of sensor lag, motor lag" in asked.why
+
+
 def test_an_effect_more_beside_one_of_a_class_is_no_other_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
     """Gains by wind, or the loss by wind, or the loss by wind and something else: one of the first two."""
     monkeypatch.setattr(judging, "told_apart", lambda search, base, best, other: not other.hypotheses)
