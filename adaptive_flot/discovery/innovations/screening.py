@@ -8,21 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from adaptive_flot.discovery.further_sites.places import is_further
-from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, MATTERS, Hypothesis, constant_change
+from adaptive_flot.discovery.hypotheses.families import FOREVER, LEAST_MOVE, Hypothesis, constant_change
 from adaptive_flot.discovery.hypotheses.seen import ordinary_size
 from adaptive_flot.discovery.innovations.courses import Suspect, periodic, suspects
+from adaptive_flot.discovery.innovations.events.at_times import (
+    cycle_at,
+    halt_at,
+    late_after,
+    pulse_of,
+    ramp_between,
+    switch_at,
+)
 from adaptive_flot.discovery.innovations.events.cycling import best_cycle, is_on, possible_periods, refined_period
 from adaptive_flot.discovery.innovations.events.halting import MOST_EDGES as HALTS
 from adaptive_flot.discovery.innovations.events.halting import Halt, best_halt, still_stretch
 from adaptive_flot.discovery.innovations.events.switching import MOST_EDGES, IntArray, Switch, best_switch
 from adaptive_flot.discovery.innovations.filter.linear_response import LinearResponse
-from adaptive_flot.greybox.data.dataset import Dataset
-from adaptive_flot.greybox.effects import Effect, Mode
+from adaptive_flot.greybox.effects import Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 
-EDGE = 0.05
-"""Width of the edges of a switch, in sampling intervals."""
 NOTHING = 1e-9
 CERTAIN = 0.5
 """Gain of log-likelihood for each row of a sensor that is still: what its spread says when it falls to its noise."""
@@ -131,7 +136,7 @@ class Screening:
         record, by = self._response.record, self._course(site, mode)
         if by is None:
             return None
-        late = {s.name: _late(s, record.dt) for s in self.model.sites}
+        late = {s.name: late_after(s, record.dt) for s in self.model.sites}
         pulses = [(on + late[site.name] - late[switch.site], length) for on, length in switch.pulses]
         mask = np.zeros(len(by), dtype=bool)
         for on, length in pulses:
@@ -160,7 +165,7 @@ class Screening:
         if switch is None or not self._is_sharp(site.name, by, switch):
             return None
         numbers = sum(1 + (b < count) for _, b in switch.pulses)
-        pulses = [_pulse(site, record, a, b) for a, b in switch.pulses]
+        pulses = [pulse_of(site, record, a, b) for a, b in switch.pulses]
         hypothesis = switch_at(site, mode, pulses, record.dt)
         suspect = Suspect(hypothesis, (by * switch.mask(count))[:, None], hypothesis.free, numbers)
         return Screened(suspect, np.array([switch.size]), switch.gain - self._charge(suspect))
@@ -174,12 +179,8 @@ class Screening:
         found = self._still(site) if site.role == "sensor" else self._halt(site, v)
         if found is None:
             return None
-        on, length = _pulse(site, record, found.begin, found.end)
-        told = {"amplitude": 1.0, "level": found.level, "on_1": on, "for_1": length}
-        effect = Effect(site.name, "time", "stuck_while", told, {"width": EDGE * record.dt})
-        limits = {"level": (float(v.min()), float(v.max()))} if site.role == "actuator" else {}
-        scales = {"level": MATTERS * spread}
-        hypothesis = Hypothesis(site.name, "time", "stuck for a time", effect, ("level",), ({},), limits, scales)
+        on, length = pulse_of(site, record, found.begin, found.end)
+        hypothesis = halt_at(site, v, found.level, (on, length), record.dt)
         stands = (np.arange(len(v)) >= found.begin) & (np.arange(len(v)) < found.end)
         suspect = Suspect(hypothesis, ((found.level - v) * stands)[:, None], (), 2 + (length < FOREVER))
         return Screened(suspect, np.empty(0), found.gain - self._charge(suspect))
@@ -233,7 +234,7 @@ class Screening:
         pairs = [(a, b) for a in grid[:-1] for b in grid[1:] if b > a]
         best: Screened | None = None
         for zoom in range(ZOOMS + 1):
-            group = [_ramp(site, by, record, a, b) for a, b in pairs]
+            group = [ramp_between(site, by, record, a, b) for a, b in pairs]
             best = max(self._regressions(site.name, group), key=lambda x: x.gain, default=None)
             if best is None:
                 return None
@@ -255,7 +256,7 @@ class Screening:
         record, by = self._response.record, self._course(site, site.mode)
         if by is None:
             return None
-        time, dt = record.time[1:] - (record.dt / 2 - _late(site, record.dt)), record.dt
+        time, dt = record.time[1:] - (record.dt / 2 - late_after(site, record.dt)), record.dt
 
         def respond(courses: FloatArray) -> FloatArray:
             return self._rest(self._response.respond(site.name, courses))
@@ -274,11 +275,8 @@ class Screening:
         gain, other = (self._gain(left) for left in (self._total - best.explained, self._linear(smooth)[1]))
         if gain - other < SHARP:
             return None
-        told = {"amplitude": 0.0, "onset": best.onset, "duration": best.duration, "period": best.period}
-        effect = Effect(site.name, "time", "cycle", told, {"width": EDGE * dt}, mode=site.mode)
-        hypothesis = Hypothesis(site.name, "time", "cycle", effect, ("amplitude",), ({},))
         course = (by * is_on(time, best.period, best.onset, best.duration))[:, None]
-        suspect = Suspect(hypothesis, course, hypothesis.free, 3)
+        suspect = Suspect(cycle_at(site, best, dt), course, ("amplitude",), 3)
         return Screened(suspect, np.array([best.size]), gain - self._charge(suspect))
 
     def _gain(self, left: float) -> float:
@@ -340,40 +338,3 @@ def span(X: FloatArray) -> FloatArray:
     U, s, _ = np.linalg.svd(X[:, length > 0] / length[length > 0], full_matrices=False)
     found: FloatArray = U[:, s > NOTHING * s.max()] if len(s) else U
     return found
-
-
-def _ramp(site: Site, by: FloatArray, record: Dataset, begin: int, end: int) -> Suspect:
-    """A change that grows from one interval to another and stays, of a course (N - 1,)."""
-    count = len(by)
-    share = np.clip((np.arange(count) + 0.5 - begin) / (end - begin), 0.0, 1.0)
-    times = {"onset": float(record.time[begin]), "duration": float((end - begin) * record.dt)}
-    effect = Effect(site.name, "time", "ramp", {"amplitude": 0.0, **times}, {}, mode=site.mode)
-    hypothesis = Hypothesis(site.name, "time", "ramp", effect, ("amplitude",), ({},))
-    return Suspect(hypothesis, (by * share)[:, None], ("amplitude",), 2)
-
-
-def _late(site: Site, dt: float) -> float:
-    """How long after a row a switch is [s]: a sensor's is between two, what acts on a state begins with an interval."""
-    return dt / 2 if site.role == "sensor" else 0.0
-
-
-def _pulse(site: Site, record: Dataset, begin: int, end: int) -> tuple[float, float]:
-    """When an event of some intervals begins [s], and how long it is there [s]: FOREVER where it lasts to the end."""
-    time = record.time
-    lasts = end >= len(time) - 1
-    return float(time[begin] + _late(site, record.dt)), FOREVER if lasts else float(time[end] - time[begin])
-
-
-def times_of_switch(pulses: Sequence[tuple[float, float]]) -> dict[str, float]:
-    """Coefficients of a switch of no size yet, from its times and durations [s]."""
-    told = {"amplitude": 0.0}
-    for k, (on, length) in enumerate(pulses, 1):
-        told |= {f"on_{k}": on, f"for_{k}": length}
-    return told
-
-
-def switch_at(site: Site, mode: Mode, pulses: Sequence[tuple[float, float]], dt: float) -> Hypothesis:
-    """A switch whose size is free, from its times and durations [s]."""
-    settings = {"count": float(len(pulses)), "width": EDGE * dt}
-    effect = Effect(site.name, "time", "switch", times_of_switch(pulses), settings, mode=mode)
-    return Hypothesis(site.name, "time", "switch", effect, ("amplitude",), ({},))

@@ -25,7 +25,7 @@ from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.hypotheses.wording import words_of
-from adaptive_flot.discovery.innovations.screening import switch_at
+from adaptive_flot.discovery.innovations.events.at_times import switch_at
 from adaptive_flot.discovery.innovations.verdicts.event import with_hypotheses
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray, Model

@@ -13,7 +13,7 @@ from dataclasses import replace
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
-from adaptive_flot.discovery.innovations.screening import switch_at
+from adaptive_flot.discovery.innovations.events.at_times import switch_at
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import SHORT
 from adaptive_flot.discovery.innovations.search.search import Search

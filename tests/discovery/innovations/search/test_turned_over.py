@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER
-from adaptive_flot.discovery.innovations.screening import switch_at
+from adaptive_flot.discovery.innovations.events.at_times import switch_at
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.search.turned_over import other_times, turned_over
 from tests.discovery.innovations.box import DT, model, record
