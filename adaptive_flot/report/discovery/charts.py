@@ -39,7 +39,7 @@ def score_map(scores: Sequence[Score], chosen: Sequence[tuple[str, str]] = ()) -
 
 def curve_chart(c: EffectCurve) -> Chart:
     """An effect over its driver with its 95 % band, and below how often the record was there, where it is not time."""
-    power = exponent(c.driver)
+    power = 0 if c.effect.driver == "time" else exponent(c.driver)  # the axis of time has units of its own
     x, seen = c.driver * 10.0**-power, c.seen * 10.0**-power
     unit = c.unit or "-"
     was = Trace("model as it was", x, np.full(len(x), 1.0 if c.relative else 0.0), Role.CONSTANT, GREY)

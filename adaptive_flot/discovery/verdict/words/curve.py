@@ -17,6 +17,8 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 POINTS = 161
+MOST_EDGES = 400
+"""Edges of a curve that are drawn as edges: more are closer than a picture shows."""
 EDGE_SHARE = 1e-6
 """Width of an edge of a switch, as a share of what the driver covers."""
 EDGE_WIDTHS = 6
@@ -172,11 +174,20 @@ def _places(effect: Effect, low: float, high: float) -> FloatArray:
         width, at = EDGE_SHARE * (high - low), tuple(effect.values(CoefficientRole.THRESHOLD))
     elif effect.family.passes:
         width, at = float(number(effect.full_settings, "width")), edges(effect)
+    elif effect.values(CoefficientRole.PHASE):
+        width, at = float(number(effect.full_settings, "width")), _edges_of_periods(effect, low, high)
     else:
         return even
     around = width * np.linspace(-EDGE_WIDTHS, EDGE_WIDTHS, 2 * EDGE_WIDTHS + 1)
     close = np.concatenate([t + around for t in at])
     return np.unique(np.concatenate([even, close[(close > low) & (close < high)]]))
+
+
+def _edges_of_periods(effect: Effect, low: float, high: float) -> tuple[float, ...]:
+    """When what is switched in every period is switched, from `low` to `high` [s]; none where that is too often."""
+    onset, duration, period = (effect.coefficients[name] for name in ("onset", "duration", "period"))
+    begins = onset + period * np.arange(np.floor((low - onset) / period), np.ceil((high - onset) / period) + 1)
+    return tuple(np.concatenate([begins, begins + duration])) if 2 * len(begins) <= MOST_EDGES else ()
 
 
 def _branches(effect: Effect, x: FloatArray) -> tuple[FloatArray, FloatArray | None]:

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adaptive_flot.discovery.innovations.events.cycling import best_cycle, is_on, possible_periods, refined_period
+from adaptive_flot.discovery.verdict.words.curve import _places
 from adaptive_flot.greybox.effects import Effect
 
 DT, ROWS, DAY = 900.0, 1000, 86_400.0
@@ -55,3 +56,13 @@ def test_the_form_is_on_in_every_period_as_the_search_has_it() -> None:
     time = np.arange(0.5, 5000.0, 1.0)
     found = np.array(change(time[None, :])).ravel()
     np.testing.assert_allclose(found, 2.0 * is_on(time, 700.0, 100.0, 200.0), atol=1e-3)
+
+
+@pytest.mark.parametrize(("periods", "edges"), [(20, 40), (1000, 0)])
+def test_its_picture_has_edges_where_it_is_switched(periods: int, edges: int) -> None:
+    """Over three weeks its windows were drawn as peaks of several shapes. A thousand are closer than a picture shows."""
+    told = {"amplitude": 0.5, "onset": 100.0, "duration": 200.0, "period": 700.0}
+    x = _places(Effect("loss", "time", "cycle", told, {"width": 0.5}), 0.0, periods * 700.0)
+    times = [100.0 + 700.0 * k + w for k in range(periods) for w in (0.0, 200.0)]
+    drawn = sum(bool(np.any(np.abs(x - t) < 0.6) and np.any(np.abs(x - t - 1.0) < 0.6)) for t in times)
+    assert drawn >= edges and (edges or len(x) < 200)
