@@ -178,6 +178,8 @@ def _places(effect: Effect, low: float, high: float) -> FloatArray:
         width, at = float(number(effect.full_settings, "width")), _edges_of_periods(effect, low, high)
     else:
         return even
+    if not at:
+        return even
     around = width * np.linspace(-EDGE_WIDTHS, EDGE_WIDTHS, 2 * EDGE_WIDTHS + 1)
     close = np.concatenate([t + around for t in at])
     return np.unique(np.concatenate([even, close[(close > low) & (close < high)]]))

@@ -60,7 +60,7 @@ def test_the_form_is_on_in_every_period_as_the_search_has_it() -> None:
 
 @pytest.mark.parametrize(("periods", "edges"), [(20, 40), (1000, 0)])
 def test_its_picture_has_edges_where_it_is_switched(periods: int, edges: int) -> None:
-    """Over three weeks its windows were drawn as peaks of several shapes. A thousand are closer than a picture shows."""
+    """Over three weeks its windows were drawn as peaks of several shapes. A thousand are too many to draw."""
     told = {"amplitude": 0.5, "onset": 100.0, "duration": 200.0, "period": 700.0}
     x = _places(Effect("loss", "time", "cycle", told, {"width": 0.5}), 0.0, periods * 700.0)
     times = [100.0 + 700.0 * k + w for k in range(periods) for w in (0.0, 200.0)]
