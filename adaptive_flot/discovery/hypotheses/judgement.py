@@ -40,6 +40,9 @@ class WithoutSite:
     words: str
 
 
+USUAL = "its errors are those of the reference"
+
+
 @dataclass(frozen=True)
 class UsualLoss:
     """What the model costs on its reference.
@@ -200,7 +203,7 @@ def judge(
     least = float(np.mean(usual.losses)) if usual is not None else float(len(rows.columns) / np.mean(rows.memory))
     if usual is not None:
         if usual.exceeded(null, count, len(blocks.edges)) is None and not excluded:
-            return Judged("none", None, (), "its errors are those of the reference", float("nan")), blocks
+            return Judged("none", None, (), USUAL, float("nan")), blocks
     ranked = sorted((t for t in tested if np.isfinite(t.total)), key=lambda t: t.total)
     errors = None if usual is None else usual.errors
     standing = [t for t in ranked if stands(rows, blocks, null, t, errors)]

@@ -14,7 +14,7 @@ from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
 from adaptive_flot.discovery.hypotheses.joint.at_noise import JUST_ABOVE, are_noise, are_usual
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows, noise_floor
-from adaptive_flot.discovery.hypotheses.judgement import Judged
+from adaptive_flot.discovery.hypotheses.judgement import USUAL, Judged
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.record.robust import AT_NOISE
 from adaptive_flot.discovery.record.slip_jump import band_ranges
@@ -24,6 +24,8 @@ from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
 """An error so many times the noise from row to row, or that of the reference, says that more is missing."""
+LARGER = 1.3
+"""Errors so many times those of the reference are no longer called the same."""
 FAR_ABOVE = 2.0
 """An error so many times its usual one is far above it."""
 FEWEST_REPEATED, REPEATED = 30, 0.1
@@ -210,8 +212,11 @@ def _effects(model: Model, judged: Judged, rows: Rows) -> tuple[NamedEffect, ...
 
 def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[OutputChange]) -> str:
     changed = "has changed" if reference else "is missing"
+    most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
     if judged.word == "none":
-        return f"Nothing {changed} that these records show: {judged.why}."
+        larger = f"its errors are up to {most:.2g} times those of the reference, which vary as much between stretches"
+        why = larger if judged.why == USUAL and LARGER < most < np.inf else judged.why
+        return f"Nothing {changed} that these records show: {why}."
     if judged.word == "insufficient":
         return f"The records do not say enough: {judged.why}."
     if judged.word == "abstain":
@@ -219,7 +224,6 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
         near = ", ".join(t.hypothesis.label for t in judged.parts[:4] if t.hypothesis) or "nothing"
         if NO_SITE in judged.why:
             return f"Something {differs}, {judged.why}. Nearest at a site: {near}."
-        most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
         if reference and most <= FAR_ABOVE:
             larger = f"up to {most:.2g} times those of the reference"
             size = larger if most > JUST_ABOVE else "no larger than those of the reference, but unlike them"

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.hypotheses.joint.rows import Rows
-from adaptive_flot.discovery.hypotheses.telling import _beyond
+from adaptive_flot.discovery.hypotheses.judgement import USUAL, Judged
+from adaptive_flot.discovery.hypotheses.telling import _beyond, _reason
+from adaptive_flot.discovery.results import OutputChange
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray
 from tests.discovery.heated import heated_tank
@@ -53,3 +55,13 @@ def test_a_free_run_that_leaves_the_plant_brings_no_plant_anywhere() -> None:
     errors = -np.linspace(0.0, 15.0, ROWS)[:, None]
     assert not _said(np.linspace(302.0, 319.0, ROWS), np.full(ROWS, 9.0), errors)
     assert "temperature is higher" in _said(np.linspace(312.0, 339.0, ROWS), np.full(ROWS, 9.0), errors)
+
+
+@pytest.mark.parametrize(
+    ("larger", "said"), [(1.1, USUAL), (2.0, "its errors are up to 2 times those of the reference")]
+)
+def test_none_does_not_call_errors_the_same_that_are_twice_as_large(larger: float, said: str) -> None:
+    """Measured: a healthy web winder at a higher speed, whose reference has stretches as bad."""
+    error = OutputChange("temperature", "K", larger, larger, 1.0, (0.0, 0.0))
+    judged = Judged("none", None, (), USUAL, float("nan"))
+    assert said in _reason(heated_tank(), judged, True, [error])
