@@ -18,6 +18,8 @@ BY_ITSELF = 0.5
 """Share of the gain that an event has alone, and beside the other effect, from which it stands by itself."""
 FOR_A_TIME = 0.7
 """The same of an event that comes once and goes again."""
+WANDERS = 0.25
+"""Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
 BESIDE = 0.02
 """Share of a record at its ends in which a change is none."""
 BY_CHANCE = 1e-3
@@ -88,6 +90,11 @@ def stands_by_itself(changes: int, both: float, neither: float, alone: float, wi
         return False
     least = (BY_ITSELF if changes == 1 else FOR_A_TIME) * (both - neither)
     return alone - neither >= least and both - without >= least
+
+
+def wanders(search: Search, explanation: Explanation, event: Hypothesis, gain: float) -> bool:
+    """Whether a further switch at the site of an event, which has gained so much, gains WANDERS of that."""
+    return search.switched_again(explanation, event) >= WANDERS * gain
 
 
 def why_given_up(search: Search, given_up: Sequence[Hypothesis]) -> str:

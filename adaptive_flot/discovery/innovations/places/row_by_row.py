@@ -21,6 +21,7 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothe
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import AT_REST
 from adaptive_flot.discovery.hypotheses.wording import cycle_times
+from adaptive_flot.discovery.innovations.given_up import wanders
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
@@ -63,6 +64,10 @@ def unless_without_a_site(search: Search, base: Explanation, told: Told) -> Told
     if not rivals:
         return told
     if told_apart(further, base, rivals[0], told.best):
+        event = rivals[0].hypotheses[-1]
+        if event.kind == "switch" and wanders(further, rivals[0], event, rivals[0].criterion - rest.criterion):
+            why = f"{event.site} changes about as much at other times, so that it wanders"
+            return replace(told, word="abstain", certain=(), open=(), why=why)
         near = best_of_each(e for e in rivals if e is rivals[0] or not told_apart(further, base, rivals[0], e))
         return replace(told, word="abstain", certain=(), open=(), why=as_if([words_at(further, e) for e in near]))
     # where a part rests, what it gives has no factor: an amount there is the part's own

@@ -10,7 +10,7 @@ from adaptive_flot.discovery.assessment.verification import AT_NOISE, MUCH_WORSE
 from adaptive_flot.discovery.hypotheses.comparison import EXPLAINED
 from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
-from adaptive_flot.discovery.innovations.given_up import changes_within, stands_by_itself
+from adaptive_flot.discovery.innovations.given_up import WANDERS, changes_within, stands_by_itself, wanders
 from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import has_short_pause
@@ -26,8 +26,6 @@ from adaptive_flot.greybox.model import FloatArray
 
 FAR = 3.0
 """An error so many times the noise from row to row is not explained by measurement noise."""
-WANDERS = 0.25
-"""Share of the gain of an event from which a further one at its site, at other times, says that the site wanders."""
 MUCH = 100.0
 """Fall of the Bayesian information criterion by which an alternative explains much; half of it where the model errs."""
 ERRS = 1.5
@@ -208,7 +206,7 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     gain = told.best.criterion - rest.criterion
     if WANDERS * gain < LEAST_GAIN:
         why = f"{event.site} changes so little that what wanders may do it: no search would find a further such change"
-    elif search.switched_again(told.best, event) >= WANDERS * gain:
+    elif wanders(search, told.best, event, gain):
         why = f"{event.site} changes about as much at other times, so that it wanders"
     else:
         return told

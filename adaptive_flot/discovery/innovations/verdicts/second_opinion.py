@@ -103,12 +103,16 @@ def second_opinion(state: State) -> State:
         found = with_pauses_closed(search, best_explanations(search, base, state.progress))
         if search.time_is_up:
             return _not_asked(state)
-        told = one_that_all_have(state, search, base, found, judge(search, base, found))
-        told = _by_the_rules(state, search, base, told)
+        first = one_that_all_have(state, search, base, found, judge(search, base, found))
+        told = _by_the_rules(state, search, base, first)
         on_sites = unless_without_a_site(search, base, told)
+        if told.word == "abstain" and any(h.kind in EVENTS for h in first.effects):
+            # an event that no part explains by itself may be one where the model has no site
+            elsewhere = unless_without_a_site(search, base, first)
+            on_sites = elsewhere if NO_SITE in elsewhere.why else on_sites
         if search.time_is_up:
             return _not_asked(state)
-    if on_sites.word != told.word and NO_SITE in on_sites.why:
+    if NO_SITE in on_sites.why:
         state = replace(state, without_a_site=on_sites.why)
     if ONE_CAUSE in state.contradiction:  # an opinion on one of several places would be none on what acts at all
         return state
