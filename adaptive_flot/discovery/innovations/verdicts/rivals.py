@@ -176,6 +176,16 @@ def not_two(search: Search, base: Explanation, told: Told) -> Told:
     return replace(told, word="abstain", certain=(), open=(), why=why)
 
 
+def two_and_more(told: Told, changes: tuple[OutputChange, ...]) -> bool:
+    """Whether effects at two places are told, and an output stays far above its noise (FAR_ABOVE) with them.
+
+    Then a third thing is missing, which both may stand in for: a reactor's jacket that fouls was a late cooler with a
+    hidden store.
+    """
+    places = {h.site for h in told.certain} | ({""} if told.open else set())
+    return len(places) > 1 and any(c.after > FAR_ABOVE * c.noise for c in changes)
+
+
 def _event_by_itself(search: Search, base: Explanation, told: Told) -> Explanation | None:
     """The event that is certain of two effects, without the other one, where it stands by itself; else None."""
     events = [h for h in told.certain if h.kind in EVENTS]

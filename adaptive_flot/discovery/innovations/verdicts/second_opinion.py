@@ -45,6 +45,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     smaller,
     surely_better,
     surely_worse,
+    two_and_more,
     unconfirmed,
     unexpected_drift,
     unless_a_trend,
@@ -249,7 +250,8 @@ def _told(state: State, search: Search, base: Explanation, told: Told, among: bo
     stands = bool(over) and not contradiction(judgement, over, noise) and _better_than_as_it_is(over, error)
     reached = outputs_in_reach(before.model, after.model)  # a sensor stands in for nothing elsewhere
     shown = tuple(c for c in (over if stands else error) if c.output in reached)
-    if (against and not stands) or hardly_explained(shown) or _another_drift(state, told):
+    falls_short = hardly_explained(shown) or two_and_more(told, shown)
+    if (against and not stands) or falls_short or _another_drift(state, told):
         kept = _kept(state, told)
         return _with_hint(kept, search, told) if kept.judged.word == "abstain" else kept
     less = smaller(error, state.error, allowed_ratio(state, names))

@@ -9,7 +9,7 @@ import pytest
 from adaptive_flot.discovery.hypotheses.judgement import Word
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
 from adaptive_flot.discovery.innovations.verdicts.cause import MOST, _too_many_parts
-from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
+from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained, two_and_more
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.taken_back import unless_contradicted, unless_much_is_left
@@ -191,3 +191,20 @@ def test_a_part_that_free_runs_do_not_tell_from_three_others_is_not_left_out(
     compared: Any = SimpleNamespace(judged=SimpleNamespace(parts=found))
     said: Any = SimpleNamespace(effects=[SimpleNamespace(site=s) for s in told])
     assert _too_many_parts(compared, said) == many
+
+
+@pytest.mark.parametrize(
+    ("sites", "opened", "after", "said"),
+    [
+        (("cooler", "reaction"), False, 2.5, True),
+        (("cooler", "reaction"), False, 1.5, False),
+        (("cooler", "cooler"), False, 2.5, False),  # its level before an event, and after it
+        (("cooler",), False, 2.5, False),
+        (("cooler",), True, 2.5, True),
+    ],
+)
+def test_two_effects_that_leave_far_more_than_noise_are_not_told(
+    sites: tuple[str, ...], opened: bool, after: float, said: bool
+) -> None:
+    told: Any = SimpleNamespace(certain=[SimpleNamespace(site=s) for s in sites], open=[object()] if opened else [])
+    assert two_and_more(told, (OutputChange("temperature", "K", 5.0, after, 1.0, (0.0, 0.0)),)) == said
