@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from adaptive_flot.charts.units import exponent, unit_text
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results.evidence import OutputChange
 from adaptive_flot.discovery.results.verdict import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.kit.parts import Fact
-from adaptive_flot.report.kit.wording import number, spaced
+from adaptive_flot.report.kit.wording import capital, number, spaced
 
 MOST_FACTS = 4
 """Outputs whose errors are told at the top: those whose error fell most, in units of their noise."""
@@ -26,6 +27,13 @@ WORDS = {
     "insufficient": "the record says too little",
     "abstain": "nothing can be told for sure",
 }
+
+
+def title_of(verdict: Verdict, titles: Mapping[str, str]) -> str:
+    """The title for the word of a verdict; where nothing is told but that the model lacks a site, that."""
+    if verdict.word == "abstain" and NO_SITE in verdict.reason:
+        return "Something acts where the model has no site"
+    return capital(titles[verdict.word])
 
 
 def word_in_words(verdict: Verdict) -> str:

@@ -16,7 +16,7 @@ from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.files import write_text
 from adaptive_flot.report.discovery import tables
-from adaptive_flot.report.discovery.answer import error_facts, made_from, word_in_words
+from adaptive_flot.report.discovery.answer import error_facts, made_from, title_of, word_in_words
 from adaptive_flot.report.discovery.charts import curve_chart, score_map
 from adaptive_flot.report.discovery.figures import residual_panels, run_panels
 from adaptive_flot.report.discovery.test_design import experiment_chapter
@@ -88,7 +88,7 @@ def _title(discovery: Discovery) -> str:
     verdict = discovery.verdict
     if verdict.word == "named" and verdict.effects:
         return re.sub(r" \([^()]*\)", "", verdict.reason.partition(". ")[0])
-    return capital(TITLES[verdict.word])
+    return title_of(verdict, TITLES)
 
 
 def _repeats(fact: str, reason: str) -> bool:

@@ -15,11 +15,11 @@ from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.since_reference.searched_change import REPORT_ROWS, SEARCHED
 from adaptive_flot.files import write_text
-from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from
+from adaptive_flot.report.discovery.answer import WORDS, error_facts, made_from, title_of
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
 from adaptive_flot.report.kit.parts import Fact, Part, Picture, Section, Table, Text
-from adaptive_flot.report.kit.wording import capital, number
+from adaptive_flot.report.kit.wording import number
 
 MOST_RECORDS = 5
 """Records whose runs are drawn."""
@@ -75,9 +75,7 @@ def records_report(comparison: Comparison, name: str, command: str = "", read: S
     tried: list[Part] = [Text(_tried(comparison)), *([_hypotheses(comparison)] if comparison.tested else [])]
     page = Page(
         kind="Discovery report",
-        title=capital(titles[verdict.word])
-        if verdict.word != "named"
-        else verdict.reason.partition(". ")[0].rstrip("."),
+        title=title_of(verdict, titles) if verdict.word != "named" else verdict.reason.partition(". ")[0].rstrip("."),
         lead=f"Records: {name}." + (f" Reference: {', '.join(old)}." if old else ""),
         answer=[verdict.reason, *verdict.notes],
         facts=[Fact("Verdict", verdict.word, WORDS[verdict.word]), *error_facts(verdict.error)],

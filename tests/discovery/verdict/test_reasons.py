@@ -8,10 +8,14 @@ from typing import Any
 import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import has_a_reason
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
+from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.discovery.verdict import conclude
 from adaptive_flot.discovery.verdict.conclude import _meaning
 from adaptive_flot.discovery.verdict.words import wording
 from adaptive_flot.greybox import Effect
+from adaptive_flot.report.discovery.answer import title_of
+from adaptive_flot.report.discovery.page import TITLES
 from tests.discovery.hypotheses.test_constants import tank
 
 
@@ -67,3 +71,15 @@ def test_a_late_sensor_is_said_to_look_like_a_store_before_it(
     judged = SimpleNamespace(word="named", best=SimpleNamespace(names=((site, driver),)), part=(), members=())
     state: Any = SimpleNamespace(referred=referred, judged=judged, model=tank())
     assert bool(conclude._looks_like_a_store(state)) == said
+
+
+@pytest.mark.parametrize(
+    ("word", "reason", "title"),
+    [
+        ("abstain", f"Something is missing. It is as if level lost a share of itself: {NO_SITE}.", "no site"),
+        ("abstain", "Something is missing, but the record does not say what.", "does not tell what"),
+        ("class", f"One of these: pump; or as if something takes from the balance of level, and {NO_SITE}.", "a few"),
+    ],
+)
+def test_the_title_of_an_abstention_says_where_the_model_lacks_a_site(word: Any, reason: str, title: str) -> None:
+    assert title in title_of(Verdict(word, reason), TITLES)
