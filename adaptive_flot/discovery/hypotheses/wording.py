@@ -178,11 +178,14 @@ def _hours(duration: float) -> str:
 
 def _cycles(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:
     """What is switched in every period: `is 47 % larger for 8 h of every 24 h, first at 0-28800 s`."""
+    return f"{_while_on(mode, size, unit, sensor)} {cycle_times(effect)}"
+
+
+def _while_on(mode: str, size: float, unit: str, sensor: bool) -> str:
+    """What is switched, while it is on: `is 47 % larger`, `shows 0.3 K less`."""
     if mode == "offset":
-        rest = f"{'shows' if sensor else 'is'} {short(abs(size))}{unit} {'more' if size > 0 else 'less'}"
-    else:
-        rest = f"is {_factor(size)}"
-    return f"{rest} {cycle_times(effect)}"
+        return f"{'shows' if sensor else 'is'} {short(abs(size))}{unit} {'more' if size > 0 else 'less'}"
+    return f"is {_factor(size)}"
 
 
 def _grows(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -> str:
@@ -201,11 +204,7 @@ def _switched(effect: Effect, mode: str, size: float, unit: str, sensor: bool) -
     on = [effect.coefficients[f"on_{k}"] for k in range(1, count + 1)]
     duration = [effect.coefficients[f"for_{k}"] for k in range(1, count + 1)]
     lasting = count == 1 and duration[0] >= FOREVER
-    if mode == "offset":
-        change = f"{short(abs(size))}{unit} {'more' if size > 0 else 'less'}"
-        rest = f"shows {change}" if sensor else f"is {change}"
-    else:
-        rest = f"is {_factor(size)}"
+    rest = _while_on(mode, size, unit, sensor)
     if lasting:
         return f"{rest} from {clock(on[0])} s on"
     if count == 1:  # it may as well have wandered there

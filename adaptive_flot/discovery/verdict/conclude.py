@@ -121,10 +121,8 @@ def _reason(state: State, effects: tuple[NamedEffect, ...], drift: tuple[str, ..
         part = _part_of_record(state.screening.notes)
         where = ""
         if _acts_without_a_site(state):
-            where, said = (
-                f"Something is missing. It is {state.without_a_site}.",
-                f"Free runs do not tell it: {_rest(said)}",
-            )
+            where = f"Something is missing. It is {state.without_a_site}."
+            said = f"Free runs do not tell it: {_rest(said)}"
         late = _looks_like_a_store(state)
         return " ".join(filter(None, (where, said, late, likelier, state.certain, hidden, state.background, part)))
     errors = ", ".join(c.words for c in state.error)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from adaptive_flot.charts.units import exponent, unit_text
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results.evidence import OutputChange
 from adaptive_flot.discovery.results.verdict import Verdict
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -15,6 +15,8 @@ from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.kit.parts import Fact
 from adaptive_flot.report.kit.wording import capital, number, spaced
 
+LACKS_A_SITE = re.compile(r"Something [a-z ]+(\. It is|,) as if ")
+"""How the reason of an abstention begins that says where the model lacks a site."""
 MOST_FACTS = 4
 """Outputs whose errors are told at the top: those whose error fell most, in units of their noise."""
 LEAST_SHARE = 0.01
@@ -30,8 +32,11 @@ WORDS = {
 
 
 def title_of(verdict: Verdict, titles: Mapping[str, str]) -> str:
-    """The title for the word of a verdict; where nothing is told but that the model lacks a site, that."""
-    if verdict.word == "abstain" and NO_SITE in verdict.reason:
+    """The title for the word of a verdict; where a reason begins with what acts without a site, that.
+
+    Not where that is one of several in the text.
+    """
+    if verdict.word == "abstain" and LACKS_A_SITE.match(verdict.reason):
         return "Something acts where the model has no site"
     return capital(titles[verdict.word])
 

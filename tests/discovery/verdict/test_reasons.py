@@ -77,9 +77,24 @@ def test_a_late_sensor_is_said_to_look_like_a_store_before_it(
     ("word", "reason", "title"),
     [
         ("abstain", f"Something is missing. It is as if level lost a share of itself: {NO_SITE}.", "no site"),
+        ("abstain", f"Something differs from the reference, as if level lost a share of itself: {NO_SITE}.", "no site"),
+        ("abstain", f"No change is told: it may be. The nearest: pump; or as if air were less, and {NO_SITE}.", "what"),
         ("abstain", "Something is missing, but the record does not say what.", "does not tell what"),
         ("class", f"One of these: pump; or as if something takes from the balance of level, and {NO_SITE}.", "a few"),
     ],
 )
 def test_the_title_of_an_abstention_says_where_the_model_lacks_a_site(word: Any, reason: str, title: str) -> None:
     assert title in title_of(Verdict(word, reason), TITLES)
+
+
+@pytest.mark.parametrize(("word", "first"), [("abstain", True), ("class", False)])
+def test_an_abstention_begins_with_what_acts_without_a_site_and_a_class_has_it_as_a_note(
+    word: str, first: bool
+) -> None:
+    state: Any = SimpleNamespace(without_a_site="as if water came", judged=SimpleNamespace(word=word))
+    assert conclude._acts_without_a_site(state) == first
+    assert bool(conclude._beside(state)) != first
+    assert conclude._rest("Something is missing, but it is not told: pump by time fits best.").startswith(
+        "pump by time"
+    )
+    assert conclude._rest("Something is missing, and no effect explains it.").startswith("Something is missing")

@@ -112,9 +112,7 @@ def best_of_each(found: Iterable[Explanation]) -> list[Explanation]:
 
 def _period(search: Search, explanation: Explanation, h: Hypothesis) -> float | None:
     """The period of an effect that repeats itself [s]."""
-    if h.kind == "cycle":
-        return h.effect.coefficients["period"]
-    return search.coefficient(explanation, h, "period") if h.kind == "periodic" else None
+    return search.coefficient(explanation, h, "period") if h.kind in ("periodic", "cycle") else None
 
 
 def _at(screening: Screening, site: Site, told: Hypothesis, period: float | None) -> Sequence[Screened]:

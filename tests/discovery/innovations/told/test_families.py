@@ -9,6 +9,7 @@ from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.courses import suspects
 from adaptive_flot.discovery.innovations.in_words import told_in_words
 from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.places.row_by_row import _period
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
@@ -68,6 +69,7 @@ def test_a_lamp_with_a_clock_is_told_with_its_times() -> None:
     assert lamp.effect.coefficients["onset"] == pytest.approx(ON, abs=2 * DT)
     assert lamp.effect.coefficients["duration"] == pytest.approx(FOR, abs=3 * DT)
     assert _values(search, told, "other_heat")["amplitude"] == pytest.approx(LAMP, rel=0.15)
+    assert _period(search, told.best, told.best.hypotheses[0]) == lamp.effect.coefficients["period"]
     assert re.search(r"W more for 2\d\d s of every (699|70\d) s, first at 1\d\d-3\d\d s", words), words
 
 

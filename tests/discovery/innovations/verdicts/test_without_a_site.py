@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from adaptive_flot.discovery.further_sites.places import with_further_sites
+from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses import procedure
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import compare
 from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.places import row_by_row
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
@@ -95,6 +97,13 @@ def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
     assert kept.why.startswith("as if something takes from the balance of salt (")
     begins, ends = (float(t) for t in kept.why.split("(")[1].split(" s)")[0].split("-"))
     assert abs(begins - 2000.0) < 100.0 and abs(ends - 4000.0) < 100.0
+
+
+def test_what_wanders_at_a_place_without_a_site_is_no_event_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    search, base, told = judged(record(2, fresh=6.0))
+    monkeypatch.setattr(row_by_row, "wanders", lambda further, explanation, event, gain: True)
+    kept = unless_without_a_site(search, base, told)
+    assert kept.word == "abstain" and "so that it wanders" in kept.why and NO_SITE not in kept.why
 
 
 @pytest.mark.parametrize("seed", [2, 5])
