@@ -5,6 +5,7 @@ Map
 noise_model.py  How large process and measurement noise are, and which parameters walk.
 step.py         One interval of the extended Kalman filter as one compiled function.
 filter.py       The filter over a whole record: innovations, their variances, the log-likelihood.
+linearised.py   The same for other sizes of the noise, by the derivatives along one run.
 smoother.py     The states and walking parameters given the whole record, with their standard deviations.
 prediction.py   Errors k steps ahead of the filtered state.
 likelihood.py   Parameters and noise by maximum likelihood.

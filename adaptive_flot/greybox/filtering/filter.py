@@ -11,6 +11,7 @@ import numpy as np
 
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.filtering import linearised
 from adaptive_flot.greybox.filtering.noise_model import STUDENT, NoiseModel
 from adaptive_flot.greybox.filtering.step import filter_step, first_correction
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -37,6 +38,8 @@ class Filtered:
         States and walking parameters at each row, corrected by it (N, n), with covariance (N, n, n).
     ahead, F
         Where row k leads before row k + 1 is used (N - 1, n), and the derivative of that map (N - 1, n, n).
+    H
+        Derivative of the outputs predicted for row k + 1 by the state at row k (N - 1, m, n).
     Q
         Variance that process noise adds at the start of each interval (n,).
     """
@@ -48,6 +51,7 @@ class Filtered:
     P: FloatArray
     ahead: FloatArray
     F: FloatArray
+    H: FloatArray
     Q: FloatArray
 
 
@@ -80,6 +84,7 @@ class RecordFilter:
             raise ModelError(f"model '{model.name}': a filter needs a measured output; name at least one")
         self.model, self.dt = model, dt
         self.outputs, self.walking = tuple(outputs), tuple(walking)
+        self._degrees_of_freedom = degrees_of_freedom
         self._first, self._many = model.derived(
             _calls, dt, self.outputs, self.walking, degrees_of_freedom, threading.get_ident()
         )
@@ -106,12 +111,10 @@ class RecordFilter:
         n, rows = len(self.model.states) + len(self.walking), len(record)
         (z, P, predicted, variance, likelihood), each, Q = self._from_first_row(record, noise, z0, P0, p)
         if rows == 1:
-            empty = np.empty((0, n, n))
-            return Filtered(
-                predicted[None], variance[None], likelihood.ravel(), z[None], P[None], np.empty((0, n)), empty, Q
-            )
+            ahead, F, H = np.empty((0, n)), np.empty((0, n, n)), np.empty((0, len(self.outputs), n))
+            return Filtered(predicted[None], variance[None], likelihood.ravel(), z[None], P[None], ahead, F, H, Q)
         joined = self._many({"z": z, "P": P}, each)
-        F = joined["F"].reshape(-1, n, n).transpose(0, 2, 1)  # a matrix comes row by row, transposed
+        F, H = (joined[of].reshape(rows - 1, n, -1).transpose(0, 2, 1) for of in ("F", "H"))  # they come by columns
         return Filtered(
             np.vstack([predicted[None], joined["predicted"]]),
             np.vstack([variance[None], joined["variance"]]),
@@ -120,6 +123,7 @@ class RecordFilter:
             np.concatenate([P[None], joined["P_next"].reshape(-1, n, n)]),
             joined["ahead"],
             F,
+            H,
             Q,
         )
 
@@ -131,6 +135,32 @@ class RecordFilter:
             with suppress(CompileError):  # without the library for several they are run one by one
                 return self._side_by_side(self._many, record, cases)
         return np.array([self.run(record, *case).log_likelihood for case in cases]).reshape(-1, len(record))
+
+    def log_likelihoods_near(
+        self, run: Filtered, record: Dataset, cases: Sequence[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]]
+    ) -> FloatArray:
+        """The same (cases, N) for other noise than that of a run at the same parameters, by the derivatives along it.
+
+        Nothing is integrated, see `filtering.linearised`.
+        """
+        starts, noises, found = [], [], np.empty((len(cases), len(record)))
+        for i, case in enumerate(cases):
+            (z, P, _, _, likelihood), each, Q = self._from_first_row(record, *case)
+            starts.append((z - run.z[0], P))
+            noises.append((Q, each["r"]))
+            found[i, 0] = likelihood.item()
+        if cases and len(record) > 1:
+            y = record.outputs[1:, list(self.outputs)]
+            there = np.isfinite(y)
+            along = {
+                "F": linearised.by_columns(run.F),
+                "H": linearised.by_columns(run.H),
+                "error": np.where(there, y - run.predicted[1:], 0.0),
+                "shift": run.z[1:] - run.ahead,
+                "there": there.astype(float),
+            }
+            found[:, 1:] = linearised.log_likelihoods(along, starts, noises, self._degrees_of_freedom)
+        return found
 
     def _side_by_side(
         self,

@@ -33,8 +33,8 @@ def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequen
     -------
     casadi.Function
         ``(z (n,), P (n, n), t, u (nu,), p (np,), Q (n,), r (m,), y (m,), there (m,)) -> (z_next, P_next, ahead (n,),
-        F (n, n), predicted (m,), variance (m,), log_likelihood)``. `ahead` is f(z), before the sample was used;
-        predicted and variance are those of each output before its correction by any.
+        F (n, n), H (m, n), predicted (m,), variance (m,), log_likelihood)``. `ahead` is f(z), before the sample was
+        used; predicted and variance are those of each output before its correction by any.
     """
     jacobians = Stepper(model, dt).one_step_jacobians(list(walking))
     _, t, u, p = jacobians.sx_in()
@@ -58,10 +58,10 @@ def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequen
     carried = (carried + carried.T) / 2
     names = (
         ["z", "P", "t", "u", "p", "Q", "r", "y", "there"],
-        ["z_next", "P_next", "ahead", "F", "predicted", "variance", "log_likelihood"],
+        ["z_next", "P_next", "ahead", "F", "H", "predicted", "variance", "log_likelihood"],
     )
     ahead = ca.vertcat(x_next, walked)
-    results = [after, carried, ahead, ca.densify(F), predicted, variance, likelihood]
+    results = [after, carried, ahead, ca.densify(F), ca.densify(H), predicted, variance, likelihood]
     return ca.Function("filter_step", [z, P, t, u, p, Q, r, y, there], results, *names)
 
 

@@ -12,6 +12,7 @@ Trans. Automatic Control* 21 (1976) 108, on jumps; Basseville & Nikiforov, *Dete
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -24,7 +25,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.linear_run import linear_run
-from adaptive_flot.greybox.stepping.recursion import row_by_row
+from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
 from adaptive_flot.greybox.stepping.stepper import Stepper
 
 CLIP = 100.0
@@ -64,7 +65,7 @@ class ResponseFunctions:
         self.extended = model.with_effects(effects) if effects else model
         self.filter = RecordFilter(self.extended, dt, columns, (), degrees_of_freedom)
         self.wrt = (*(e.parameter(e.terms[0].name) for e in effects), *constants)
-        self._each_row = row_by_row(Stepper(self.extended, dt).one_step_jacobians(list(self.wrt)), {}, ("p",))
+        self._each_row = self.extended.derived(_jacobians_row_by_row, dt, self.wrt, threading.get_ident())
         self.degrees_of_freedom = degrees_of_freedom
 
     def at(
@@ -85,7 +86,12 @@ class ResponseFunctions:
         """
         values = self.extended.parameter_values
         values[: len(p)] = p
-        filtered = self.filter.run(record, noise, *start, values)
+        return self.along(record, noise, p, self.filter.run(record, noise, *start, values))
+
+    def along(self, record: Dataset, noise: NoiseModel, p: FloatArray, filtered: Filtered) -> LinearResponse:
+        """The derivatives along a run of the filter with this noise and these parameters (np,)."""
+        values = self.extended.parameter_values
+        values[: len(p)] = p
         return LinearResponse(self, record, noise, p, filtered, self._jacobians(record, filtered, values))
 
     def _jacobians(self, record: Dataset, filtered: Filtered, p: FloatArray) -> Jacobians:
@@ -199,6 +205,12 @@ class LinearResponse:
 def weight_of(square: FloatArray, nu: float) -> FloatArray:
     """Weight of innovations by squared distance, as in the filter (`greybox.filtering.step`); 1 for the Gaussian."""
     return np.ones_like(square) if np.isinf(nu) else (nu + 1) / (nu + square)
+
+
+def _jacobians_row_by_row(model: Model, dt: float, wrt: tuple[str, ...], thread: int) -> RowByRow:
+    """Derivatives of one step, with the working memory of one thread; folds of a record ask for the same."""
+    del thread
+    return row_by_row(Stepper(model, dt).one_step_jacobians(list(wrt)), {}, ("p",))
 
 
 def _probe(model: Model, site: str) -> Effect:

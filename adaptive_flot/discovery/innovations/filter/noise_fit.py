@@ -36,6 +36,14 @@ ENOUGH = 0.3
 """Gain of a step that does not count."""
 FLAT, TINY = 1e-3, 1e-9
 """Least curvature that counts, as a share of the largest, and in itself."""
+PROMISED = 0.05
+"""Gain by costs that are nearly right that is not tried."""
+COURSES = 4
+"""Most runs along whose courses a search looks before it looks without them."""
+BETWEEN = (1.0, 0.6, 0.3, 0.1)
+"""Shares of the way to what a search along a course has found that are tried."""
+KEPT_PROMISE = 0.25
+"""Share of a promised gain that is enough."""
 Costs = Callable[[Sequence[tuple[float, float]]], Sequence[float]]
 Point = tuple[float, float]
 """Logarithms of theta and rho."""
@@ -99,7 +107,62 @@ def search_noise(
         search.least_of([at, *(at + NEAR * STENCIL)])
         middle = search.least_of(search.steps_from(at))
         gain = before - search.seen[middle]
-    return (float(np.exp(middle[0])), float(np.exp(middle[1]))), search.seen[middle]
+    return _sizes(middle), search.seen[middle]
+
+
+def search_noise_along(
+    costs: Costs,
+    along: Callable[[tuple[float, float]], Costs],
+    start: tuple[float, float] | None = None,
+    cost: float | None = None,
+    *,
+    near: bool = False,
+) -> tuple[tuple[float, float], float]:
+    """The same, by costs that are right at one pair and nearly right elsewhere, and take little time.
+
+    What these find is tried, and looked from again, until it gains nothing that counts. Where they promise a gain that
+    is not there, the search goes on without them: so none ends above where it began.
+
+    Parameters
+    ----------
+    costs, start, cost, near
+        As `search_noise` has them.
+    along
+        The costs that are right at a pair.
+
+    Returns
+    -------
+    tuple
+        The pair, and its cost.
+    """
+    if start is None or cost is None:
+        first = _Search(costs)
+        middle = first.least_of(np.log(list(product(THETAS, RHOS))) if start is None else [np.log(start)])
+        start, cost = _sizes(middle), first.seen[middle]
+    for _ in range(COURSES):
+        found, promised = search_noise(along(start), start, cost, near=near)
+        if promised > cost - PROMISED:
+            return start, cost
+        begin, before, least = start, cost, cost - (cost - promised) * KEPT_PROMISE
+        way = np.log(found) - np.log(begin)
+        for shares in (BETWEEN[:1], BETWEEN[1:]):  # mostly the first
+            tried = [_sizes(np.log(begin) + share * way) for share in shares]
+            values = list(costs(tried))
+            if min(values) < cost:
+                start, cost = tried[int(np.argmin(values))], min(values)
+            if cost <= least:
+                break
+        else:
+            return search_noise(costs, start, cost, near=near)
+        if before - cost < ENOUGH:
+            break
+        near = True
+    return start, cost
+
+
+def _sizes(point: ArrayLike) -> tuple[float, float]:
+    theta, rho = np.exp(point).tolist()
+    return theta, rho
 
 
 def _all_over(middle: Point) -> list[Point]:

@@ -17,7 +17,7 @@ from scipy.stats import t as student_t
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
 from adaptive_flot.discovery.innovations.filter.linear_response import LinearResponse, ResponseFunctions, weight_of
-from adaptive_flot.discovery.innovations.filter.noise_fit import Costs, noise_of, search_noise
+from adaptive_flot.discovery.innovations.filter.noise_fit import Costs, noise_of, search_noise_along
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel
 from adaptive_flot.greybox.filtering.likelihood import first_state
@@ -39,6 +39,8 @@ UNSURE = 3.0
 HOPELESS = 1e12
 STRETCHES = 5
 """Stretches of a record that are compared for the covariance of a parameter."""
+KEPT = 3
+"""Runs of the filter that are kept."""
 DIFFERENCE = 0.05
 """Width of a difference of the cost, in standard deviations of a parameter."""
 
@@ -57,6 +59,8 @@ class Refit:
         What the filter makes of the record.
     log_likelihood
         Over the rows that fitted, and less the priors.
+    at_rest
+        Whether its last step gained nothing that counts.
     """
 
     p: FloatArray
@@ -64,6 +68,7 @@ class Refit:
     size: tuple[float, float]
     filtered: Filtered
     log_likelihood: float
+    at_rest: bool = True
 
     @property
     def rows(self) -> FloatArray:
@@ -117,6 +122,7 @@ class Refitter:
         self._lower, self._upper = (np.array([getattr(q, end) for q in chosen]) for end in ("lower", "upper"))
         self._constants = [self.free.index(n) for n in known.names] if known is not None else []
         self._root = np.linalg.inv(known.root) if known is not None else np.empty((0, 0))
+        self._runs: dict[tuple[bytes, tuple[float, float]], Filtered] = {}
 
     def start(self, noise: NoiseModel, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """State and covariance before the first row."""
@@ -127,32 +133,34 @@ class Refitter:
         """Noise of a size."""
         return noise_of(self.model, self.floor, self.columns, self.record.dt, *size, self.degrees_of_freedom)
 
-    def fit(self, p: FloatArray, size: tuple[float, float] | None = None, *, hold_noise: bool = False) -> Refit:
+    def fit(
+        self,
+        p: FloatArray,
+        size: tuple[float, float] | None = None,
+        *,
+        hold_noise: bool = False,
+        iterations: int = ITERATIONS,
+    ) -> Refit:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
         p = self._in_range(p)
         first = p[self._where].copy()
         if size is None or not hold_noise:
-            size, best = search_noise(self._costs_of_noise(p, first), size)
+            size, best = self._search_noise(p, first, size)
         else:
             best = self._cost(p, size, first)
-        for i in range(ITERATIONS if self.free else 0):
-            q, value = self._moved(p, size, first, best)
-            gain = best - value
-            p, best = q, value
-            if hold_noise and gain < ENOUGH:
-                break
-            if not hold_noise and (gain < LARGE or i % 2):
-                improved = 0.0
+        at_rest = not self.free
+        for i in range(iterations if self.free else 0):
+            before = best
+            p, best = self._moved(p, size, first, best)
+            if not hold_noise and (before - best < LARGE or i % 2):
                 for near in (True, False):  # all over again only where all else has come to rest
-                    again, value = search_noise(self._costs_of_noise(p, first), size, best, near=near)
-                    if value < best:
-                        improved, size, best = improved + best - value, again, value
-                    if gain >= ENOUGH or improved >= ENOUGH:
+                    size, best = self._search_noise(p, first, size, best, near=near)
+                    if before - best >= ENOUGH:
                         break
-                else:
-                    break
-        noise = self.noise(size)
-        return Refit(p, noise, size, self.run(p, noise), -best)
+            at_rest = before - best < ENOUGH
+            if at_rest:
+                break
+        return Refit(p, self.noise(size), size, self._run_at(p, size), -best, at_rest)
 
     def costs(self, points: FloatArray, size: tuple[float, float]) -> FloatArray:
         """Costs (k,) at several parameters (k, np), each in range, with factors of the noise."""
@@ -168,9 +176,8 @@ class Refitter:
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
         first = p[self._where].copy()
-        size, cost = search_noise(self._costs_of_noise(p, first))
-        noise = self.noise(size)
-        return Refit(p.copy(), noise, size, self.run(p, noise), -cost)
+        size, cost = self._search_noise(p, first)
+        return Refit(p.copy(), self.noise(size), size, self._run_at(p, size), -cost)
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
         """How the innovations of a fit, of a Gaussian filter, answer at sites, with the free parameters beside.
@@ -189,23 +196,65 @@ class Refitter:
         with np.errstate(all="ignore"):
             return self._filter.run(self.record, noise, *self.start(noise, p), p)
 
+    def _run_at(self, p: FloatArray, size: tuple[float, float]) -> Filtered:
+        """The filter over the record; the last few runs are kept, as a step begins where the one before was tried."""
+        key = p.tobytes(), size
+        if key not in self._runs:
+            while len(self._runs) >= KEPT:
+                del self._runs[next(iter(self._runs))]
+            self._runs[key] = self.run(p, self.noise(size))
+        return self._runs[key]
+
     def _cost(self, p: FloatArray, size: tuple[float, float], first: FloatArray) -> float:
-        return self._costs([(p, size)], first)[0]
+        return self._totals(self._run_at(p, size).log_likelihood[None], [p], first)[0]
 
     def _costs(self, points: Sequence[tuple[FloatArray, tuple[float, float]]], first: FloatArray) -> list[float]:
         """Costs at several parameters and sizes of the noise, whose filters run side by side."""
-        cases = [(noise := self.noise(size), *self.start(noise, p), p) for p, size in points]
         with np.errstate(all="ignore"):
-            rows = self._filter.log_likelihoods(self.record, cases)[:, self.counted]
+            rows = self._filter.log_likelihoods(self.record, self._cases(points))
+        return self._totals(rows, [p for p, _ in points], first)
+
+    def _cases(
+        self, points: Sequence[tuple[FloatArray, tuple[float, float]]]
+    ) -> list[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]]:
+        return [(noise := self.noise(size), *self.start(noise, p), p) for p, size in points]
+
+    def _totals(self, rows: FloatArray, points: Sequence[FloatArray], first: FloatArray) -> list[float]:
+        """Costs of parameters (np,) by the log-likelihoods of all rows (k, N)."""
         totals = [
             -float(own.sum()) + float(np.sum(self._prior(p[self._where], first) ** 2)) / 2
-            for own, (p, _) in zip(rows, points, strict=True)
+            for own, p in zip(rows[:, self.counted], points, strict=True)
         ]
         return [total if np.isfinite(total) else HOPELESS for total in totals]
 
-    def _costs_of_noise(self, p: FloatArray, first: FloatArray) -> Costs:
-        """The costs of sizes of the noise at some parameters."""
-        return lambda sizes: self._costs([(p, size) for size in sizes], first)
+    def _search_noise(
+        self,
+        p: FloatArray,
+        first: FloatArray,
+        size: tuple[float, float] | None = None,
+        best: float | None = None,
+        *,
+        near: bool = False,
+    ) -> tuple[tuple[float, float], float]:
+        """The size of the noise of least cost at some parameters, and that cost; from a size and its cost."""
+
+        def along(middle: tuple[float, float]) -> Costs:
+            run = self._run_at(p, middle)
+
+            def costs(sizes: Sequence[tuple[float, float]]) -> list[float]:
+                points = [(p, size) for size in sizes]
+                with np.errstate(all="ignore"):
+                    rows = self._filter.log_likelihoods_near(run, self.record, self._cases(points))
+                return self._totals(rows, [p] * len(sizes), first)
+
+            return costs
+
+        def costs(sizes: Sequence[tuple[float, float]]) -> list[float]:
+            if len(sizes) == 1:  # the course of the next search
+                return [self._cost(p, sizes[0], first)]
+            return self._costs([(p, each) for each in sizes], first)
+
+        return search_noise_along(costs, along, size, best, near=near)
 
     def _prior(self, x: FloatArray, first: FloatArray) -> FloatArray:
         """Distances from what is known before, in standard deviations (q + c,)."""
@@ -240,41 +289,49 @@ class Refitter:
         """Parameters after one step, and their cost; where none is better, those from before.
 
         The gain moves with the parameters, so that a step at the present gain may lead up: a late sensor beside process
-        noise is such a case. Then the slopes of the cost itself show the way.
+        noise is such a case. Then the slopes of the cost itself show the way, too.
         """
         A, b = self._normal_equations(p, size, first)
-        for of_the_cost in (False, True):
-            if of_the_cost and np.isfinite(A).all() and np.isfinite(b).all():
-                b = -self._slopes(p, size, first, np.sqrt(np.diag(A)))
-            step = self._step(p, A, b)
-            # mostly the whole step is the best, but not where the gain has led up
-            for shares in (SHARES,) if of_the_cost else (SHARES[:1], SHARES[1:]):
-                tried = [p.copy() for _ in shares]
-                for q, share in zip(tried, shares, strict=True):
-                    q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
-                values = self._costs([(q, size) for q in tried], first)
-                better = [(q, value) for q, value in zip(tried, values, strict=True) if value < best]
-                if better:
-                    return better[0]
-        return p, best
+        if not (np.isfinite(A).all() and np.isfinite(b).all()):
+            return p, best
+        step = self._step(p, A, b)
+        (whole,) = self._stepped(p, step, SHARES[:1])
+        value = self._cost(whole, size, first)  # mostly the best; the next step needs all of its run
+        if value < best:
+            return whole, value
+        by_slopes = self._step(p, A, -self._slopes(p, size, first, best, A))
+        tried = [*self._stepped(p, step, SHARES[1:]), *self._stepped(p, by_slopes, SHARES)]
+        values = self._costs([(q, size) for q in tried], first)
+        least = int(np.argmin(values))
+        return (tried[least], values[least]) if values[least] < best else (p, best)
 
-    def _slopes(self, p: FloatArray, size: tuple[float, float], first: FloatArray, root: FloatArray) -> FloatArray:
-        """Slopes of the cost along the free parameters, in their scales (q,), by central differences.
+    def _stepped(self, p: FloatArray, step: FloatArray, shares: Sequence[float]) -> list[FloatArray]:
+        """Parameters (np,) after shares of a step of the free ones (q,), each in its range."""
+        tried = [p.copy() for _ in shares]
+        for q, share in zip(tried, shares, strict=True):
+            q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
+        return tried
 
-        A difference is a share (DIFFERENCE) of what the normal equations, with diagonal root^2, take for one standard
-        deviation.
+    def _slopes(
+        self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float, A: FloatArray
+    ) -> FloatArray:
+        """Slopes of the cost along the free parameters, in their scales (q,), by differences to one side.
+
+        With the curvature that the normal equations A have, from the cost `best` at p::
+
+            slope = (cost(p + d) - best) / d - A d / 2
+
+        A difference d is a share (DIFFERENCE) of what these take for one standard deviation.
         """
-        away = DIFFERENCE / root * self._scale
-        low, high = (np.clip(p[self._where] + side * away, self._lower, self._upper) for side in (-1.0, 1.0))
-        points = []
-        for k, *ends in zip(self._where, low, high, strict=True):
-            for end in ends:
-                q = p.copy()
-                q[k] = end
-                points.append((q, size))
-        below, above = np.array(self._costs(points, first)).reshape(-1, 2).T
-        told = (np.maximum(below, above) < HOPELESS) & (high > low)
-        slopes: FloatArray = np.where(told, (above - below) / np.where(told, high - low, 1.0) * self._scale, 0.0)
+        away = DIFFERENCE / np.sqrt(np.diag(A))
+        x = p[self._where]
+        away = np.where(x + away * self._scale > self._upper, -away, away)
+        points = np.tile(p, (len(x), 1))
+        points[np.arange(len(x)), self._where] = x + away * self._scale
+        inside = self._in_range(points)
+        values = np.array(self._costs([(q, size) for q in inside], first))
+        told = (values < HOPELESS) & (inside == points).all(axis=1)
+        slopes: FloatArray = np.where(told, (values - best) / away - np.diag(A) * away / 2, 0.0)
         return slopes
 
     def covariance(self, fit: Refit) -> FloatArray:
@@ -309,7 +366,7 @@ class Refitter:
     ) -> tuple[FloatArray, FloatArray]:
         """Normal equations (A, b) of a step, in scales of the free parameters."""
         noise = self.noise(size)
-        L = self._functions.at(self.record, noise, p, self.start(noise, p))
+        L = self._functions.along(self.record, noise, p, self._run_at(p, size))
         counts = np.repeat(self.counted[1:], len(self.columns))
         w = counts * weight_of(L.innovations**2, self.degrees_of_freedom)
         J, x = L.by_constants * self._scale, p[self._where]
