@@ -16,6 +16,7 @@ from scipy.stats import t as student_t
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, at_rest
 from adaptive_flot.discovery.hypotheses.joint.rows import BoolArray
+from adaptive_flot.discovery.innovations.filter.free_parameters import LOOSE, FreeParameters
 from adaptive_flot.discovery.innovations.filter.linear_response import LinearResponse, ResponseFunctions, weight_of
 from adaptive_flot.discovery.innovations.filter.noise_fit import Costs, noise_of, search_noise_along
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -30,8 +31,6 @@ SHARES = (1.0, 0.5, 0.2, 0.05)
 """Shares of a step that are tried in turn."""
 ENOUGH, LARGE = 0.05, 5.0
 """Gain below which a fit is where it stays, and below which the noise is searched for again."""
-LOOSE = 30.0
-"""Standard deviation of the prior of a free parameter about its start, in its scales."""
 OUTLIER, USUAL = 5.0, 3.0
 """Standard deviations of an innovation beyond which it is an outlier where those beside it are at most usual."""
 UNSURE = 3.0
@@ -116,12 +115,8 @@ class Refitter:
         self.counted = np.ones(len(record), dtype=bool) if counted is None else counted
         self._functions = ResponseFunctions(model, record.dt, columns, (), free, degrees_of_freedom)
         self._filter = self._functions.filter
-        self._where = list(model.indices("parameters", free))
-        chosen = [model.parameters[i] for i in self._where]
-        self._scale = np.array([q.scale or abs(q.value) or 1.0 for q in chosen])
-        self._lower, self._upper = (np.array([getattr(q, end) for q in chosen]) for end in ("lower", "upper"))
-        self._constants = [self.free.index(n) for n in known.names] if known is not None else []
-        self._root = np.linalg.inv(known.root) if known is not None else np.empty((0, 0))
+        self.space = FreeParameters(model, free, known)
+        self._where, self._scale = self.space.where, self.space.scale
         self._runs: dict[tuple[bytes, tuple[float, float]], Filtered] = {}
 
     def start(self, noise: NoiseModel, p: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -142,7 +137,7 @@ class Refitter:
         iterations: int = ITERATIONS,
     ) -> Refit:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
-        p = self._in_range(p)
+        p = self.space.inside(p)
         first = p[self._where].copy()
         if size is None or not hold_noise:
             size, best = self._search_noise(p, first, size)
@@ -164,14 +159,8 @@ class Refitter:
 
     def costs(self, points: FloatArray, size: tuple[float, float]) -> FloatArray:
         """Costs (k,) at several parameters (k, np), each in range, with factors of the noise."""
-        inside = self._in_range(points)
+        inside = self.space.inside(points)
         return np.array(self._costs([(p, size) for p in inside], inside[0, self._where]))
-
-    def _in_range(self, p: FloatArray) -> FloatArray:
-        """Parameters (..., np), the free ones each within its range."""
-        inside = p.copy()
-        inside[..., self._where] = np.clip(p[..., self._where], self._lower, self._upper)
-        return inside
 
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
@@ -222,7 +211,7 @@ class Refitter:
     def _totals(self, rows: FloatArray, points: Sequence[FloatArray], first: FloatArray) -> list[float]:
         """Costs of parameters (np,) by the log-likelihoods of all rows (k, N)."""
         totals = [
-            -float(own.sum()) + float(np.sum(self._prior(p[self._where], first) ** 2)) / 2
+            -float(own.sum()) + float(np.sum(self.space.prior(p[self._where], first) ** 2)) / 2
             for own, p in zip(rows[:, self.counted], points, strict=True)
         ]
         return [total if np.isfinite(total) else HOPELESS for total in totals]
@@ -256,33 +245,6 @@ class Refitter:
 
         return search_noise_along(costs, along, size, best, near=near)
 
-    def _prior(self, x: FloatArray, first: FloatArray) -> FloatArray:
-        """Distances from what is known before, in standard deviations (q + c,)."""
-        loose = (x - first) / (self._scale * LOOSE)
-        if self.known is None:
-            return loose
-        told: FloatArray = self._root @ self.known.distances(x[self._constants])
-        return np.concatenate([loose, told])
-
-    def known_rows(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What is known before of the constants as further rows of a regression on innovations, at parameters (np,).
-
-        With the covariance S of what is known, the distances d(p) from its mean (see `Constants`), and L L' = S::
-
-            0 = L^-1 d(p) + L^-1 d'(p) dp
-
-        Returns
-        -------
-        tuple
-            L^-1 d' by the free parameters (c, q), and -L^-1 d (c,); no rows where nothing is known.
-        """
-        rows = np.zeros((len(self._root), len(self.free)))
-        if self.known is None:
-            return rows, np.empty(0)
-        now = p[self._where][self._constants]
-        rows[:, self._constants] = self._root * self.known.slopes(now)
-        return rows, -self._root @ self.known.distances(now)
-
     def _moved(
         self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float
     ) -> tuple[FloatArray, float]:
@@ -294,23 +256,16 @@ class Refitter:
         A, b = self._normal_equations(p, size, first)
         if not (np.isfinite(A).all() and np.isfinite(b).all()):
             return p, best
-        step = self._step(p, A, b)
-        (whole,) = self._stepped(p, step, SHARES[:1])
+        step = self.space.step(p, A, b)
+        (whole,) = self.space.stepped(p, step, SHARES[:1])
         value = self._cost(whole, size, first)  # mostly the best; the next step needs all of its run
         if value < best:
             return whole, value
-        by_slopes = self._step(p, A, -self._slopes(p, size, first, best, A))
-        tried = [*self._stepped(p, step, SHARES[1:]), *self._stepped(p, by_slopes, SHARES)]
+        by_slopes = self.space.step(p, A, -self._slopes(p, size, first, best, A))
+        tried = [*self.space.stepped(p, step, SHARES[1:]), *self.space.stepped(p, by_slopes, SHARES)]
         values = self._costs([(q, size) for q in tried], first)
         least = int(np.argmin(values))
         return (tried[least], values[least]) if values[least] < best else (p, best)
-
-    def _stepped(self, p: FloatArray, step: FloatArray, shares: Sequence[float]) -> list[FloatArray]:
-        """Parameters (np,) after shares of a step of the free ones (q,), each in its range."""
-        tried = [p.copy() for _ in shares]
-        for q, share in zip(tried, shares, strict=True):
-            q[self._where] = np.clip(p[self._where] + share * step, self._lower, self._upper)
-        return tried
 
     def _slopes(
         self, p: FloatArray, size: tuple[float, float], first: FloatArray, best: float, A: FloatArray
@@ -325,10 +280,10 @@ class Refitter:
         """
         away = DIFFERENCE / np.sqrt(np.diag(A))
         x = p[self._where]
-        away = np.where(x + away * self._scale > self._upper, -away, away)
+        away = np.where(x + away * self._scale > self.space.upper, -away, away)
         points = np.tile(p, (len(x), 1))
         points[np.arange(len(x)), self._where] = x + away * self._scale
-        inside = self._in_range(points)
+        inside = self.space.inside(points)
         values = np.array(self._costs([(q, size) for q in inside], first))
         told = (values < HOPELESS) & (inside == points).all(axis=1)
         slopes: FloatArray = np.where(told, (values - best) / away - np.diag(A) * away / 2, 0.0)
@@ -370,31 +325,9 @@ class Refitter:
         counts = np.repeat(self.counted[1:], len(self.columns))
         w = counts * weight_of(L.innovations**2, self.degrees_of_freedom)
         J, x = L.by_constants * self._scale, p[self._where]
-        prior = self._prior(x, first)
-        D = np.eye(len(x)) / LOOSE
-        if self.known is not None:
-            told = np.zeros((len(self.known.names), len(x)))
-            slopes = self.known.slopes(x[self._constants])
-            told[:, self._constants] = self._root * slopes * self._scale[self._constants]
-            D = np.vstack([D, told])
+        prior = self.space.prior(x, first)
+        D = np.vstack([np.eye(len(x)) / LOOSE, self.space.known_rows(p)[0] * self._scale])
         return (J * w[:, None]).T @ J + D.T @ D, (J * w[:, None]).T @ L.innovations - D.T @ prior
-
-    def _step(self, p: FloatArray, A: FloatArray, b: FloatArray) -> FloatArray:
-        """One step of Gauss and Newton by normal equations in scales; an unknown that would leave its range is held."""
-        x = p[self._where]
-        held = np.zeros(len(x), dtype=bool)
-        if not (np.isfinite(A).all() and np.isfinite(b).all()):
-            return held.astype(float)
-        while True:
-            move = np.zeros(len(x))
-            free = ~held
-            move[free] = np.linalg.lstsq(A[np.ix_(free, free)], b[free], rcond=1e-12)[0]
-            out = x + move * self._scale
-            beyond = free & (((out < self._lower) & (x <= self._lower)) | ((out > self._upper) & (x >= self._upper)))
-            if not beyond.any():
-                moved: FloatArray = move * self._scale
-                return moved
-            held |= beyond
 
 
 def single_outliers(innovation: FloatArray, variance: FloatArray) -> BoolArray:

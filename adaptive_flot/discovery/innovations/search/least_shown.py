@@ -60,7 +60,7 @@ def least_shown(fitter: Refitter, fit: Refit) -> tuple[LeastShown, ...]:
     """
     model = fitter.model
     response = fitter.response(fit, [s.name for s in model.sites])
-    slopes, _ = fitter.known_rows(fit.p)
+    slopes, _ = fitter.space.known_rows(fit.p)
     constants = np.vstack([response.by_constants, slopes])
     n = max(int(np.count_nonzero(response.innovations)), 2)
     reach = np.sqrt(2 * (LEAST_GAIN + np.log(n))) + norm.ppf(POWER)

@@ -153,7 +153,7 @@ class Search:
         """The regressions on an explanation, of changes at some sites."""
         model = self.model_of(start)
         fitter = self.fitter(model, start.free)
-        return Screening(model, fitter.response(start.fit, sites), fitter.known_rows(start.fit.p))
+        return Screening(model, fitter.response(start.fit, sites), fitter.space.known_rows(start.fit.p))
 
     def settled(self, explanation: Explanation) -> Explanation:
         """The same, its switch placed anew beside the other effects, where that is better."""

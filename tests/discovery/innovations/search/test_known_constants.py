@@ -42,7 +42,7 @@ def test_known_rows_are_the_prior_of_the_refit() -> None:
     """Half the sum of squares of the rows, at any step from the fit, is what the refit's cost adds for the prior."""
     _, base, search = _gains(1 / 1.5, 0.05)
     fitter = search.fitter(search.model, ())
-    slopes, told = fitter.known_rows(base.fit.p)
+    slopes, told = fitter.space.known_rows(base.fit.p)
     step = np.array([0.1, -20.0])
     p = base.fit.p.copy()
     p[list(search.model.indices("parameters", NAMES))] += step
