@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.further_sites.places import with_further_sites
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses import procedure
@@ -23,6 +24,8 @@ from adaptive_flot.discovery.innovations.places.row_by_row import unless_without
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.verdicts import second_opinion
+from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
@@ -195,3 +198,18 @@ def test_what_would_be_too_large_a_class_is_told_in_a_note(monkeypatch: pytest.M
     (note,) = (n for n in found.notes if n.startswith(f"With process noise {why}."))
     assert found.word == "abstain" and not found.effects
     assert "Probe is " in note or "Probe shows " in note
+
+
+def test_an_event_that_a_rule_takes_back_is_said_where_the_model_has_no_site(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The whole program, and a rule that takes back whatever is told of the parts."""
+
+    def taken_back(state: State, search: Search, base: Explanation, told: Told) -> Told:
+        return replace(told, word="abstain", certain=(), open=(), why="a rule says so")
+
+    monkeypatch.setattr(second_opinion, "_by_the_rules", taken_back)
+    verdict = discover(basin(), record(2, fresh=6.0), processes=1).verdict
+    assert verdict.word == "abstain" and not verdict.effects
+    assert re.search(
+        r"It is as if something takes from the balance of salt \((19\d\d|20\d\d)-\d+ s\)[^:]*: the model has no site for",
+        verdict.reason,
+    ), verdict.reason
