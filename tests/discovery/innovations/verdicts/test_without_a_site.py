@@ -210,6 +210,6 @@ def test_an_event_that_a_rule_takes_back_is_said_where_the_model_has_no_site(mon
     verdict = discover(basin(), record(2, fresh=6.0), processes=1).verdict
     assert verdict.word == "abstain" and not verdict.effects
     assert re.search(
-        r"It is as if something takes from the balance of salt \((19\d\d|20\d\d)-\d+ s\)[^:]*: the model has no site for",
+        r"It is as if something takes from the balance of salt \((19\d\d|20\d\d)-\d+ s\)[^:]*: the model has no site",
         verdict.reason,
     ), verdict.reason
