@@ -34,6 +34,8 @@ SHARES = (1.0, 0.5, 0.25, 2.0)
 """Shares of a step that are tried."""
 ENOUGH = 0.3
 """Gain of a step that does not count."""
+LITTLE = 0.02
+"""Gain that a step promises below which it is not tried."""
 FLAT, TINY = 1e-3, 1e-9
 """Least curvature that counts, as a share of the largest, and in itself."""
 PROMISED = 0.05
@@ -104,8 +106,10 @@ def search_noise(
         elif gain < ENOUGH:
             break
         before, at = search.seen[middle], search.off_the_ends(middle)
-        search.least_of([at, *(at + NEAR * STENCIL)])
-        middle = search.least_of(search.steps_from(at))
+        middle = search.least_of([at, *(at + NEAR * STENCIL)])
+        steps, promised = search.steps_from(at)
+        if promised >= LITTLE:
+            middle = search.least_of(steps)
         gain = before - search.seen[middle]
     return _sizes(middle), search.seen[middle]
 
@@ -197,8 +201,8 @@ class _Search:
             self.seen.update(zip(new, found, strict=True))
         return min(self.seen, key=self.seen.__getitem__)
 
-    def steps_from(self, at: FloatArray) -> list[FloatArray]:
-        """Where steps of Newton from a point may lead, from the differences about it."""
+    def steps_from(self, at: FloatArray) -> tuple[list[FloatArray], float]:
+        """Where steps of Newton from a point may lead, from the differences about it, and what a whole one promises."""
         east, west, north, south, both, neither = (self.seen[self.inside(at + NEAR * move)] for move in STENCIL)
         middle = self.seen[self.inside(at)]
         slope = np.array([east - west, north - south]) / 2
@@ -209,4 +213,5 @@ class _Search:
         parts = directions * np.clip(-(directions.T @ slope) / size, -LONGEST, LONGEST)
         alone = np.diag(np.clip(-slope / np.maximum(np.abs(np.diag(bends)), TINY), -LONGEST, LONGEST))
         whole = parts.sum(axis=1)
-        return [at + NEAR * move for move in (*(share * whole for share in SHARES), *parts.T, *alone)]
+        promised = float(np.sum((directions.T @ slope) ** 2 / size)) / 2
+        return [at + NEAR * move for move in (*(share * whole for share in SHARES), *parts.T, *alone)], promised
