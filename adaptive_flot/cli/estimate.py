@@ -45,6 +45,7 @@ def estimate(
     ] = None,
     save_cell: Annotated[Path | None, typer.Option(help="Write the fitted parameters as a cell file.")] = None,
     save_model: Annotated[Path | None, typer.Option(help="Write the fitted model as a model file (YAML).")] = None,
+    report: Annotated[bool, typer.Option(help="Draw the report page too; a batch of records may do without.")] = True,
     out: Out = None,
     json: Json = None,
     compile_: Compile = False,
@@ -72,7 +73,7 @@ def estimate(
         raise CellError(f"--save-cell: model {model!r} has no cell file; use --save-model")
     names = once(estimator) or list(OF_A_RECORD)
     folder = results_folder(out, data.stem, "estimate")
-    files = [*map(replay_file, names), SMOOTHED, "summary.json", "report.html"]
+    files = [*map(replay_file, names), SMOOTHED, "summary.json", *(["report.html"] if report else [])]
     check_targets(
         [data, map_, *model_inputs(model, cell, data.parent, names)],
         [*in_folder(folder, *files), ("--json", json), ("--save-cell", save_cell), ("--save-model", save_model)],
@@ -84,10 +85,11 @@ def estimate(
             blocks, made, estimators=names, fit=fit or (), outputs=output or (), folder=data.parent,
             innovations=innovations, progress=advance,
         )  # fmt: skip
-    from adaptive_flot.report.estimate.page import estimate_report
+    page = ""
+    if report:
+        from adaptive_flot.report.estimate.page import estimate_report
 
-    read = [data, *([map_] if map_ is not None else [])]
-    page = estimate_report(result, command_line(), read)
+        page = estimate_report(result, command_line(), [data, *([map_] if map_ is not None else [])])
     with undisturbed():  # no estimates without their page
         write_replays(result, folder)
         for target in filter(None, (folder / "summary.json", json)):
@@ -96,6 +98,7 @@ def estimate(
             save_fitted_cell(result, find_cell(cell, data.parent), save_cell)
         if save_model is not None:
             save_fitted_model(result, save_model, base=model, cell=cell, folder=data.parent)
-        write_text(folder / "report.html", page)
+        if report:
+            write_text(folder / "report.html", page)
     print_estimate(result)
-    typer.echo(f"Report: {folder / 'report.html'}")
+    typer.echo(f"Report: {folder / 'report.html'}" if report else f"Results: {folder}")

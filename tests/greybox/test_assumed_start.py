@@ -21,7 +21,7 @@ def test_a_start_on_the_move_is_told_with_the_state_and_what_to_set() -> None:
     """At rest the warmth is power / k = 2 K."""
     said = wrong_start(box(), _record(), np.array([5.0]), np.array([1.0]), [0], np.array([0.1]))
     assert len(said) == 1 and "warmth 5 instead of 2 K" in said[0]
-    assert "nothing need be done; in a model of your own, set starts_steady=False and initial_guess" in said[0]
+    assert "which is in order; to say so in a model of your own, set starts_steady=False and initial_guess" in said[0]
 
 
 def test_nothing_is_said_where_the_start_is_at_rest_known_or_not_assumed() -> None:

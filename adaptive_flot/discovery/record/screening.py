@@ -91,7 +91,9 @@ def screen(record: Dataset, model: Model) -> Screening:
     if not moving:
         reasons.append(f"no input moves ({', '.join(still)}): nothing that depends on them can be told from a constant")
     elif still:
-        notes.append(f"{', '.join(still)} hardly moves: no dependence on it can be told")
+        one = len(still) == 1
+        moves, it = ("moves", "it") if one else ("move", "them")
+        notes.append(f"{', '.join(still)} hardly {moves}: no dependence on {it} can be told")
     if measured and not reasons and all(_flat(outputs[:, j]) for j in range(outputs.shape[1])):
         reasons.append("every measured output is constant")
     return Screening(record, tuple(reasons), tuple(notes), suspects)

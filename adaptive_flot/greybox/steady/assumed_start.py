@@ -56,8 +56,8 @@ def wrong_start(
         return ()
     said = _told(model, record, state, steady)
     return (
-        "a start at rest was assumed, and what was fitted does not start so: its start was fitted, too"
-        f"{f' ({said})' if said else ''}, and nothing need be done; {REMEDY}",
+        "the model says that a record starts at rest, and this one does not: its start was fitted"
+        f"{f' ({said})' if said else ''}, which is in order; to say so {REMEDY}",
     )
 
 

@@ -73,9 +73,11 @@ def test_parameters_to_fit_can_be_chosen(call: Call, table: WriteTable, tmp_path
 
 
 def test_estimators_outputs_and_share_can_be_chosen(call: Call, table: WriteTable, tmp_path: Path) -> None:
+    """And a batch of records needs no page each."""
     options = ["--estimator", "rpem", "--output", "concentrate_grade", "--fit-share", "0.8", "--out", "r"]
-    result = call("estimate", table(), *options)
+    result = call("estimate", table(), *options, "--no-report")
     assert result.code == 0, result.err
+    assert not (tmp_path / "r" / "report.html").exists() and "Report:" not in result.out
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     assert summary["fit"]["outputs"] == ["concentrate_grade"]
     assert [e["estimator"] for e in summary["estimators"]] == ["rpem"]

@@ -85,8 +85,9 @@ def reason_words(
         )
     if not result.rounds[0].compared:
         best = judgement.best
-        so_far = " with ".join(f"{s} by {d}" for s, d in best.names) if best else "nothing"
-        return f"The time for the search ended before the rivals had been compared; best so far: {so_far}."
+        so_far = " with ".join(f"{s} by {d}" for s, d in best.names) if best else ""
+        ahead = f", whatever is ahead by now ({so_far})" if so_far else ""
+        return f"The time for the search ended before the rivals had been compared: nothing is found yet{ahead}."
     if judgement.word == "abstain" and judgement.best is None:
         return "Something is missing, and no effect at any site, with any driver, explains it."
     evidence = f"{result.verification}" if result.verification else ""
