@@ -42,6 +42,7 @@ from adaptive_flot.discovery.test_design.signals import input_range
 from adaptive_flot.discovery.verdict.at_noise import none_at_noise
 from adaptive_flot.discovery.verdict.conclude import STILL_WRONG, conclude
 from adaptive_flot.discovery.verdict.heed_report import heed_report
+from adaptive_flot.discovery.verdict.large_drift import heed_large_drift
 from adaptive_flot.discovery.verdict.one_course import heed_one_course
 from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.errors import ModelError
@@ -204,6 +205,7 @@ STAGES: tuple[Callable[[State], State | Verdict], ...] = (
     compare_with_what_has_no_site,
     with_constants_alike,
     none_at_noise,
+    heed_large_drift,
     tell_least_shown,
     plan_test,
     conclude,

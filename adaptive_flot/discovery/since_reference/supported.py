@@ -7,6 +7,8 @@ pump that is worn shows whenever it is moved. Where that brings nothing, the fre
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 import numpy as np
 
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
@@ -44,9 +46,8 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
     if verdict.word not in WITH_A_NAME or best is None:
         return compared
     sites = verdict.sites
-    # an event there, or a part that is late, is another cause: it does not speak for one that is there all the time
-    found = (e for e in told.alike if sites & {h.site for h in e.hypotheses if h.kind not in (*EVENTS, LATE)})
-    if any(e.criterion - base.criterion > SUPPORT for e in found):
+    pairs = {(e.effect.site, e.effect.driver) for e in verdict.effects} | set(verdict.members)
+    if any(e.criterion - base.criterion > SUPPORT and _speaks_for(e, sites, pairs) for e in told.alike):
         return compared
     # each form is asked: what starts where a free run has it may rest there, as a limit that nothing reaches
     gain = max(_gain(search, base, each) for each in (best, *compared.judged.alike))
@@ -61,6 +62,16 @@ def unless_unsupported(compared: Comparison, search: Search, base: Explanation, 
         said = " and ".join(h.label for h in told.best.hypotheses)
         why = f"with process noise {said} explains far more"
     return taken_back(compared, why)
+
+
+def _speaks_for(e: Explanation, sites: frozenset[str], said: Set[tuple[str, str]]) -> bool:
+    """Whether an explanation has what is told at its site, a change that is there all the time.
+
+    An event there, or a part that is late, is another cause. So is a dependence of that part, unless it is what is
+    told: an evaporator at another load has a heater that depends on the load, and not one that has become better.
+    """
+    lasting = [h for h in e.hypotheses if h.site in sites and h.kind not in (*EVENTS, LATE)]
+    return any(h.kind not in STRUCTURE or (h.site, h.driver) in said for h in lasting)
 
 
 def _is_elsewhere(e: Explanation, sites: frozenset[str]) -> bool:

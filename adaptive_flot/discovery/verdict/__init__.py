@@ -8,6 +8,7 @@ one_course.py   Changes with one course in time are one cause, and no name is to
 certain_part.py A part that is certain, where the whole is not told.
 heed_report.py  The stage in which the report rows have their say.
 at_noise.py     The stage that says `none` where errors are noise and no name is told.
+large_drift.py  The stage in which a large drift that nobody expects is no longer `none`.
 report_veto.py  What held-out rows contradict is not told as a name.
 outputs.py      What is certain output by output where the record is not told.
 conclude.py     The verdict: that word with errors, tests, intervals and reasons.

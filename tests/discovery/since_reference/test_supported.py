@@ -88,18 +88,31 @@ def test_a_worn_pump_is_told() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "gain", "stays"),
-    [("gain", 100.0, True), ("gain", 20.0, False), ("lag", 100.0, False), ("switch", 100.0, False)],
+    [
+        ("gain", 100.0, True),
+        ("gain", 20.0, False),
+        ("lag", 100.0, False),
+        ("switch", 100.0, False),
+        ("depends", 100.0, False),
+        ("bends", 100.0, True),
+    ],
 )
 def test_only_what_is_there_all_the_time_speaks_for_a_name(
     monkeypatch: pytest.MonkeyPatch, kind: str, gain: float, stays: bool
 ) -> None:
-    """A battery with a hidden load for some hours: "the charger gives 0.1 A too little" had a late charger for it."""
+    """A battery with a hidden load for some hours: "the charger gives 0.1 A too little" had a late charger for it.
+
+    A healthy evaporator at another load: "the heater is 2 % better" had a heater that depends on the load. Where the
+    dependence itself is what is told (`bends`), it speaks for that.
+    """
     monkeypatch.setattr(supported, "_gain", lambda *given: 0.0)
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: None)
-    verdict = SimpleNamespace(word="named", sites=frozenset({"pump"}))
+    driver = "speed" if kind == "bends" else "constant"
+    effect = SimpleNamespace(effect=SimpleNamespace(site="pump", driver=driver))
+    verdict = SimpleNamespace(word="named", sites=frozenset({"pump"}), effects=(effect,), members=())
     compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
     base: Any = SimpleNamespace(criterion=10.0)
-    there = SimpleNamespace(site="pump", kind=kind)
+    there = SimpleNamespace(site="pump", driver="speed", kind="depends" if kind == "bends" else kind)
     best = SimpleNamespace(hypotheses=(there,), criterion=10.0 + gain)
     found: Any = SimpleNamespace(alike=(best,), best=best)
     assert (supported.unless_unsupported(compared, None, base, found) is compared) == stays  # type: ignore[arg-type]
@@ -125,7 +138,7 @@ def test_another_part_must_not_explain_far_more(
     said: list[str] = []
     monkeypatch.setattr(supported, "_gain", lambda *given: gain)
     monkeypatch.setattr(supported, "taken_back", lambda compared, why: said.append(why))
-    verdict = SimpleNamespace(word="named", sites=frozenset({"pump"}))
+    verdict = SimpleNamespace(word="named", sites=frozenset({"pump"}), effects=(), members=())
     verdict.error = (SimpleNamespace(after=left, noise=1.0),)
     compared: Any = SimpleNamespace(verdict=verdict, judged=SimpleNamespace(best=object(), alike=()))
     base: Any = SimpleNamespace(criterion=10.0)

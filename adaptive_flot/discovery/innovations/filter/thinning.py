@@ -17,7 +17,7 @@ MOST_WORK = 5_000
 """Rows times states up to which a record is taken as it is: half the rows lost friction that came in three spells."""
 THINNED_TO = 4_000
 """Rows times states that are left of a longer record at most."""
-MOST_SINCE_REFERENCE = 14_000
+MOST_SINCE_REFERENCE = 9_000
 """The same where a reference tells the constants: half a minute on two cores."""
 USUAL_STATES = 3
 """States up to which each costs as much as the first."""

@@ -52,13 +52,6 @@ def follows_time(state: State) -> bool:
     return best is not None and any(_free_course(e) for e in best.effects)
 
 
-def unexpected_drift(state: State) -> bool:
-    """Whether a `none` rests on a drift of what is fitted, and the model does not say that it drifts."""
-    if state.judged.word != "none" or state.judged.best is None:
-        return False
-    return not may_drift(state.refitted[0].model, state.known_problem.adapted)
-
-
 def one_of_them_drifts(state: State) -> bool:
     """Whether the best of a class is a change in time of what is fitted, and the model does not say that it drifts.
 

@@ -47,7 +47,6 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     surely_worse,
     two_and_more,
     unconfirmed,
-    unexpected_drift,
     unless_a_trend,
     unless_hardly_off,
     unless_it_wanders,
@@ -56,6 +55,7 @@ from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_f
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
 from adaptive_flot.discovery.results.words import ONE_CAUSE, TELLING, WITH_A_NAME
 from adaptive_flot.discovery.verdict.conclude import report_errors
+from adaptive_flot.discovery.verdict.large_drift import unexpected_drift
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
 from adaptive_flot.discovery.verdict.words.wording import beside_a_part
 from adaptive_flot.greybox.model import Model
@@ -118,7 +118,10 @@ def second_opinion(state: State) -> State:
     if ONE_CAUSE in state.contradiction:  # an opinion on one of several places would be none on what acts at all
         return state
     told = unless_hardly_off(on_sites)
-    asked = _told(state, search, base, told) if told.word in TELLING else _kept(state, told)
+    if told.word in TELLING:
+        asked = _told(state, search, base, told)
+    else:
+        asked = _with_both(_kept(state, told), search, first)
     if asked.judged.word in TELLING or time.monotonic() > state.ends:
         return asked
     with np.errstate(all="ignore"):
@@ -139,6 +142,15 @@ def _with_hint(state: State, search: Search, told: Told) -> State:
         return state
     words = told_in_words(search, told).rstrip(".")
     return _with_note(state, f"with process noise one explanation is best, and free runs do not confirm it: {words}")
+
+
+def _with_both(state: State, search: Search, first: Told) -> State:
+    """The state with a note on two effects that explain a record best together, and are not told (see `not_two`)."""
+    if state.judged.word != "abstain" or first.word != "named" or len(first.certain) != 2:
+        return state
+    words = told_in_words(search, first).rstrip(".")
+    said = "with process noise two effects together are best, which more often stand in for a third thing"
+    return _with_note(state, f"{said}: {words}")
 
 
 def _with_note(state: State, said: str) -> State:
