@@ -41,7 +41,7 @@ FLAT, TINY = 1e-3, 1e-9
 PROMISED = 0.05
 """Gain by costs that are nearly right that is not tried."""
 COURSES = 4
-"""Most runs along whose courses a search looks before it looks without them."""
+"""Most runs along which a search looks."""
 BETWEEN = (1.0, 0.6, 0.3, 0.1)
 """Shares of the way to what a search along a course has found that are tried."""
 KEPT_PROMISE = 0.25
