@@ -16,6 +16,8 @@ NORMAL95 = 1.96
 """Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 ONE_CAUSE = "One cause that acts at several places looks like that, and the catalogue has none"
 """Why several changes with one course are not told."""
+DRIFTS = "Something changes with time."
+"""How the reason of an abstention begins where a constant drifts far that the model does not say to drift."""
 
 
 def in_seconds(period: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from adaptive_flot.discovery.results import State
+from adaptive_flot.discovery.results.words import DRIFTS
 from adaptive_flot.discovery.verdict.judge import may_drift
 from adaptive_flot.discovery.verdict.report_veto import FAR_FROM_NOISE
 from adaptive_flot.discovery.verdict.words.wording import drift_words
@@ -32,5 +33,5 @@ def heed_large_drift(state: State) -> State:
     return replace(
         state,
         judgement=replace(state.judged, word="abstain"),
-        sentence=f"Something changes with time. What explains it best: {drift}. {NO_NAME}",
+        sentence=f"{DRIFTS} What explains it best: {drift}. {NO_NAME}",
     )

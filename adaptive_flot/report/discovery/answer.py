@@ -10,6 +10,7 @@ import numpy as np
 from adaptive_flot.charts.units import exponent, unit_text
 from adaptive_flot.discovery.results.evidence import OutputChange
 from adaptive_flot.discovery.results.verdict import Verdict
+from adaptive_flot.discovery.results.words import DRIFTS
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.provenance import values_hash
 from adaptive_flot.report.kit.parts import Fact
@@ -32,12 +33,14 @@ WORDS = {
 
 
 def title_of(verdict: Verdict, titles: Mapping[str, str]) -> str:
-    """The title for the word of a verdict; where a reason begins with what acts without a site, that.
+    """The title for the word of a verdict; where a reason begins with what acts without a site, or with a drift, that.
 
     Not where that is one of several in the text.
     """
     if verdict.word == "abstain" and LACKS_A_SITE.match(verdict.reason):
         return "Something acts where the model has no site"
+    if verdict.word == "abstain" and verdict.reason.startswith(DRIFTS):
+        return "Something changes with time, and its cause is not sure"
     return capital(titles[verdict.word])
 
 

@@ -10,6 +10,7 @@ import pytest
 from adaptive_flot.discovery.candidates.catalogue import has_a_reason
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.discovery.results.words import DRIFTS
 from adaptive_flot.discovery.verdict import conclude
 from adaptive_flot.discovery.verdict.conclude import _meaning
 from adaptive_flot.discovery.verdict.words import wording
@@ -80,6 +81,7 @@ def test_a_late_sensor_is_said_to_look_like_a_store_before_it(
         ("abstain", f"Something differs from the reference, as if level lost a share of itself: {NO_SITE}.", "no site"),
         ("abstain", f"No change is told: it may be. The nearest: pump; or as if air were less, and {NO_SITE}.", "what"),
         ("abstain", "Something is missing, but the record does not say what.", "does not tell what"),
+        ("abstain", f"{DRIFTS} What explains it best: heater changes by about -24 %.", "changes with time"),
         ("class", f"One of these: pump; or as if something takes from the balance of level, and {NO_SITE}.", "a few"),
     ],
 )
