@@ -13,13 +13,16 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.filtering import linearised
 from adaptive_flot.greybox.filtering.noise_model import STUDENT, NoiseModel
-from adaptive_flot.greybox.filtering.step import filter_step, first_correction
+from adaptive_flot.greybox.filtering.step import filter_after_steps, filter_step, first_correction
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
 from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
-from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
+from adaptive_flot.greybox.stepping.in_steps import steps_along
+from adaptive_flot.greybox.stepping.recursion import RowByRow, ordered, row_by_row
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
+CARRIED, HELD = {"z": "z_next", "P": "P_next"}, ("p", "Q", "r")
+"""Arguments of the step that its results replace from row to row, and those that are the same in all rows."""
 LEAST_MEMBERS = 3
 """Cases that are worth running side by side: one or two take as long as all places of a register."""
 
@@ -204,5 +207,10 @@ def _calls(
     """
     del thread
     first = first_correction(model, outputs, walking, degrees_of_freedom)
+    steps = None if walking else steps_along(model, dt, ())
+    if steps is not None:
+        with suppress(CompileError):  # without the library for tapes an interval is one function
+            after = filter_after_steps(model, dt, outputs, degrees_of_freedom)
+            return FastCall(first, ["P", "P_next"]), TapeRecursion(ordered(after, CARRIED), len(CARRIED), HELD, steps)
     step = filter_step(model, dt, outputs, walking, degrees_of_freedom)
-    return FastCall(first, ["P", "P_next"]), row_by_row(step, {"z": "z_next", "P": "P_next"}, ("p", "Q", "r"))
+    return FastCall(first, ["P", "P_next"]), row_by_row(step, CARRIED, HELD)

@@ -23,7 +23,11 @@ import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.stepping.in_steps import at_the_end
 from adaptive_flot.greybox.stepping.stepper import Stepper
+
+NAMES = ["z", "P", "t", "u", "p", "Q", "r", "y", "there"]
+TOLD = ["z_next", "P_next", "ahead", "F", "H", "predicted", "variance", "log_likelihood"]
 
 
 def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequence[str], nu: float) -> ca.Function:
@@ -49,20 +53,36 @@ def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequen
     x_next, outs, fx, fp, hx, hp = jacobians(z[:nx], t, u, p_now)
     F = ca.vertcat(ca.horzcat(fx, fp), ca.horzcat(ca.SX(w, nx), ca.SX.eye(w)))
     H = ca.horzcat(hx, hp)[rows, :]
+    results = _filtered(P, ca.vertcat(x_next, walked), F, H, outs[rows], (Q, r, y, there), nu)
+    return ca.Function("filter_step", [z, P, t, u, p, Q, r, y, there], results, NAMES, TOLD)
+
+
+def filter_after_steps(model: Model, dt: float, outputs: Sequence[int], nu: float) -> ca.Function:
+    """The same after the steps of an interval (`stepping.in_steps`), for a filter without walking parameters.
+
+    The arguments END and ALONG, what these steps leave, are between P and t.
+    """
+    nx, m, rows = len(model.states), len(outputs), list(outputs)
+    given, names, outs, slopes = at_the_end(model, dt, ())
+    z, P = ca.SX.sym("z", nx), ca.SX.sym("P", nx, nx)
+    Q, r, y, there = ca.SX.sym("Q", nx), ca.SX.sym("r", m), ca.SX.sym("y", m), ca.SX.sym("there", m)
+    end, along = given[:2]
+    results = _filtered(P, end, along, slopes[rows, :], outs[rows], (Q, r, y, there), nu)
+    names = ["z", "P", *names, "Q", "r", "y", "there"]
+    return ca.Function("filter_after_steps", [z, P, *given, Q, r, y, there], results, names, TOLD, {"cse": True})
+
+
+def _filtered(
+    P: ca.SX, ahead: ca.SX, F: ca.SX, H: ca.SX, predicted: ca.SX, measured: tuple[ca.SX, ...], nu: float
+) -> list[ca.SX]:
+    """Results of an interval that leads ahead, with the derivatives F of that and H of what is predicted there."""
+    Q, r, y, there = measured
     corrected = P + ca.diag(Q)
-    predicted = outs[rows]
-    variance = ca.vertcat(*(H[j, :] @ corrected @ H[j, :].T + r[j] ** 2 for j in range(m)))
+    variance = ca.vertcat(*(H[j, :] @ corrected @ H[j, :].T + r[j] ** 2 for j in range(r.numel())))
     moved, corrected, likelihood = correct(corrected, H, y - predicted, r, there, nu)
-    after = ca.vertcat(x_next, walked) + F @ moved
     carried = F @ corrected @ F.T
     carried = (carried + carried.T) / 2
-    names = (
-        ["z", "P", "t", "u", "p", "Q", "r", "y", "there"],
-        ["z_next", "P_next", "ahead", "F", "H", "predicted", "variance", "log_likelihood"],
-    )
-    ahead = ca.vertcat(x_next, walked)
-    results = [after, carried, ahead, ca.densify(F), ca.densify(H), predicted, variance, likelihood]
-    return ca.Function("filter_step", [z, P, t, u, p, Q, r, y, there], results, *names)
+    return [ahead + F @ moved, carried, ahead, ca.densify(F), ca.densify(H), predicted, variance, likelihood]
 
 
 def first_correction(model: Model, outputs: Sequence[int], walking: Sequence[str], nu: float) -> ca.Function:

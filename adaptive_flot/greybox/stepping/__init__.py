@@ -6,6 +6,7 @@ step_functions.py  The compiled functions of one interval: the step, its derivat
 stepper.py    Simulation of a record, with or without sensitivities.
 trajectory.py What a simulation returns.
 fast_step.py  The same in fewer operations, where the model allows.
+in_steps.py   The steps of an interval as a loop, for filters: a function that is short however many there are.
 compiling/    Machine code with the system's C compiler, its cache, and calls without copies.
 recursion.py  Many intervals in one call.
 nodes.py      A densely sampled record in longer intervals.

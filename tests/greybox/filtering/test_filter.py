@@ -1,13 +1,18 @@
 """The filter in innovations form: the textbook's results where these are known."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from adaptive_flot.discovery.innovations.filter import linear_response
+from adaptive_flot.discovery.innovations.filter.linear_response import ResponseFunctions
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Dataset, Effect, FloatArray, Model, Parameter, Quantity, Scope, Stepper
 from adaptive_flot.greybox.filtering import NoiseModel, RecordFilter, maximise, prediction_errors, smooth
+from adaptive_flot.greybox.filtering import filter as filters
 from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
 from adaptive_flot.greybox.stepping.whole_record import tape_recursion
 
@@ -89,11 +94,15 @@ def test_likelihoods_of_several_cases_are_those_of_each_alone(
 ) -> None:
     """To the last bit, with missing outputs, and noise, start and parameters of its own for each."""
 
-    def none() -> None:
+    one = tape_recursion._library
+
+    def none(lanes: int) -> Any:
+        if lanes == 1:
+            return one(1)
         raise CompileError("the disk is full")
 
     if not library:
-        monkeypatch.setattr(tape_recursion, "_library_in_lanes", none)
+        monkeypatch.setattr(tape_recursion, "_library", none)
     data, _ = record(rows)
     own = RecordFilter(first_order(), DT, [0])
     cases = [
@@ -216,3 +225,26 @@ def test_a_hidden_state_that_starts_far_off_is_found_beside_outliers_that_are_no
     )
     distance = np.abs(filtered.z[:, 0] - x) / np.sqrt(filtered.P[:, 0, 0])
     assert np.mean(distance[20:] < 3.0) > 0.95
+
+
+@pytest.mark.parametrize("power", [1.0, 0.5])
+def test_steps_as_a_loop_are_those_of_one_function(monkeypatch: pytest.MonkeyPatch, power: float) -> None:
+    """Sixteen steps an interval, with a constant that is fitted, for one member and for several."""
+    data, _ = record(200)
+    model = replace(first_order(), max_step_s=DT / 16)
+    p = np.array([DECAY * power])
+    both = np.array([p[0], 0.2])  # and how much too much the gauge shows
+    cases = [(NoiseModel({"x": Q * k}, {"y": R}), np.zeros(1), np.eye(1), both) for k in (0.5, 1.0, 1.5)]
+
+    def runs() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        fresh = replace(model, name=f"{model.name}-{power}")
+        own = ResponseFunctions(fresh, DT, [0], ["gauge"], ["k"], 5.0)
+        at = own.at(data, cases[0][0], p, cases[0][1:3])
+        run = own.filter.run(data, *cases[0])
+        return own.filter.log_likelihoods(data, cases), at.by_constants, run.P, run.H
+
+    in_steps = runs()
+    monkeypatch.setattr(filters, "steps_along", lambda *given: None)
+    monkeypatch.setattr(linear_response, "steps_along", lambda *given: None)
+    for one, other in zip(in_steps, runs(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)

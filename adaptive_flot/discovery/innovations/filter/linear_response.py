@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,12 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
+from adaptive_flot.greybox.stepping.in_steps import jacobians_at_the_end, steps_along
 from adaptive_flot.greybox.stepping.linear_run import linear_run
-from adaptive_flot.greybox.stepping.recursion import RowByRow, row_by_row
+from adaptive_flot.greybox.stepping.recursion import RowByRow, ordered, row_by_row
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 CLIP = 100.0
 """Innovations count up to so many of their standard deviations. A jump of a sensor is far: less would shrink it."""
@@ -210,6 +214,10 @@ def weight_of(square: FloatArray, nu: float) -> FloatArray:
 def _jacobians_row_by_row(model: Model, dt: float, wrt: tuple[str, ...], thread: int) -> RowByRow:
     """Derivatives of one step, with the working memory of one thread; folds of a record ask for the same."""
     del thread
+    steps = steps_along(model, dt, wrt)
+    if steps is not None:
+        with suppress(CompileError):  # without the library for tapes an interval is one function
+            return TapeRecursion(ordered(jacobians_at_the_end(model, dt, wrt), {}), 0, ("p",), steps)
     return row_by_row(Stepper(model, dt).one_step_jacobians(list(wrt)), {}, ("p",))
 
 

@@ -189,45 +189,60 @@ void run(const Kernels *K, int64_t rows, int64_t substeps, double dt, double t0,
 """
 
 _RECURSION = """
-/* The tape for each of so many rows. The first `carried` arguments are the first results of the row before. A stride of
-   zero is an argument that stays. Row k's results go to `found[j] + k * widths[j]`. */
-void recur(const Tape *tape, int64_t rows, int64_t given, int64_t carried, const int64_t *sizes,
-           const double *const *values, const int64_t *strides, int64_t made, const int64_t *widths,
-           double *const *found) {
-    for (int64_t row = 0; row < rows; row++) {
-        for (int64_t k = 0; k < given; k++) {
-            if (row && k < carried) copy(argument(tape, k), result(tape, k), sizes[k]);
-            else if (!row || strides[k]) copy(argument(tape, k), values[k] + row * strides[k], sizes[k]);
+/* Steps before each row: the state and its derivatives, from the start of the row over so many steps. */
+typedef struct {
+    Tape tape;
+    int64_t times, state, derivatives, inputs, parameters, to_state, to_derivatives, of_time, of_inputs, of_parameters;
+    double length; const double *start;
+} Steps;
+
+static double *at(const Tape *tape, int64_t k) { return tape->memory + tape->arguments[k] * LANES; }
+static double *out(const Tape *tape, int64_t k) { return tape->memory + tape->results[k] * LANES; }
+
+/* A row's steps, from its state (its first argument) and the derivatives at its start, with its inputs held. */
+static void advance(const Steps *steps, const Tape *row, int64_t first) {
+    const Tape *tape = &steps->tape;
+    copy(at(tape, 0), at(row, 0), steps->state * LANES);
+    for (int64_t e = 0; e < steps->derivatives; e++)
+        for (int l = 0; l < LANES; l++) at(tape, 1)[e * LANES + l] = steps->start[e];
+    copy(at(tape, 3), at(row, steps->of_inputs), steps->inputs * LANES);
+    if (first) copy(at(tape, 4), at(row, steps->of_parameters), steps->parameters * LANES);
+    run_held(tape);
+    for (int64_t i = 0; i < steps->times; i++) {
+        for (int l = 0; l < LANES; l++) at(tape, 2)[l] = at(row, steps->of_time)[l] + (double)i * steps->length;
+        if (i) {
+            copy(at(tape, 0), out(tape, 0), steps->state * LANES);
+            copy(at(tape, 1), out(tape, 1), steps->derivatives * LANES);
         }
-        if (!row) run_held(tape);
         run_tape(tape);
-        for (int64_t j = 0; j < made; j++) copy(found[j] + row * widths[j], result(tape, j), widths[j]);
     }
+    copy(at(row, steps->to_state), out(tape, 0), steps->state * LANES);
+    copy(at(row, steps->to_derivatives), out(tape, 1), steps->derivatives * LANES);
 }
-"""
 
-
-_RECURSION_IN_LANES = """
-/* The same for LANES members at once. Member l has its k-th argument at `values[k * LANES + l]`, and the result that is
-   wanted goes to `found[l]`. A place of the memory holds the numbers of all members beside each other. */
-void recur_in_lanes(const Tape *tape, int64_t rows, int64_t given, int64_t carried, const int64_t *sizes,
-                    const double *const *values, const int64_t *strides, int64_t wanted, int64_t width,
-                    double *const *found) {
+/* The tape for each of so many rows, for LANES members at once, after `steps` where these are not null. The first
+   `carried` arguments are the first results of the row before. Member l has its k-th argument at
+   `values[k * LANES + l]`; a stride of zero is an argument that stays. The j-th of the results that are wanted goes to
+   `found[j * LANES + l]`, row by row. A place of the memory holds the numbers of all members beside each other. */
+void recur(const Tape *tape, const Steps *steps, int64_t rows, int64_t given, int64_t carried, const int64_t *sizes,
+           const double *const *values, const int64_t *strides, int64_t made, const int64_t *wanted,
+           const int64_t *widths, double *const *found) {
     for (int64_t row = 0; row < rows; row++) {
         for (int64_t k = 0; k < given; k++) {
-            double *to = tape->memory + tape->arguments[k] * LANES;
-            if (row && k < carried) copy(to, tape->memory + tape->results[k] * LANES, sizes[k] * LANES);
+            if (row && k < carried) copy(at(tape, k), out(tape, k), sizes[k] * LANES);
             else if (!row || strides[k])
-                for (int64_t l = 0; l < LANES; l++) {
+                for (int l = 0; l < LANES; l++) {
                     const double *from = values[k * LANES + l] + row * strides[k];
-                    for (int64_t e = 0; e < sizes[k]; e++) to[e * LANES + l] = from[e];
+                    for (int64_t e = 0; e < sizes[k]; e++) at(tape, k)[e * LANES + l] = from[e];
                 }
         }
         if (!row) run_held(tape);
+        if (steps) advance(steps, tape, !row);
         run_tape(tape);
-        const double *made = tape->memory + tape->results[wanted] * LANES;
-        for (int64_t l = 0; l < LANES; l++)
-            for (int64_t e = 0; e < width; e++) found[l][row * width + e] = made[e * LANES + l];
+        for (int64_t j = 0; j < made; j++)
+            for (int l = 0; l < LANES; l++)
+                for (int64_t e = 0; e < widths[j]; e++)
+                    found[j * LANES + l][row * widths[j] + e] = out(tape, wanted[j])[e * LANES + l];
     }
 }
 """
@@ -258,13 +273,14 @@ def _evaluation(lanes: int = 1) -> str:
 
 RECORD_SOURCE = "\n".join([_TAPE, _HEAD, HELPERS, _evaluation(), _RUN, _LOOPS])
 """The whole of it, the same for every model."""
-RECURSION_SOURCE = "\n".join([_TAPE, HELPERS, _evaluation(), _RUN, _RECURSION])
-"""Any function whose results are arguments of its next call."""
 
 
-def recursion_in_lanes(lanes: int) -> str:
-    """The same for so many members at once, each with arguments of its own. Each has the numbers that it has alone."""
-    return "\n".join([_TAPE, HELPERS, _evaluation(lanes), _RUN, _RECURSION_IN_LANES])
+def recursion_source(lanes: int = 1) -> str:
+    """Any function whose results are arguments of its next call, for so many members at once.
+
+    Each member has arguments of its own, and the numbers that it has alone.
+    """
+    return "\n".join([_TAPE, HELPERS, _evaluation(lanes), _RUN, _RECURSION])
 
 
 def kernel_source(tapes: Mapping[str, Tape]) -> str:
