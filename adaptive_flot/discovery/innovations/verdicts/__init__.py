@@ -10,6 +10,7 @@ in_time.py         A dependence on what moves slowly, beside a change in time at
 reach.py           Outputs that effects can change at all.
 members.py         Members of a class as alternatives of a free run.
 second_opinion.py  The stage of `discover` that asks, where the free run leaves too much.
+telling.py         What it tells as a verdict, or the verdict of the free run that is kept.
 event.py           An event in a record with a reference.
 sole_cause.py      A cause that is certain alone, of explanations of two effects.
 cause.py           A cause of the whole record, in one with a reference.

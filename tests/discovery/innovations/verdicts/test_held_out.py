@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
+from adaptive_flot.discovery.innovations.verdicts import telling
 from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.greybox.effects import Effect
 
@@ -34,25 +34,25 @@ def verdict(
     told: Any = SimpleNamespace(
         word="named", effects=(h,), certain=(), open=(), best=best, sites=frozenset(["valve"]), why="", beside=None
     )  # fmt: skip
-    monkeypatch.setattr(asking, "_free_run", lambda *a: fit)
-    monkeypatch.setattr(asking, "report_errors", lambda *a: (free,))
-    monkeypatch.setattr(asking, "noise_from_row_to_row", lambda *a: np.array([NOISE]))
-    monkeypatch.setattr(asking, "_over_stretches", lambda *a: (over,))
-    monkeypatch.setattr(asking, "outputs_in_reach", lambda *a: ("level",))
-    monkeypatch.setattr(asking, "in_all_that_is_near", lambda *a: False)
-    monkeypatch.setattr(asking, "told_in_words", lambda *a: "Valve does not go below 0.5.")
+    monkeypatch.setattr(telling, "_free_run", lambda *a: fit)
+    monkeypatch.setattr(telling, "report_errors", lambda *a: (free,))
+    monkeypatch.setattr(telling, "noise_from_row_to_row", lambda *a: np.array([NOISE]))
+    monkeypatch.setattr(telling, "_over_stretches", lambda *a: (over,))
+    monkeypatch.setattr(telling, "outputs_in_reach", lambda *a: ("level",))
+    monkeypatch.setattr(telling, "in_all_that_is_near", lambda *a: False)
+    monkeypatch.setattr(telling, "told_in_words", lambda *a: "Valve does not go below 0.5.")
     rival: Any = SimpleNamespace(effects=(CURVE,), names=(("supply", "time"),))
     if both:
         rival = SimpleNamespace(effects=(LEAK, CURVE), names=(("valve", "own_value"), ("supply", "time")))
     judged = Judgement(word, rival, (("supply", "time"),) if word == "class" else (), (), 0.0)  # type: ignore[arg-type]
-    monkeypatch.setattr(asking, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
+    monkeypatch.setattr(telling, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
     state: Any = SimpleNamespace(
         judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
         known_problem=None, model=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
     )  # fmt: skip
-    monkeypatch.setattr(asking, "_is_nameable", lambda model, site, driver: True)
+    monkeypatch.setattr(telling, "_is_nameable", lambda model, site, driver: True)
     search: Any = SimpleNamespace(sizes=lambda explanation: ({}, np.zeros((0, 0))))
-    found: Judgement = asking._told(state, search, told.best, told).judgement  # type: ignore[assignment]
+    found: Judgement = telling.tell(state, search, told.best, told).judgement  # type: ignore[assignment]
     return found
 
 
@@ -85,4 +85,4 @@ def test_what_stretches_show_must_be_better_than_the_model_as_it_is(over: tuple[
     """From the state of a filter both outputs of a healthy wall erred by more with a cause than in a free run."""
     free = tuple(OutputChange(n, "", b, b, b, UNSURE) for n, b in (("level", 0.2), ("flow", 1.0)))
     said = tuple(OutputChange(n, "", 9.0, a, 0.1, SURELY_LESS) for n, a in zip(("level", "flow"), over, strict=True))
-    assert asking._better_than_as_it_is(said, free) == stands
+    assert telling._better_than_as_it_is(said, free) == stands

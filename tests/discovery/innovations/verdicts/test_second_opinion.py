@@ -10,7 +10,7 @@ from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.innovations.judge import Told
-from adaptive_flot.discovery.innovations.verdicts import rivals
+from adaptive_flot.discovery.innovations.verdicts import rivals, telling
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
 from adaptive_flot.greybox.effects import Effect
@@ -104,7 +104,7 @@ def test_a_name_stays_at_its_site_and_a_curve_without_one_only_as_that_curve(
     """With process noise nothing is told for sure, and the best explanation has one effect."""
     explanation = SimpleNamespace(hypotheses=(SimpleNamespace(site=there[0], driver=there[1]),))
     told = Told("abstain", explanation, (), (), (explanation,), "")  # type: ignore[arg-type]
-    assert asking._knows(told, state(word, LAW).judged) == known
+    assert telling._knows(told, state(word, LAW).judged) == known
 
 
 def test_only_a_fault_at_the_place_of_an_unnamed_curve_may_leave_a_little_more() -> None:
@@ -145,7 +145,7 @@ def test_a_class_without_what_the_innovations_form_names_is_not_told(word: str, 
     limit = SimpleNamespace(site="heater", label="heater range")
     told: Any = SimpleNamespace(effects=(limit,))
     judged: Any = SimpleNamespace(word=word, best=SimpleNamespace(names=members[:1]), members=members)
-    assert asking.names_one_of(judged, told) == agrees
+    assert telling.names_one_of(judged, told) == agrees
 
 
 @pytest.mark.parametrize(("low", "word"), [(0.2, "none"), (-0.1, "abstain")])
@@ -156,7 +156,7 @@ def test_a_drift_explains_the_record_only_where_held_out_rows_get_better(low: fl
     nothing: dict[str, Any] = {f.name: None for f in fields(State)}
     given = State(**nothing | {"judgement": judged, "error": error})
     told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
-    assert asking._kept(given, told).judged.word == word
+    assert telling.kept(given, told).judged.word == word
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_several_effects_do_not_stand_in_for_what_has_no_site(names: Any, why: s
     nothing: dict[str, Any] = {f.name: None for f in fields(State)}
     told: Any = SimpleNamespace(word="abstain", why=why, sites=frozenset())
     given = State(**nothing | {"judgement": Judgement("class", best, names, (), 0.0)})
-    assert asking._kept(given, told).judged.word == word
+    assert telling.kept(given, told).judged.word == word
 
 
 @pytest.mark.parametrize(("effect", "word"), [(CURVE, "abstain"), (LAW, "class")])
@@ -182,7 +182,7 @@ def test_a_class_of_free_curves_in_time_needs_the_innovations_form(effect: Effec
     judged = Judgement("class", best, (("gains", effect.driver), ("loss", effect.driver)), (), 0.0)
     nothing: dict[str, Any] = {f.name: None for f in fields(State)}
     told: Any = SimpleNamespace(word="abstain", why="no rows confirm it", sites=frozenset())
-    assert asking._kept(State(**nothing | {"judgement": judged}), told).judged.word == word
+    assert telling.kept(State(**nothing | {"judgement": judged}), told).judged.word == word
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_a_drift_that_helps_is_not_replaced_by_something_elsewhere(
         known_problem=SimpleNamespace(adapted=("gain",)), error=(OutputChange("y", "K", 4.0, 1.0, 1.0, (low, 0.9)),),
     )  # fmt: skip
     told: Any = SimpleNamespace(effects=(SimpleNamespace(site=site, label=site),))
-    assert asking._another_drift(given, told) == another
+    assert telling._another_drift(given, told) == another
 
 
 @pytest.mark.parametrize(
@@ -251,8 +251,8 @@ def test_what_has_no_site_stays_beside_a_name_that_alternatives_leave(
     best: Any = SimpleNamespace(hypotheses=())
     before = Told("named", best, (), (), (best,), "", place)
     both = Told(word, best, certain, (), (best,), "")  # type: ignore[arg-type]
-    assert asking.with_what_stood_beside(both, before).beside == (place if kept else None)
-    assert asking.with_what_stood_beside(both, replace(before, beside=None)) is both
+    assert telling.with_what_stood_beside(both, before).beside == (place if kept else None)
+    assert telling.with_what_stood_beside(both, replace(before, beside=None)) is both
 
 
 @pytest.mark.parametrize(("errs", "fall", "asked"), [(True, -60.0, True), (False, -60.0, False), (True, -40.0, False)])
@@ -280,4 +280,4 @@ def test_a_dependence_that_its_site_has_no_reason_for_has_no_name_here_either(
     state: Any = SimpleNamespace(model=model())
     told: Any = SimpleNamespace(word="named", open=(), effects=(), beside=None)
     best: Any = SimpleNamespace(names=((site, driver),))
-    assert asking._judgement(state, told, best).word == word
+    assert telling._judgement(state, told, best).word == word
