@@ -78,7 +78,7 @@ def with_searched_effect(
     error = tuple(replace(c, noise=max(usual[c.output], c.noise)) for c in verdict.error if c.output in usual)
     if all(c.before <= ABOVE_USUAL * c.noise for c in error) or hardly_explained(error, ABOVE_USUAL, MOST):
         return compared
-    if _follows_time(verdict) and any(c.after > ABOVE_USUAL * c.noise for c in error):
+    if needs_to_suffice(verdict) and any(c.after > ABOVE_USUAL * c.noise for c in error):
         return compared
     if compared.verdict.word in WITH_A_NAME and not tells_more(compared.verdict, verdict):
         return compared
@@ -109,12 +109,14 @@ def with_constants_held(model: Model, names: tuple[str, ...]) -> Model:
     return replace(model, parameters=parameters)
 
 
-def _follows_time(found: Verdict) -> bool:
-    """Whether a free curve in time is told, which bends to what any cause has done, and has no excuse for what is left.
+def needs_to_suffice(found: Verdict) -> bool:
+    """Whether what is told has no excuse for an error that is left: a free curve in time, or several effects.
 
-    A burst rate that follows the solids was told as one that fell, and air recovery kept 1.8 times its usual error.
+    A curve bends to what any cause has done. A burst rate that follows the solids was told as one that fell, and air
+    recovery kept 1.8 times its usual error. Several effects stand in for a third thing where something is left: a load
+    that swings on a robot's arm was a class of its friction, its motor and its gear, two at a time.
     """
-    return any(e.effect.driver == "time" and e.effect.family.is_curve for e in found.effects)
+    return len(found.effects) > 1 or any(e.effect.driver == "time" and e.effect.family.is_curve for e in found.effects)
 
 
 def tells_more(said: Verdict, found: Verdict) -> bool:

@@ -175,20 +175,36 @@ def test_what_is_told_gives_way_where_it_leaves_something_missing(
     assert tells_more(verdict(said), verdict(found)) is more
 
 
-@pytest.mark.parametrize(("left", "told"), [(1.3, True), (1.8, False)])
-def test_a_curve_in_time_is_told_only_where_it_leaves_nothing(
-    monkeypatch: pytest.MonkeyPatch, left: float, told: bool
+CURVE = Effect("heat_loss", "time", "curve", {"value_1": 0.0, "value_2": 0.3}, {"knots": (0.0, 9000.0)})
+BY_WARMTH = Effect("heat_loss", "temperature", "curve", {"value_1": 0.0, "value_2": 0.3}, {"knots": (300.0, 320.0)})
+BY_POWER = Effect("heater", "power", "curve", {"value_1": 0.0, "value_2": 0.3}, {"knots": (500.0, 3000.0)})
+
+
+@pytest.mark.parametrize(
+    ("effects", "left", "told"),
+    [
+        ((CURVE,), 1.3, True),
+        ((CURVE,), 1.8, False),
+        ((BY_WARMTH,), 1.8, True),
+        ((BY_WARMTH, BY_POWER), 1.3, True),
+        ((BY_WARMTH, BY_POWER), 1.8, False),
+    ],
+)
+def test_a_curve_in_time_and_several_effects_are_told_only_where_they_leave_nothing(
+    monkeypatch: pytest.MonkeyPatch, effects: tuple[Effect, ...], left: float, told: bool
 ) -> None:
-    """It bends to what any cause has done: a burst rate that follows the solids was told as one that fell."""
+    """A curve bends to what any cause has done: a burst rate that follows the solids was told as one that fell.
+
+    Several effects stand in for a third thing: a load that swings on a robot's arm was its friction and its gear.
+    """
     before = compared()
-    curve = Effect("heat_loss", "time", "curve", {"value_1": 0.0, "value_2": 0.3}, {"knots": (0.0, 9000.0)})
     c, usual = before.rows.columns[0], float(before.calibration.usual.overall[0])
     output = before.calibration.model.outputs[c]
     error = (OutputChange(output.name, output.unit, 9 * usual, left * usual, usual, (0.5, 0.9)),)
-    effects = (NamedEffect(curve, "", {}, ()),)
-    grew = Verdict("named", "Loss grew.", effects, error=error)
-    found = SimpleNamespace(verdict=grew, model=before.calibration.model.with_effects([curve]))
+    grew = Verdict("named", "Loss grew.", tuple(NamedEffect(e, "", {}, ()) for e in effects), error=error)
+    found = SimpleNamespace(verdict=grew, model=before.calibration.model.with_effects(effects))
     monkeypatch.setattr(searched_change, "discover", lambda *given, **named: found)
+    monkeypatch.setattr(searched_change, "_worse_on_reference", lambda *given: np.inf)  # all are new
     assert (searched(before).verdict.word == "named") is told
 
 
