@@ -6,6 +6,5 @@ tape.py            Such a list as numbers, which one library reads for every mod
 source.py          The C source of that library: the fast step over states and directions, from row to row.
 library.py         Called with the tapes of a model, or with its compiled equations once it has run often.
 instruction_sets.py  Vector instructions of this machine, chosen at run time.
-tape_recursion.py  Any function whose results are arguments of its next call, over all rows, with steps before each
-                   row; several side by side.
+tape_recursion.py  A function whose results go to its next call, over all rows, with steps before each; several at once.
 """
