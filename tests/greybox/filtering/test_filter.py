@@ -248,3 +248,20 @@ def test_steps_as_a_loop_are_those_of_one_function(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(linear_response, "steps_along", lambda *given: None)
     for one, other in zip(in_steps, runs(), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)
+
+
+def test_without_a_compiler_the_steps_of_an_interval_are_one_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, _ = record(150)
+    case = NoiseModel({"x": Q}, {"y": R}), np.zeros(1), np.eye(1), np.array([DECAY])
+
+    def run(name: str) -> FloatArray:
+        model = replace(first_order(), name=name, max_step_s=DT / 4)
+        return RecordFilter(model, DT, [0]).run(data, *case).log_likelihood
+
+    in_steps = run("compiled")
+
+    def none(lanes: int) -> Any:
+        raise CompileError("no compiler")
+
+    monkeypatch.setattr(tape_recursion, "_library", none)
+    np.testing.assert_allclose(run("interpreted"), in_steps, rtol=1e-12)
