@@ -17,8 +17,8 @@ from adaptive_flot.greybox.filtering.step import filter_after_steps, filter_step
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
 from adaptive_flot.greybox.stepping.compiling.fastcall import FastCall
-from adaptive_flot.greybox.stepping.in_steps import steps_along
-from adaptive_flot.greybox.stepping.recursion import RowByRow, ordered, row_by_row
+from adaptive_flot.greybox.stepping.in_steps import interval_by_interval, steps_along
+from adaptive_flot.greybox.stepping.recursion import RowByRow
 from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 CARRIED, HELD = {"z": "z_next", "P": "P_next"}, ("p", "Q", "r")
@@ -207,10 +207,11 @@ def _calls(
     """
     del thread
     first = first_correction(model, outputs, walking, degrees_of_freedom)
-    steps = None if walking else steps_along(model, dt, ())
-    if steps is not None:
-        with suppress(CompileError):  # without the library for tapes an interval is one function
-            after = filter_after_steps(model, dt, outputs, degrees_of_freedom)
-            return FastCall(first, ["P", "P_next"]), TapeRecursion(ordered(after, CARRIED), len(CARRIED), HELD, steps)
-    step = filter_step(model, dt, outputs, walking, degrees_of_freedom)
-    return FastCall(first, ["P", "P_next"]), row_by_row(step, CARRIED, HELD)
+    many = interval_by_interval(
+        None if walking else steps_along(model, dt, ()),
+        lambda: filter_after_steps(model, dt, outputs, degrees_of_freedom),
+        lambda: filter_step(model, dt, outputs, walking, degrees_of_freedom),
+        CARRIED,
+        HELD,
+    )
+    return FastCall(first, ["P", "P_next"]), many

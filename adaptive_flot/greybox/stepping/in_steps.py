@@ -5,15 +5,18 @@ As one function, sixteen steps with their derivatives take longer to make, and t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 import casadi as ca
 import numpy as np
 
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping import step_functions
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
+from adaptive_flot.greybox.stepping.recursion import RowByRow, ordered, row_by_row
 from adaptive_flot.greybox.stepping.step_functions import Interval
-from adaptive_flot.greybox.stepping.whole_record.tape_recursion import ALONG, END, Steps
+from adaptive_flot.greybox.stepping.whole_record.tape_recursion import ALONG, END, Steps, TapeRecursion
 
 
 def steps_along(model: Model, dt: float, wrt: Sequence[str]) -> Steps | None:
@@ -30,6 +33,23 @@ def steps_along(model: Model, dt: float, wrt: Sequence[str]) -> Steps | None:
     end, along, *_ = step(*given)
     function = ca.Function("step_along", given, [ca.densify(end), ca.densify(along)], {"cse": True})
     return Steps(function, times, length, np.hstack([np.zeros((nx, q)), np.eye(nx)]))
+
+
+def interval_by_interval(
+    steps: Steps | None,
+    after: Callable[[], ca.Function],
+    whole: Callable[[], ca.Function],
+    carried: Mapping[str, str],
+    held: Sequence[str],
+) -> RowByRow:
+    """A function of an interval, over all rows: `after` its steps, or the `whole` of it as one function.
+
+    The latter for an interval of one step (None), and without the library for tapes.
+    """
+    if steps is not None:
+        with suppress(CompileError):
+            return TapeRecursion(ordered(after(), carried), len(carried), held, steps)
+    return row_by_row(whole(), carried, held)
 
 
 def at_the_end(model: Model, dt: float, wrt: Sequence[str]) -> tuple[list[ca.SX], list[str], ca.SX, ca.SX]:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -25,12 +24,10 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.filtering import Filtered, NoiseModel, RecordFilter
 from adaptive_flot.greybox.model import FloatArray, Model
-from adaptive_flot.greybox.stepping.compiling.compiled import CompileError
-from adaptive_flot.greybox.stepping.in_steps import jacobians_at_the_end, steps_along
+from adaptive_flot.greybox.stepping.in_steps import interval_by_interval, jacobians_at_the_end, steps_along
 from adaptive_flot.greybox.stepping.linear_run import linear_run
-from adaptive_flot.greybox.stepping.recursion import RowByRow, ordered, row_by_row
+from adaptive_flot.greybox.stepping.recursion import RowByRow
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from adaptive_flot.greybox.stepping.whole_record.tape_recursion import TapeRecursion
 
 CLIP = 100.0
 """Innovations count up to so many of their standard deviations. A jump of a sensor is far: less would shrink it."""
@@ -88,15 +85,17 @@ class ResponseFunctions:
         start
             z0 (nx,) and P0 (nx, nx) before the first row.
         """
-        values = self.extended.parameter_values
-        values[: len(p)] = p
-        return self.along(record, noise, p, self.filter.run(record, noise, *start, values))
+        return self.along(record, noise, p, self.filter.run(record, noise, *start, self._values(p)))
 
     def along(self, record: Dataset, noise: NoiseModel, p: FloatArray, filtered: Filtered) -> LinearResponse:
         """The derivatives along a run of the filter with this noise and these parameters (np,)."""
+        return LinearResponse(self, record, noise, p, filtered, self._jacobians(record, filtered, self._values(p)))
+
+    def _values(self, p: FloatArray) -> FloatArray:
+        """Parameters of the extended model, those of the model itself (np,) as they are given."""
         values = self.extended.parameter_values
         values[: len(p)] = p
-        return LinearResponse(self, record, noise, p, filtered, self._jacobians(record, filtered, values))
+        return values
 
     def _jacobians(self, record: Dataset, filtered: Filtered, p: FloatArray) -> Jacobians:
         each = {"x": filtered.z[:-1], "t": record.time[:-1, None], "u": record.inputs[1:], "p": p}
@@ -214,11 +213,13 @@ def weight_of(square: FloatArray, nu: float) -> FloatArray:
 def _jacobians_row_by_row(model: Model, dt: float, wrt: tuple[str, ...], thread: int) -> RowByRow:
     """Derivatives of one step, with the working memory of one thread; folds of a record ask for the same."""
     del thread
-    steps = steps_along(model, dt, wrt)
-    if steps is not None:
-        with suppress(CompileError):  # without the library for tapes an interval is one function
-            return TapeRecursion(ordered(jacobians_at_the_end(model, dt, wrt), {}), 0, ("p",), steps)
-    return row_by_row(Stepper(model, dt).one_step_jacobians(list(wrt)), {}, ("p",))
+    return interval_by_interval(
+        steps_along(model, dt, wrt),
+        lambda: jacobians_at_the_end(model, dt, wrt),
+        lambda: Stepper(model, dt).one_step_jacobians(list(wrt)),
+        {},
+        ("p",),
+    )
 
 
 def _probe(model: Model, site: str) -> Effect:
