@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from adaptive_flot.errors import ResultError, near_match
 from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.greybox.model import Model, Quantity
-from adaptive_flot.runner.commands.simulate import simulate_record
+from adaptive_flot.runner.commands.simulate import MEASURED, simulate_record
 from adaptive_flot.targets import check_targets
 
 if TYPE_CHECKING:
@@ -80,8 +80,11 @@ class Simulation:
                 raise ResultError(f"plot: no column {given!r} here; {near_match(given, (*by_name, *known))}")
             q, values = known[column], self.table[column].to_numpy(dtype=float)
             time = self.table[TIME_COLUMN].to_numpy(dtype=float)
-            trace = Trace("", time, values, Role.ESTIMATE, held=column in inputs)
-            panels.append(Panel(q.name.replace("_", " "), q.unit, (trace,), height=0.8))
+            traces = [Trace("", time, values, Role.ESTIMATE, held=column in inputs)]
+            if column + MEASURED in self.table:
+                seen = self.table[column + MEASURED].to_numpy(dtype=float)
+                traces = [Trace("measured", time, seen, Role.TRUTH), replace(traces[0], label="simulated")]
+            panels.append(Panel(q.name.replace("_", " "), q.unit, tuple(traces), height=0.8))
         return time_figure(panels)
 
     def save(self, path: Path | str) -> Path:
@@ -120,9 +123,10 @@ class Simulation:
 def simulate(model: AnyModel, inputs: AnyRecord, *, accurate: bool = False) -> Simulation:
     """Simulate a table of inputs: every state, output and signal comes out.
 
-    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
-    the `initial_guess` of a model that has none and does not start steady. Each further row holds the inputs during the
-    interval that ends at its time.
+    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs. A
+    model with `starts_steady=False` starts where outputs show its states, and else at its `initial_guess`. Each further
+    row holds the inputs during the interval that ends at its time. What the table has of an output comes out beside it,
+    with `_measured` behind the name of the column.
 
     Parameters
     ----------

@@ -29,14 +29,16 @@ def simulate(
     json: Annotated[Path | None, typer.Option("--json", help="With --draws: write the summary here.")] = None,
     compile_: Compile = False,
 ) -> None:
-    """Simulate a table of inputs: every state and output column comes out.
+    """Simulate a table of inputs: every state and output column comes out, and beside them what was measured.
 
     With --draws the constants of a file of ranges are drawn, and quantiles of each output come out. Without a table
     the air then goes up in four steps over the operating range of the cell.
     """
+    from adaptive_flot.console.lines import print_sentences
+    from adaptive_flot.greybox.data.dataset import read_dataset
     from adaptive_flot.greybox.data.tables import check_table_path, write_table
     from adaptive_flot.processes.registry import make_model
-    from adaptive_flot.runner.commands.simulate import simulate_file
+    from adaptive_flot.runner.commands.simulate import misfit, simulate_record, start_of
 
     if draws is not None:
         if accurate or model != "flotation" or cell is None:
@@ -50,8 +52,16 @@ def simulate(
         raise DataError("simulate: no table of inputs; give one, or --draws and a file of ranges")
     check_targets([inputs, *model_inputs(model, cell, inputs.parent)], [("--out", out)])
     check_table_path(out)
-    table = simulate_file(inputs, make_model(model, cell=cell, folder=inputs.parent), accurate=accurate)
+    made = make_model(model, cell=cell, folder=inputs.parent)
+    record = read_dataset(inputs, made)
+    table = simulate_record(record, made, accurate=accurate)
     write_table(table, out)
+    told = [f"It starts from {start_of(record, made).words}.", *record.notes]
+    units = {q.name: "" if q.unit == "-" else f" {q.unit}" for q in made.outputs}
+    errors = [f"{name} {size:.3g}{units[name]}" for name, size in misfit(table, made).items()]
+    if errors:
+        told.append(f"Measured minus simulated, root mean square: {', '.join(errors)}.")
+    print_sentences(f"- {sentence}" for sentence in told)
     typer.echo(f"{len(table)} rows: {out}")
 
 

@@ -72,6 +72,14 @@ def test_results_show_plot_and_report_themselves(fit: Estimation, simulated: Sim
     assert len(pd.read_csv(simulated.save(tmp_path / "table.csv"))) == len(simulated.table)
 
 
+def test_a_simulation_is_drawn_over_what_was_measured(simulated: Simulation, record: pd.DataFrame) -> None:
+    again = af.simulate(simulated.model, record.assign(**{"level_m": np.nan}))
+    (axes,) = again.plot(["concentrate_grade"]).axes
+    drawn = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.lines}
+    np.testing.assert_array_equal(drawn["measured"], record["concentrate_grade"])
+    np.testing.assert_array_equal(drawn["simulated"], again.table["concentrate_grade"])
+
+
 def test_a_record_at_hand_gives_what_its_table_gives(record: pd.DataFrame, fit: Estimation) -> None:
     model = fit.result.setup.model
     again = af.estimate(model, af.read_dataset(record, model), estimators=["fixed", "pem"], parameters=["C"])

@@ -1,6 +1,8 @@
-"""Simulate a table of inputs with the flotation model."""
+"""Simulate a table of inputs."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,6 +13,9 @@ from adaptive_flot.greybox.data.tables import Source
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
+
+MEASURED = "_measured"
+"""Behind the name of a column of an output: what the record has of it."""
 
 
 def simulate_file(path: Source, model: Model, *, accurate: bool = False) -> pd.DataFrame:
@@ -24,17 +29,24 @@ def simulate_file(path: Source, model: Model, *, accurate: bool = False) -> pd.D
     return simulate_record(read_dataset(path, model), model, accurate=accurate)
 
 
+@dataclass(frozen=True)
+class Start:
+    """Where a simulation starts: the state (nx,), and in words where that is from."""
+
+    state: FloatArray
+    words: str
+
+
 def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) -> pd.DataFrame:
     """Every state, output and signal of the model for the inputs (and parameters) of a record.
 
-    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
-    the `initial_guess` of a model that has none and does not start steady. Each further row holds inputs and parameters
-    during the interval that ends at its time.
+    Row 0 is the initial condition, see `start_of`. Each further row holds inputs and parameters during the interval
+    that ends at its time.
 
     Parameters
     ----------
     record
-        The record; its outputs are not used.
+        The record; its outputs are shown beside the simulated ones, and may say where it starts.
     model
         The model.
     accurate
@@ -43,7 +55,8 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     Returns
     -------
     DataFrame
-        `time_s`, inputs, parameters of the record by label, outputs, signals, and the states that are no outputs.
+        `time_s`, inputs, parameters of the record by label, outputs, signals, and the states that are no outputs. What
+        is measured has `_measured` behind the name of its column.
 
     Raises
     ------
@@ -54,9 +67,7 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     for name, values in record.parameters.items():
         p[:, model.index("parameters", name)] = values
     _check_parameters(record, model)
-    x0 = record.initial_state
-    if x0 is None:
-        x0 = _assumed_start(record, model, p[0])
+    x0 = start_of(record, model).state
     stepper = Stepper(model, record.dt, accurate=accurate)
     run = stepper.simulate(x0, record.inputs[1:], p[1:], record.time[0])
     states = np.vstack([x0, run.states])
@@ -71,17 +82,62 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     columns |= {q.column: shown[:, j] for j, q in enumerate((*model.outputs, *model.signals))}
     for j, q in enumerate(model.states):
         columns.setdefault(q.column, states[:, j])
+    measured = {q.name: record.outputs[:, j] for j, q in enumerate(model.outputs)}
+    columns |= {q.column + MEASURED: measured[q.name] for q in model.outputs if q.name in record.measured(model)}
     return pd.DataFrame(columns)
 
 
-def _assumed_start(record: Dataset, model: Model, parameters: FloatArray) -> FloatArray:
-    """State (nx,) at the first row of a record that does not hold it; `parameters` (np,) are those of that row."""
+def start_of(record: Dataset, model: Model) -> Start:
+    """Where the simulation of a record starts.
+
+    The states in the first row, if it holds all of them. Else, of a model that starts steady, the steady state of that
+    row's inputs. Of another model each state starts where an output of its name shows it, or at its `initial_guess`;
+    what has neither starts at the steady state, or where there is none, at its scale.
+
+    Parameters
+    ----------
+    record, model
+        What is simulated.
+
+    Raises
+    ------
+    RangeError
+        A model that starts steady has no steady state there.
+    """
+    if record.initial_state is not None:
+        return Start(record.initial_state, "the states in the first row")
+    parameters = model.parameter_values.copy()
+    for name, values in record.parameters.items():
+        parameters[model.index("parameters", name)] = values[0]
+    at_rest = "the steady state of the first row's inputs"
     try:
-        return steady_state(model, record.inputs[0], parameters, time=float(record.time[0])).state
+        state, elsewhere = steady_state(model, record.inputs[0], parameters, time=float(record.time[0])).state, at_rest
     except RangeError:
         if model.starts_steady:
             raise
-        return model.first_guess  # a battery never rests
+        state, elsewhere = model.first_guess, "its scale"  # a battery never rests
+    if model.starts_steady:
+        return Start(state, at_rest)
+    shown = {(q.name, q.unit): y for q, y in zip(model.outputs, record.outputs[0], strict=True) if np.isfinite(y)}
+    parts: dict[str, list[str]] = {}
+    for j, q in enumerate(model.states):
+        if (q.name, q.unit) in shown:
+            state[j], source = shown[q.name, q.unit], "as measured in the first row"
+        elif q.name in model.initial_guess:
+            state[j], source = model.initial_guess[q.name], "at its initial_guess"
+        else:
+            source = f"at {elsewhere}"
+        parts.setdefault(source, []).append(q.name)
+    return Start(state, "; ".join(f"{', '.join(names)} {source}" for source, names in parts.items()))
+
+
+def misfit(table: pd.DataFrame, model: Model) -> dict[str, float]:
+    """Root mean square of measured minus simulated, by name of the output, from a table of `simulate_record`."""
+    return {
+        q.name: float(np.sqrt(np.nanmean((table[q.column + MEASURED] - table[q.column]) ** 2)))
+        for q in model.outputs
+        if q.column + MEASURED in table
+    }
 
 
 def _check_parameters(record: Dataset, model: Model) -> None:

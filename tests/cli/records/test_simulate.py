@@ -37,7 +37,10 @@ def test_a_simulated_table_comes_back(call: Call, truth: pd.DataFrame, tmp_path:
     assert "150 rows" in result.out
     read: Callable[[Path], pd.DataFrame] = pd.read_csv if suffix == ".csv" else pd.read_parquet
     again = read(tmp_path / "new" / f"again{suffix}")
-    assert set(again.columns) == set(truth.columns)
+    measured = {"level_m", "tails_flow_m3_s", "concentrate_grade", "air_recovery", "concentrate_flow_m3_s", "recovery"}
+    assert set(again.columns) == set(truth.columns) | {f"{column}_measured" for column in measured}
+    words = " ".join(result.out.split())
+    assert "starts from the states in the first row" in words and "root mean square" in words
     for column in truth.columns:
         np.testing.assert_allclose(again[column], truth[column], rtol=1e-9, err_msg=column)
 

@@ -14,7 +14,7 @@ from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from adaptive_flot.runner.commands.simulate import simulate_file, simulate_record
+from adaptive_flot.runner.commands.simulate import misfit, simulate_file, simulate_record, start_of
 
 ROWS = 30
 
@@ -79,11 +79,58 @@ def test_a_model_without_a_steady_state_starts_from_its_first_guess() -> None:
         simulate_record(record, store(True))
 
 
-def test_a_model_that_has_a_steady_state_starts_there_though_its_records_need_not(
-    model: Model, record: Dataset
-) -> None:
-    moving = replace(model, starts_steady=False)
-    np.testing.assert_array_equal(simulate_record(record, moving), simulate_record(record, model))
+def test_a_model_that_need_not_start_steady_starts_at_its_guess(model: Model, record: Dataset) -> None:
+    """What has no guess starts at the steady state, where there is one."""
+    steady = steady_state(model, record.inputs[0], model.parameter_values).state
+    own = {"level": 0.9 * steady[model.index("states", "level")]}
+    blank = replace(record, initial_state=None, parameters={})
+    moving = replace(model, starts_steady=False, initial_guess=own)
+    start = start_of(blank, moving)
+    np.testing.assert_array_equal(start.state[model.index("states", "level")], own["level"])
+    rest = [j for j, q in enumerate(model.states) if q.name != "level"]
+    np.testing.assert_allclose(start.state[rest], steady[rest], rtol=1e-6)
+    assert "level at its initial_guess" in start.words and "at the steady state" in start.words
+
+
+def test_a_state_starts_where_the_first_row_shows_it() -> None:
+    """Also where another state has no column: that one starts at its guess. A steady model starts at rest."""
+
+    def equations(m: Scope) -> None:
+        heat = m.state("heat")
+        m.derivative("heat", m.input("power") - 0.1 * heat)
+        m.derivative("hidden", heat - m.state("hidden"))
+        m.output("heat", heat)
+
+    cooling = Model(
+        name="cooling",
+        states=(Quantity("heat", "K", "", -1e3, 1e3), Quantity("hidden", "W", "", -1e3, 1e3)),
+        inputs=(Quantity("power", "W", "", 0.0, 10.0),),
+        parameters=(),
+        outputs=(Quantity("heat", "K", ""),),
+        equations=equations,
+        starts_steady=False,
+        initial_guess={"heat": 3.0, "hidden": 4.0},
+    )
+    record = Dataset("r", np.arange(4.0), 1.0, np.ones((4, 1)), np.array([[7.0], [np.nan], [6.0], [5.0]]))
+    start = start_of(record, cooling)
+    assert start.state.tolist() == [7.0, 4.0]
+    assert start.words == "heat as measured in the first row; hidden at its initial_guess"
+    steady = start_of(record, replace(cooling, starts_steady=True))
+    np.testing.assert_allclose(steady.state, [10.0, 10.0], rtol=1e-6)
+    unseen = replace(record, outputs=np.full((4, 1), np.nan))
+    assert start_of(unseen, cooling).state.tolist() == [3.0, 4.0]
+
+
+def test_what_is_measured_stands_beside_what_is_simulated(model: Model, record: Dataset) -> None:
+    outputs = np.full((len(record), len(model.outputs)), np.nan)
+    clean = simulate_record(record, model)
+    level = model.index("outputs", "level")
+    outputs[1:, level] = clean["level_m"].iloc[1:] + 0.003
+    table = simulate_record(replace(record, outputs=outputs), model)
+    np.testing.assert_array_equal(table["level_m"], clean["level_m"])
+    np.testing.assert_array_equal(table["level_m_measured"], outputs[:, level])
+    assert [c for c in map(str, table) if c.endswith("_measured")] == ["level_m_measured"]
+    assert misfit(table, model) == {"level": pytest.approx(0.003)}
 
 
 def test_a_steady_record_stays_where_it_is(model: Model, record: Dataset) -> None:
