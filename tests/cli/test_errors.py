@@ -43,7 +43,7 @@ TABLES: Mapping[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], list[str]]] =
     "missing time": (lambda t: t.drop(columns="time_s"), ["'time_s' is missing"]),
     "wrong unit of an input": (
         lambda t: t.rename(columns={"air_flow_m3_s": "air_flow_m3_h"}),
-        ["'air_flow_m3_h'", "convert it to m3/s", "'air_flow_m3_s'"],
+        ["'air_flow_m3_h'", "multiply the column by 0.000277778 and name it", "'air_flow_m3_s'"],
     ),
     "wrong unit of the time": (lambda t: t.rename(columns={"time_s": "time_min"}), ["'time_min'", "'time_s'"]),
     "wrong unit of an output": (

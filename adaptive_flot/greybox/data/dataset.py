@@ -18,7 +18,7 @@ from adaptive_flot.greybox.data.columns import UNIFORMITY, line, numeric_column,
 from adaptive_flot.greybox.data.lost_rows import with_lost_rows
 from adaptive_flot.greybox.data.stretches import longest_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
-from adaptive_flot.greybox.data.wrong_unit import check_unit
+from adaptive_flot.greybox.data.wrong_unit import check_unit, conversion_of
 from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
 MOST_STEPS = 5_000_000
@@ -168,14 +168,16 @@ def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path,
         return column
     other = _other_unit(columns, name, column)
     if other is not None:
+        how = conversion_of(unit, other.removeprefix(f"{name}_"))
         raise DataError(
-            f"{file}: column {other!r} has the wrong unit suffix; convert it to {unit} and name it {column!r}"
+            f"{file}: column {other!r} has the wrong unit suffix; {how or f'convert it to {unit}'} and name it "
+            f"{column!r}, or import it: 'adaptive-flot import' converts units"
         )
     if f"{column}_measured" in columns:
         raise DataError(f"{file}: column {column!r} is missing; of a time series of `run`, rename '{column}_measured'")
     hint = ", or make a record of an export with 'adaptive-flot import'" if column == TIME_COLUMN else ""
     free = [c for c in columns if c not in taken]
-    meant = near_match(column, free) if free else "the file has no other columns"
+    meant = near_match(column, free) if free else "every column of the file has another use"
     raise DataError(f"{file}: column {column!r} is missing; add it ({meant}){hint}")
 
 
@@ -186,7 +188,26 @@ def _other_unit(columns: Sequence[str], name: str, column: str) -> str | None:
 
 def _looks_like_unit(suffix: str) -> bool:
     units = {"s", "ms", "min", "h", "d", "m", "mm", "cm", "km", "m3", "l", "L", "ml", "kg", "g", "t", "pct", "percent"}
-    units |= {"V", "mV", "C", "K", "lpm", "cfm", "ft", "in", "gpm", "ppm", "frac"}
+    units |= {
+        "V",
+        "mV",
+        "C",
+        "K",
+        "lpm",
+        "cfm",
+        "ft",
+        "in",
+        "gpm",
+        "ppm",
+        "frac",
+        "mA",
+        "bar",
+        "Pa",
+        "kPa",
+        "kW",
+        "degC",
+        "degF",
+    }
     return bool(suffix) and all(part in units for part in suffix.split("_"))
 
 

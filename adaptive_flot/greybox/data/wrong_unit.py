@@ -21,8 +21,13 @@ OTHER_UNITS = {
     "1/s": {"1/min": 1 / 60},
 }
 """Units that plants use instead of a model's, and what one of them is in it."""
-OFFSETS = {"K": {"degC": (1.0, 273.15), "degF": (5 / 9, 273.15 - 32 * 5 / 9)}}
+OFFSETS = {
+    "K": {"degC": (1.0, 273.15), "degF": (5 / 9, 273.15 - 32 * 5 / 9)},
+    "degC": {"K": (1.0, -273.15), "degF": (5 / 9, -32 * 5 / 9)},
+}
 """Units whose zero is another one: what one of them is in a model's unit, and where their zero is."""
+SPELT = {"%": ("pct", "percent"), "degC": ("C",), "degF": ("F",), "L/min": ("lpm",)}
+"""How else the suffix of a column has a unit."""
 FAR = 20.0
 """A median so many times as large as what is usual is of another unit."""
 
@@ -89,11 +94,26 @@ def check_unit(quantity: Quantity, values: FloatArray, where: str) -> None:
         )
 
 
+def conversion_of(unit: str, suffix: str) -> str | None:
+    """What to do with a column of a table that carries another unit as its suffix, in words; None where not known.
+
+    >>> conversion_of("V", "mV"), conversion_of("m3/s", "L_min"), conversion_of("K", "C"), conversion_of("V", "volt")
+    ('multiply the column by 0.001', 'multiply the column by 1.66667e-05', 'add 273.15 to the column', None)
+    """
+    known = (*OTHER_UNITS.get(unit, {}), *OFFSETS.get(unit, {}))
+    meant = {spelt.lower(): other for other in known for spelt in (other.replace("/", "_"), *SPELT.get(other, ()))}
+    other = meant.get(suffix.lower())
+    return None if other is None else _converted(unit, other)
+
+
 def _converted(unit: str, other: str) -> str:
     """What to do with a column, in words."""
     if other in OFFSETS.get(unit, {}):
         factor, offset = OFFSETS[unit][other]
+        moved = f"add {offset:g}" if offset > 0 else f"subtract {-offset:g}"
         return (
-            f"add {offset:g} to the column" if factor == 1 else f"multiply the column by {factor:g} and add {offset:g}"
+            f"{moved} {'to' if offset > 0 else 'from'} the column"
+            if factor == 1
+            else f"multiply the column by {factor:g} and {moved}"
         )
     return f"multiply the column by {OTHER_UNITS[unit][other]:g}"

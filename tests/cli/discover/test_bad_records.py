@@ -67,7 +67,9 @@ def test_a_record_without_an_output_is_refused_in_the_same_words(call: Call, tmp
     write_tank(tmp_path).drop(columns="temperature_K").to_csv(tmp_path / "tank.csv", index=False)
     result = call(command, "tank.csv", "--model", "heated:make_model", "--out", "r")
     assert result.code == 2 and len(result.err.splitlines()) == 1
-    assert "tank.csv: column 'temperature_K' is missing; add it (the file has no other columns)" in result.err
+    assert (
+        "tank.csv: column 'temperature_K' is missing; add it (every column of the file has another use)" in result.err
+    )
     assert not (tmp_path / "r").exists()
 
 
