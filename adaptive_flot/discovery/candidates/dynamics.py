@@ -1,4 +1,4 @@
-"""Sensors that respond late, actuators that follow late, stick or reach a limit: what each does to the value there."""
+"""Sensors that respond late, actuators that follow late, stick, reach a limit or leak: what each does to the value."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ LONGEST_DELAY = 0.2
 """Longest dead time that is tried, as a share of the record."""
 LIMIT_QUANTILES = (0.6, 0.75, 0.9)
 """An actuator is scored with a limit at these quantiles of what is asked of it."""
+FLOOR_QUANTILES = (0.1, 0.25, 0.4)
+"""An actuator is scored with a floor at these quantiles of what is asked of it."""
 LIMIT_WIDTH = 0.01
 """Rounding of the limit, as a share of the range of what is asked."""
 BANDS = (0.3, 1.0)
@@ -90,6 +92,19 @@ def limited(site: Site, responses: Responses) -> Iterator[Variant]:
         if limit < float(np.max(v)):
             profile = TimeProfile(site.name, -np.maximum(v - limit, 0.0), True)
             yield Variant(effect, (profile,), ("amplitude",), (("limit", limit),))
+
+
+def leaking(site: Site, responses: Responses) -> Iterator[Variant]:
+    """What is asked of an actuator, that lets something through when less is asked: it does not close."""
+    v = responses.site_values[site.name]
+    if not _moves(v):
+        return
+    effect = Effect(site.name, "own_value", "leak", settings={"width": LIMIT_WIDTH * float(np.ptp(v))})
+    for share in FLOOR_QUANTILES:
+        floor = float(np.quantile(v, share))
+        if floor > float(np.min(v)):
+            profile = TimeProfile(site.name, np.maximum(floor - v, 0.0), True)
+            yield Variant(effect, (profile,), ("amplitude",), (("level", floor),))
 
 
 def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:

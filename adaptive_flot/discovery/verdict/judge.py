@@ -14,6 +14,8 @@ from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.effects import LATE, STATELESS_DRIVERS
 from adaptive_flot.greybox.model import Model
 
+BOUNDED = ("saturation", "own_value")
+"""Drivers of a part that reaches a limit, or does not close."""
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 MUCH = 0.1
@@ -80,15 +82,15 @@ def judge(result: SearchResult) -> Judgement:
 def _one_way_each(members: Sequence[Name]) -> tuple[Name, ...]:
     """The members, the best first, each part once for each way in which it may be wrong.
 
-    A lag and a dead time look alike, and so do a limit and a bent dependence.
+    A lag and a dead time look alike, and so do a limit or a floor and a bent dependence.
     """
-    limited = {site for site, driver in members if driver == "saturation"}
+    limited = {site for site, driver in members if driver in BOUNDED}
 
     def way(name: Name) -> Name:
         site, driver = name
         if driver in LATE:
             return site, "late"
-        bent = driver == "saturation" or (site in limited and driver not in STATELESS_DRIVERS)
+        bent = driver in BOUNDED or (site in limited and driver not in STATELESS_DRIVERS)
         return site, "limited" if bent else driver
 
     likeliest = {way(n): n for n in reversed(members)}.values()

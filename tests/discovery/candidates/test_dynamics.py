@@ -1,4 +1,4 @@
-"""Actuators that stick or reach a limit are found as such: on the heated tank, whose heater is made to."""
+"""Actuators that stick, reach a limit or do not close are found as such: on the heated tank, whose heater is made to."""
 
 from __future__ import annotations
 
@@ -44,6 +44,18 @@ def test_a_heater_at_its_limit_is_named() -> None:
     )
     if found.effects[0].effect.driver == "saturation":
         assert found.effects[0].effect.coefficients["limit"] == pytest.approx(0.9 * 2000.0, rel=0.03)
+
+
+def test_a_heater_that_does_not_close_is_named_with_what_it_lets_through() -> None:
+    """Without a reference, too. It was told as a heater that depends on its own power, by a curve."""
+    asked = moves(600, 500, 3000, 30, 1)
+    found = discover(heated_tank(), _told(asked, np.maximum(asked, 1200.0))).verdict
+    assert found.word == "named", found.reason
+    (told,) = found.effects
+    assert (told.effect.site, told.effect.driver, told.effect.form) == ("heating", "own_value", "leak")
+    floor = told.effect.coefficients["level"]
+    assert floor == pytest.approx(0.9 * 1200.0, rel=0.03)
+    assert found.reason.startswith(f"Heating does not go below {floor:.0f} W, whatever is asked"), found.reason
 
 
 def test_a_heater_with_play_is_told_with_its_size() -> None:

@@ -148,7 +148,7 @@ def changed(line: int, text: str) -> tuple[str, ...]:
         (changed(1, "time_s,inflo_m3_s,level_m,outflow_m3_s"), ("'inflow_m3_s' is missing", "mean 'inflo_m3_s'")),
         (changed(1, "t,inflow_m3_s,level_m,outflow_m3_s"), ("'time_s' is missing", "add it")),
         (changed(1, "time_min,inflow_m3_s,level_m,outflow_m3_s"), ("'time_min' has the wrong unit", "'time_s'")),
-        (changed(1, "time_s,inflow_m3_h,level_m,outflow_m3_s"), ("'inflow_m3_h' has the wrong unit", "column by 0.000277778 and name it 'inflow_m3_s'")),
+        (changed(1, "time_s,inflow_m3_h,level_m,outflow_m3_s"), ("'inflow_m3_h' has the wrong unit", "by 0.000277778 and name it")),
         (changed(1, "time_s,inflow,level_m,outflow_m3_s"), ("'inflow' has the wrong unit", "name it 'inflow_m3_s'")),
         (changed(1, "time_s,inflow_m3_s,level_cm,outflow_m3_s"), ("'level_cm' has the wrong unit", "column by 0.01 and name it 'level_m'")),
         (changed(3, "2,,1.1,0.2"), ("input 'inflow_m3_s' has no value in line 3", "1 in all", "fill in")),

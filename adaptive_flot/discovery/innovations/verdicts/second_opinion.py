@@ -116,8 +116,12 @@ def second_opinion(state: State) -> State:
 
 
 def _with_both(state: State, search: Search, first: Told) -> State:
-    """The state with a note on two effects that explain a record best together, and are not told (see `not_two`)."""
-    if state.judged.word != "abstain" or first.word != "named" or len(first.certain) != 2:
+    """The state with a note on two effects that explain a record best together, and are not told (see `not_two`).
+
+    Of a class the second is one of those that are open.
+    """
+    needed = len(first.certain) + (first.word == "class")
+    if state.judged.word != "abstain" or first.word not in WITH_A_NAME or needed != 2:
         return state
     words = told_in_words(search, first).rstrip(".")
     said = "with process noise two effects together are best, which more often stand in for a third thing"

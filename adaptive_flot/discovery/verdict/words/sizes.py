@@ -62,6 +62,8 @@ def words_of_effect(model: Model, told: NamedEffect, curve: EffectCurve | None =
     elif effect.driver == "saturation":
         (limit,) = effect.values(CoefficientRole.LIMIT)
         said = f"{name} does not go beyond {short(limit)}{_unit(site)}"
+    elif floor := effect.values(CoefficientRole.FLOOR):
+        said = f"{name} does not go below {short(floor[0])}{_unit(site)}, whatever is asked"
     elif effect.family.is_event and (level := effect.values(CoefficientRole.POSITION)):
         (begin,), (long,) = effect.values(CoefficientRole.ONSET), effect.values(CoefficientRole.DURATION)
         verb, asked = ("showed", "") if site.role == "sensor" else ("stayed at", ", whatever was asked")
