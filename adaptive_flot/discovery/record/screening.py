@@ -16,6 +16,8 @@ from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 FEWEST_ROWS = 200
 FROZEN_ROWS = 30
 """So many equal values in a row, in a signal that else changes from sample to sample, are a frozen sensor."""
+SLOW = 1.5
+"""Steps into and out of a run of equal values, in the least steps of a signal, where a slow curve turns."""
 MOST_FROZEN = 0.3
 """An input that stands still for a larger share of the record is moved in steps."""
 CLIPPED_SHARE = 0.03
@@ -218,13 +220,27 @@ def _outliers(values: FloatArray) -> float:
     return float(np.mean(away > max(8 * noise, float(np.quantile(middle, 0.9) - np.quantile(middle, 0.1)))))
 
 
+def _turns(step: FloatArray, a: int, b: int, least: float) -> bool:
+    """Whether a run of equal values, steps a to b, is left to the side from where it was reached, by least steps."""
+    if a == 0 or b >= len(step):
+        return False
+    into, out = float(step[a - 1]), float(step[b])
+    return into * out < 0 and max(abs(into), abs(out)) <= least
+
+
 def _frozen(values: FloatArray) -> BoolArray:
-    """Mask of samples in long runs of one value, if most other samples differ from their neighbours."""
-    same = np.diff(values) == 0
+    """Mask of samples in long runs of one value, if most other samples differ from their neighbours.
+
+    Not where a slow curve turns: there its rounded values stay, and go into the run and out of it by the least step
+    that they know. A sensor that had stopped jumps to where the process is by then.
+    """
+    step = np.diff(values)
+    same = step == 0
+    least = SLOW * float(np.min(np.abs(step[~same]), initial=np.inf))
     mask = np.zeros(len(values), dtype=bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
     runs = list(zip(edges[::2], edges[1::2], strict=True))
-    long = [(a, b) for a, b in runs if b - a >= FROZEN_ROWS]
+    long = [(a, b) for a, b in runs if b - a >= FROZEN_ROWS and not _turns(step, a, b, least)]
     elsewhere = same.copy()
     for a, b in long:
         elsewhere[a:b] = False

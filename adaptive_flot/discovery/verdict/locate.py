@@ -11,7 +11,11 @@ from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.results import Detection, Location, Place
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 
-CAUSES = {"constant": "all the time", "time": "with time", **dict.fromkeys((*DYNAMIC_DRIVERS, "own_value"), "late or limited")}
+CAUSES = {
+    "constant": "all the time",
+    "time": "with time",
+    **dict.fromkeys((*DYNAMIC_DRIVERS, "own_value"), "late or limited"),
+}
 
 
 def locate(detection: Detection, scores: tuple[Score, ...]) -> Location:

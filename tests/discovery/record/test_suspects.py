@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.record.screening import Suspect, clean_outputs
+from adaptive_flot.discovery.record.screening import FROZEN_ROWS, Suspect, _frozen, clean_outputs
 from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.heated import Truth, heated_tank, tank_record
@@ -34,6 +34,21 @@ def test_a_curve_is_judged_where_it_moves_most_and_a_dependence_not_at_all() -> 
     assert suspect_notes([late], [FROZEN], 30.0) and not suspect_notes([early], [FROZEN], 30.0)
     by_fan = Effect("heat_loss", "fan_speed", "power", {"exponent": 0.6}, {"reference": 10.0})
     assert suspect_notes([by_fan], [FROZEN], 30.0) == ()
+
+
+def test_a_slow_curve_that_turns_has_not_stopped_where_its_rounded_values_stay() -> None:
+    """The temperature of water over two days, in steps of 0.01 K. A sensor that stops there jumps when it goes on."""
+    time = np.arange(2160) * 120.0
+    water = np.round(15 + 2.0 * np.sin(2 * np.pi * time / 172_800), 2)
+    runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[-1.0], water, [-1.0]]))))
+    assert runs.max() >= FROZEN_ROWS  # it does stay
+    assert not _frozen(water).any()
+    stopped = water.copy()
+    stopped[400:480] = stopped[400]
+    assert _frozen(stopped)[410:470].all()
+    rest = water.copy()
+    rest[2000:] = rest[2000]  # and does not come back
+    assert _frozen(rest)[2010:].all()
 
 
 def test_what_is_frozen_missing_or_stands_still_becomes_a_suspect_part() -> None:
