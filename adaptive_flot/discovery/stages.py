@@ -32,7 +32,7 @@ from adaptive_flot.discovery.fitting.unseen_end import with_unseen_ends
 from adaptive_flot.discovery.record.even_steps import steps_evenly
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
-from adaptive_flot.discovery.record.screening import screen
+from adaptive_flot.discovery.record.screening import screen, where_noise_changes
 from adaptive_flot.discovery.results import State, Verdict
 from adaptive_flot.discovery.search.common_nuisance import adjust_for_common_nuisance
 from adaptive_flot.discovery.search.joint_search import search_jointly, wants_joint
@@ -107,7 +107,11 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     said += wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
     if not state.adapted:
         said += (NONE_FITTED,)
-    screening = replace(state.screening, notes=state.screening.notes + said)
+    measured = [state.model.outputs[c].name for c in problem.columns]
+    doubtful = where_noise_changes(problem.noise_changes, measured, problem.record.time)
+    said += tuple(f"{each}: rows with more noise count less" for each in doubtful)
+    screening = state.screening
+    screening = replace(screening, notes=screening.notes + said, suspects=screening.suspects + doubtful)
     took = time.monotonic() - began
     problem = replace(problem, deadline=min(problem.deadline, state.ends - FINAL_SHARE * took))
     state = replace(state, model=model, screening=screening, problem=problem, base_seconds=took)

@@ -12,6 +12,7 @@ from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import placements, with_nodes
 from adaptive_flot.discovery.record.noise import proportional
+from adaptive_flot.discovery.record.noise_level import noise_changes, noise_levels
 from adaptive_flot.discovery.record.problem import CYCLES, Problem, make_problem, split_names
 from adaptive_flot.discovery.record.robust import noise_beside_motion
 from adaptive_flot.discovery.record.screening import Screening
@@ -61,7 +62,7 @@ def split_finer(problem: Problem, cycle: Sequence[str], least_rows: int) -> Prob
 
 
 def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
-    """Fit the model as it is, twice: the first residual shows how the noise grows.
+    """Fit the model as it is, twice: the first residual shows how the noise grows, and whether it changes.
 
     Rows that make no difference are left out of the runs: first to the model as it came, then to the first fit.
     """
@@ -78,7 +79,10 @@ def prepare(problem: Problem, model: Model) -> tuple[Problem, Fit] | None:
         return None
     first = _from_elsewhere(problem, start, first)
     seen = np.where(problem.rows("estimate")[:, None], first.residual(problem), np.nan)
-    problem = with_nodes(problem.with_weights(proportional(seen, first.predicted)), first, placed)
+    weights = proportional(seen, first.predicted)
+    changes = noise_changes(seen / weights)
+    problem = replace(problem, weights=weights * noise_levels(changes, *weights.shape), noise_changes=changes)
+    problem = with_nodes(problem, first, placed)
     fitter = Fitter(problem)
     base = fitter.fit(first.model, like=first, rounds=2)
     if base is None:

@@ -9,6 +9,7 @@ even_steps.py         Outputs that move at even times only: an analyser that is 
 seen.py               What was at every site along a run of a model.
 slip_jump.py          A part that stays, and then jumps: its positions, and the bands that give the same ones.
 noise.py              What the noise of each output looks like.
+noise_level.py        Outputs whose noise becomes several times as large at some time.
 robust.py             Spread without outliers, noise without a model, spikes.
 effective_samples.py  How many rows of a correlated series count as one sample.
 """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from adaptive_flot.discovery.record.background import Background
 from adaptive_flot.discovery.record.noise import Noise, fit_noise, white_noise
+from adaptive_flot.discovery.record.noise_level import NoiseChange
 from adaptive_flot.discovery.record.robust import CLIP
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
@@ -55,6 +56,8 @@ class Problem:
         offered beside an effect either: there it would only put right what the shape of that one lacks.
     evenly_moved
         Measured outputs, as indices into `columns`, that move at even times only: see `record.even_steps`.
+    noise_changes
+        Outputs whose noise becomes several times as large, or as small, at some time; it is in the weights.
     deadline
         When searches and fits are to end, by `time.monotonic` [s]: they keep what they have come to.
     nodes
@@ -75,6 +78,7 @@ class Problem:
     site_sizes: Mapping[str, float] = field(default_factory=dict)
     absorbed: frozenset[tuple[str, str]] = frozenset()
     evenly_moved: frozenset[int] = frozenset()
+    noise_changes: tuple[NoiseChange, ...] = ()
     deadline: float = float("inf")
 
     @property
@@ -117,10 +121,6 @@ class Problem:
         starts, stops = (np.flatnonzero(np.diff(inside) == sign) for sign in (1, -1))
         time = self.record.time
         return tuple((float(time[a]), float(time[b - 1])) for a, b in zip(starts, stops, strict=True))
-
-    def with_weights(self, weights: FloatArray) -> Problem:
-        """Return the same problem with the noise weights (N, m)."""
-        return replace(self, weights=weights)
 
 
 def make_problem(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
 
 from adaptive_flot.discovery.record.noise import is_dense
+from adaptive_flot.discovery.record.noise_level import NoiseChange
 from adaptive_flot.discovery.record.problem import BoolArray
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.data.wrong_unit import is_far_outside
@@ -46,7 +48,8 @@ class Suspect:
     what: str
 
     def __str__(self) -> str:
-        return f"{self.what} from {self.start:g} to {self.end:g} s"
+        when = f"at {self.start:g} s" if self.start == self.end else f"from {self.start:g} to {self.end:g} s"
+        return f"{self.what} {when}"
 
 
 @dataclass(frozen=True)
@@ -138,6 +141,18 @@ def _unrecorded(record: Dataset) -> list[Suspect]:
         for a, b in found
         if b - a < FROZEN_ROWS
     ]
+
+
+def where_noise_changes(
+    changes: Sequence[NoiseChange], measured: Sequence[str], time: FloatArray
+) -> tuple[Suspect, ...]:
+    """Times [s] at which the noise changes, with a word; `measured` are the names of the outputs, `time` is (N,)."""
+    found = []
+    for change in changes:
+        words = f"{change.ratio:.2g} times as large" if change.ratio > 1 else f"{1 / change.ratio:.2g} times smaller"
+        at = float(time[change.row])
+        found.append(Suspect(at, at, f"the noise of {measured[change.column]} becomes {words}"))
+    return tuple(found)
 
 
 def out_of_range(quantity: Quantity, values: FloatArray) -> list[str]:

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from adaptive_flot.discovery.assessment.beside_background import drop_beside_background, unknown_of_background
+from adaptive_flot.discovery.background import spread as spread_module
 from adaptive_flot.discovery.background.evidence import Evidence, Spread
 from adaptive_flot.discovery.background.fitting import background_of
 from adaptive_flot.discovery.background.linear import uncertain_constants
@@ -19,6 +20,7 @@ from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.background import Course
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.results import Judgement, OutputChange
 from adaptive_flot.discovery.search.rounds import scorer_of
@@ -111,6 +113,28 @@ def test_constants_are_those_of_the_process_that_are_not_fitted() -> None:
 
 def test_constants_that_are_right_are_not_told_to_be_off() -> None:
     assert spread_of(*fitted(record(0.0))) is None
+
+
+@pytest.mark.parametrize(("worse", "course", "taken"), [(5.0, False, True), (15.0, False, False), (5.0, True, False)])
+def test_constants_that_explain_as_much_as_an_effect_are_what_is_off(
+    monkeypatch: pytest.MonkeyPatch, worse: float, course: bool, taken: bool
+) -> None:
+    """A feed that wanders is not always there: it must be surely better."""
+    problem, base, responses = fitted(record(0.0, exponent=0.3))
+    scorer = scorer_of(problem, base, responses)[0]
+    extended = spread_module._with_best_effect(problem, base, scorer)
+    assert extended is not None and extended.bic < base.bic - 20  # an effect that is there
+    wandering = Course("heat_loss", 1.0, 3600.0, False) if course else None
+    background = Spread(course=wandering, constants=0.05, evidence=50.0)
+
+    def as_good(*_: object) -> list[tuple[Spread, float]]:
+        return [(background, extended.bic + worse)]
+
+    monkeypatch.setattr(spread_module, "_fitted", as_good)
+    monkeypatch.setattr(Evidence, "best", background)
+    monkeypatch.setattr(Evidence, "but_for_what_stands_out", lambda _, spread: spread)
+    monkeypatch.setattr(spread_module, "MOST_BEFORE", 1)
+    assert (spread_of(problem, base, responses, scorer) == background) == taken
 
 
 def test_constants_that_are_off_are_found_with_their_size() -> None:
