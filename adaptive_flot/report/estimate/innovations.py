@@ -7,6 +7,7 @@ import pandas as pd
 
 from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.charts.units import amount, exponent, unit_text, with_std
+from adaptive_flot.contracts.batch import ParameterEstimate
 from adaptive_flot.report.estimate import series
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.parts import Bullets, Part, Section, Table
@@ -14,6 +15,8 @@ from adaptive_flot.report.kit.wording import joined, number, spaced
 from adaptive_flot.runner.commands.estimate import RecordEstimate
 from adaptive_flot.runner.commands.innovations.estimate import InnovationsEstimate
 
+FAR = 3.0
+"""Standard deviations of the batch fit from which a value with process noise is outside its interval."""
 SHOWN_STATES = 12
 """States that the picture shows at most; the file has all."""
 
@@ -30,12 +33,29 @@ def innovations_sentences(result: RecordEstimate) -> list[str]:
         said.append(f"With process noise, {spaced(output)} is predicted on the test block to {ahead}.")
     parameters = joined([f"{e.label} = {with_std(e.value, e.std, e.unit)}" for e in form.estimates])
     said.append(f"With process noise: {parameters}.")
+    said += _which_to_believe(result, form)
     said.append(
         "The parameters wander over the record: see their smoothed course."
         if form.noise.walk
         else "Nothing speaks for parameters that wander."
     )
     return said
+
+
+def _which_to_believe(result: RecordEstimate, form: InnovationsEstimate) -> list[str]:
+    """A sentence where intervals of the batch fit exclude what process noise finds; nothing else."""
+    batch = {e.label: e for e in result.batch.estimates}
+    apart = [e.label for e in form.estimates if _excludes(batch.get(e.label), e.value)]
+    if not apart:
+        return []
+    return [
+        f"The interval of the batch fit excludes that of {joined(apart)}. It holds only for errors without a memory: "
+        "where the Ljung-Box p is small, believe the values with process noise."
+    ]
+
+
+def _excludes(estimate: ParameterEstimate | None, value: float) -> bool:
+    return estimate is not None and abs(estimate.value - value) > FAR * estimate.std
 
 
 def innovations_section(result: RecordEstimate, album: Album) -> list[Section]:

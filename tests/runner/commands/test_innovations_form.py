@@ -1,9 +1,12 @@
 """The innovations form of `estimate` on a plate whose truth is known: bands that hold it, errors by horizon."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
+from adaptive_flot.report.estimate.innovations import innovations_sentences
 from adaptive_flot.runner.commands.estimate import RecordEstimate, estimate_record
 from adaptive_flot.runner.commands.record_blocks import cut
 
@@ -83,3 +86,28 @@ def test_it_is_asked_for_by_a_record_that_needs_it_and_by_no_other() -> None:
     assert estimated(record(0.3, seed=3)[0]).innovations is not None
     assert estimated(record(0.0, seed=3)[0]).innovations is None
     assert estimated(record(0.3, seed=3)[0], innovations=False).innovations is None
+
+
+def test_an_interval_of_the_batch_fit_that_excludes_what_process_noise_finds_is_said() -> None:
+    """Reduction: where the batch fit has found the same, nothing is said."""
+    result = estimated(record(0.2, seed=1)[0], innovations=True)
+    assert result.innovations is not None
+    (with_noise,) = result.innovations.estimates
+    told = {}
+    for away in (10.0, 1.0):
+        narrow = replace(result.batch.estimates[0], value=with_noise.value + 0.01 * away, std=0.01)
+        sentences = innovations_sentences(replace(result, batch=replace(result.batch, estimates=(narrow,))))
+        told[away] = [s for s in sentences if "believe the values with process noise" in s]
+    assert len(told[10.0]) == 1 and "of loss." in told[10.0][0]
+    assert told[1.0] == []
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_fit_that_explains_little_of_an_output_says_so(turned: bool) -> None:
+    """The sign of the power is turned: the loss of the plate can not make up for that."""
+    data, _, _ = record(0.01)
+    result = estimated(replace(data, inputs=-data.inputs) if turned else data, innovations=False)
+    said = [note for note in result.blocks.fit.notes if "check the signs and units of the inputs" in note]
+    assert len(said) == turned
+    if turned:
+        assert said[0].startswith("thermometer: the fit leaves ")
