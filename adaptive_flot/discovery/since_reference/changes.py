@@ -150,6 +150,9 @@ def _row_by_row(
             compared = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, note)))
         told = unless_hardly_off(on_sites)
         with_it = compared
+        if known.held:
+            with_it = with_event(compared, search, told)
+            return with_it if all(c.after <= ABOVE_USUAL * c.noise for c in with_it.verdict.error) else compared
         if _has_event(told):
             with_it = with_event(compared, search, told)
             if with_it is compared and compared.verdict.word in ("none", "abstain"):

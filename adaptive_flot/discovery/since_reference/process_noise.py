@@ -27,6 +27,10 @@ from adaptive_flot.greybox.data.dataset import Dataset
 
 LACKING = ("lag", "store", "depends", "turns", "sign")
 """Kinds of effects that a model may lack on its reference."""
+FAR = 3.0
+"""An error so many times its usual one, in the model as it is, is surely new."""
+LARGER = 2.0
+"""Process noise so many times that of the reference may hide an event."""
 AS_LARGE = 0.8
 """An effect is the same on the reference where its size there brings so much of what it gains in the new record."""
 
@@ -45,6 +49,8 @@ class Known:
         The search in the reference, and the model as it is there.
     single
         Explanations of one effect that were found, told or not.
+    held
+        Whether the noise is that of the reference, see `_beside_its_noise`.
     """
 
     search: Search
@@ -53,6 +59,7 @@ class Known:
     sole: Told | None
     before: tuple[Search, Explanation]
     single: tuple[Explanation, ...]
+    held: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,12 +104,21 @@ def with_process_noise(
     if before.time_is_up:
         return None
 
-    def look(there: Explanation) -> _Looked | None:
-        """The new record, by the model with what an explanation of the reference has."""
+    def look(there: Explanation, noise: tuple[float, float] | None = None) -> _Looked | None:
+        """The new record, by the model with what an explanation of the reference has, and with its noise if given."""
         extended = before.model_of(there)
         known = constants.about(extended.parameter_values[list(extended.indices("parameters", constants.names))])
         search = Search(
-            extended, record, columns, floor, constants.names, known, processes, since_reference=True, ends=ends
+            extended,
+            record,
+            columns,
+            floor,
+            constants.names,
+            known,
+            processes,
+            since_reference=True,
+            noise=noise,
+            ends=ends,
         )
         base = search.base(extended.parameter_values)
         found = with_pauses_closed(search, best_explanations(search, base, progress))
@@ -119,12 +135,29 @@ def with_process_noise(
         again = look(beside)
         if again is not None and again.told.word in WITH_A_NAME:
             looked, there = again, beside
+    held = False
+    if _is_hidden(compared, looked, there):
+        progress("events beside the noise of the reference")
+        again = look(there, there.fit.size)
+        if again is not None and again.told.word in WITH_A_NAME and all(h.kind in EVENTS for h in again.told.effects):
+            looked, held = again, True
     search, base, found, told = looked.search, looked.base, looked.found, looked.told
     before = replace(before, model=search.model)
     as_it_is = before.base(search.model.parameter_values)
     told = _changed(told, search, before, as_it_is)
     single = tuple(e for e in found if len(e.hypotheses) == 1)
-    return Known(search, base, told, sole_cause(search, base, found, told), (before, as_it_is), single)
+    return Known(search, base, told, sole_cause(search, base, found, told), (before, as_it_is), single, held)
+
+
+def _is_hidden(compared: Comparison, looked: _Looked, there: Explanation) -> bool:
+    """Whether process noise may hide an event: nothing is told, and it is larger than on the reference.
+
+    A store takes up slowly what is switched for a time. Noise that is large enough draws that from row to row, and
+    nothing is left to explain. A free run errs by many times what is usual, and the reference needs no such noise.
+    """
+    far = any(c.before > FAR * c.noise for c in compared.verdict.error)
+    silent = looked.told.word not in WITH_A_NAME and not looked.search.time_is_up
+    return far and silent and looked.base.fit.size[0] > LARGER * there.fit.size[0]
 
 
 def _on_the_reference_too(looked: _Looked, before: Search, there: Explanation) -> Explanation | None:

@@ -96,6 +96,8 @@ class Refitter:
         Rows that fit (N,); default all. The filter runs over all of them.
     degrees_of_freedom
         Of the innovations; infinity is the Gaussian filter.
+    held
+        Factors of the noise that no fit changes; None where they are fitted.
     """
 
     def __init__(
@@ -108,7 +110,9 @@ class Refitter:
         known: Constants | None = None,
         counted: BoolArray | None = None,
         degrees_of_freedom: float = NU,
+        held: tuple[float, float] | None = None,
     ) -> None:
+        self.held = held
         self.model, self.record, self.columns, self.floor = model, record, tuple(columns), floor
         self.degrees_of_freedom = degrees_of_freedom
         self.free, self.known = tuple(free), known
@@ -139,6 +143,8 @@ class Refitter:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
         p = self.space.inside(p)
         first = p[self._where].copy()
+        if self.held is not None:
+            size, hold_noise = self.held, True
         if size is None or not hold_noise:
             size, best = self._search_noise(p, first, size)
         else:
@@ -165,7 +171,7 @@ class Refitter:
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
         first = p[self._where].copy()
-        size, cost = self._search_noise(p, first)
+        size, cost = self._search_noise(p, first) if self.held is None else (self.held, self._cost(p, self.held, first))
         return Refit(p.copy(), self.noise(size), size, self._run_at(p, size), -cost)
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:

@@ -63,6 +63,8 @@ class Search:
         Whether the constants that are known are those of a reference on which the model was right. Then gradual changes
         are looked for: what wanders is full of them, so a reference must say how much does. And the first effect is
         looked for beside those constants as well: without it they have moved to make up for it.
+    noise
+        Factors of the noise that no fit changes, those of a reference; None where they are fitted.
     ends
         Time of `time.monotonic` after which nothing more is looked for.
     """
@@ -77,6 +79,7 @@ class Search:
     kinds: tuple[str, ...] | None = None
     as_given: tuple[float, ...] = ()
     since_reference: bool = False
+    noise: tuple[float, float] | None = None
     ends: float = float("inf")
 
     @property
@@ -116,7 +119,7 @@ class Search:
 
     def fitter(self, model: Model, own: Sequence[str]) -> Refitter:
         """Fits of a model with the constants and further parameters free."""
-        return Refitter(model, self.record, self.columns, self.floor, (*self.free, *own), self.known)
+        return Refitter(model, self.record, self.columns, self.floor, (*self.free, *own), self.known, held=self.noise)
 
     def all_with(
         self, start: Explanation, chosen: Sequence[Screened], held: Explanation | None = None
