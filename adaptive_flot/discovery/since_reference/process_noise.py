@@ -31,6 +31,8 @@ FAR = 3.0
 """An error so many times its usual one, in the model as it is, is surely new."""
 LARGER = 2.0
 """Process noise so many times that of the reference may hide an event."""
+NEAR = 0.1
+"""Process noise of the reference, as a share of that of the new record, that is tried itself."""
 AS_LARGE = 0.8
 """An effect is the same on the reference where its size there brings so much of what it gains in the new record."""
 
@@ -50,7 +52,7 @@ class Known:
     single
         Explanations of one effect that were found, told or not.
     held
-        Whether the noise is that of the reference, see `_beside_its_noise`.
+        Whether the noise is held, at less than this record asks for, see `_less_noise`.
     """
 
     search: Search
@@ -137,10 +139,12 @@ def with_process_noise(
             looked, there = again, beside
     held = False
     if _is_hidden(compared, looked, there):
-        progress("events beside the noise of the reference")
-        again = look(there, there.fit.size)
-        if again is not None and again.told.word in WITH_A_NAME and all(h.kind in EVENTS for h in again.told.effects):
-            looked, held = again, True
+        for noise in _less_noise(looked, there):
+            progress("events beside less noise")
+            again = look(there, noise)
+            if again is not None and _tells_events(again.told):
+                looked, held = again, True
+                break
     search, base, found, told = looked.search, looked.base, looked.found, looked.told
     before = replace(before, model=search.model)
     as_it_is = before.base(search.model.parameter_values)
@@ -158,6 +162,21 @@ def _is_hidden(compared: Comparison, looked: _Looked, there: Explanation) -> boo
     far = any(c.before > FAR * c.noise for c in compared.verdict.error)
     silent = looked.told.word not in WITH_A_NAME and not looked.search.time_is_up
     return far and silent and looked.base.fit.size[0] > LARGER * there.fit.size[0]
+
+
+def _tells_events(told: Told) -> bool:
+    return told.word in WITH_A_NAME and all(h.kind in EVENTS for h in told.effects)
+
+
+def _less_noise(looked: _Looked, there: Explanation) -> list[tuple[float, float]]:
+    """Sizes of the noise with less process noise, to be tried in turn; measurement noise is that of the reference.
+
+    Half way to the reference in logarithms, and as there, where that is at least a NEAR part. Beside far less, a model
+    without the event is so far off that times come out wrong, and another part may draw what is left.
+    """
+    (theta, _), (usual, rho) = looked.base.fit.size, there.fit.size
+    tried = [float(np.sqrt(theta * usual)), usual]
+    return [(size, rho) for size in tried[: 2 if usual >= NEAR * theta else 1]]
 
 
 def _on_the_reference_too(looked: _Looked, before: Search, there: Explanation) -> Explanation | None:

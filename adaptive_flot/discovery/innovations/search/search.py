@@ -64,7 +64,7 @@ class Search:
         are looked for: what wanders is full of them, so a reference must say how much does. And the first effect is
         looked for beside those constants as well: without it they have moved to make up for it.
     noise
-        Factors of the noise that no fit changes, those of a reference; None where they are fitted.
+        Factors of the noise that no fit changes; None where they are fitted.
     ends
         Time of `time.monotonic` after which nothing more is looked for.
     """
