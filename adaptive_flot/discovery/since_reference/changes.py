@@ -137,6 +137,10 @@ def _row_by_row(
         known = with_process_noise(compared, record, reference, processes, progress, ends)
         if known is None:
             return None
+        if known.hidden is not None:
+            with_it = _with_hidden_event(compared, *known.hidden)
+            if with_it is not compared:
+                return with_it
         search, base, told, sole, before = known.search, known.base, known.told, known.sole, known.before
         told, sole = unless_a_trend(base, told), unless_a_trend(base, sole) if sole is not None else None
         on_sites = unless_without_a_site(search, base, told)
@@ -150,9 +154,6 @@ def _row_by_row(
             compared = replace(compared, verdict=replace(compared.verdict, notes=(*compared.verdict.notes, note)))
         told = unless_hardly_off(on_sites)
         with_it = compared
-        if known.held:
-            with_it = with_event(compared, search, told)
-            return with_it if all(c.after <= ABOVE_USUAL * c.noise for c in with_it.verdict.error) else compared
         if _has_event(told):
             with_it = with_event(compared, search, told)
             if with_it is compared and compared.verdict.word in ("none", "abstain"):
@@ -169,6 +170,18 @@ def _row_by_row(
         kept = kept if kept is not compared else unless_alike(compared, told)
         kept = with_what_is_nearest(kept, search, base, [told.best, *known.single])
         return _with_least_shown(kept, search, base)
+
+
+def _with_hidden_event(compared: Comparison, search: Search, base: Explanation, told: Told) -> Comparison:
+    """The comparison with events that are told beside less noise; unchanged where an error stays above the usual one.
+
+    Beside less noise whatever else is wrong looks like an event. So it must explain all of it.
+    """
+    told = unless_hardly_off(unless_without_a_site(search, base, unless_a_trend(base, told)))
+    if not _has_event(told):
+        return compared
+    with_it = with_event(compared, search, told)
+    return with_it if all(c.after <= ABOVE_USUAL * c.noise for c in with_it.verdict.error) else compared
 
 
 def _with_least_shown(compared: Comparison, search: Search, base: Explanation) -> Comparison:

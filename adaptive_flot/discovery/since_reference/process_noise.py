@@ -51,8 +51,9 @@ class Known:
         The search in the reference, and the model as it is there.
     single
         Explanations of one effect that were found, told or not.
-    held
-        Whether the noise is held, at less than this record asks for, see `_less_noise`.
+    hidden
+        The search, the model as it is and events that are told beside less noise than this record asks for, where these
+        are not told else (see `_is_hidden`); None without.
     """
 
     search: Search
@@ -61,7 +62,7 @@ class Known:
     sole: Told | None
     before: tuple[Search, Explanation]
     single: tuple[Explanation, ...]
-    held: bool = False
+    hidden: tuple[Search, Explanation, Told] | None
 
 
 @dataclass(frozen=True)
@@ -137,44 +138,41 @@ def with_process_noise(
         again = look(beside)
         if again is not None and again.told.word in WITH_A_NAME:
             looked, there = again, beside
-    held = False
-    if _is_hidden(compared, looked, there):
-        for noise in _less_noise(looked, there):
-            progress("events beside less noise")
-            again = look(there, noise)
-            if again is not None and _tells_events(again.told):
-                looked, held = again, True
-                break
+    hidden = None
+    for noise in _less_noise(looked, there) if _is_hidden(compared, looked) else ():
+        progress("events beside less noise")
+        again = look(there, noise)
+        if again is not None and again.told.word in WITH_A_NAME and all(h.kind in EVENTS for h in again.told.effects):
+            hidden = again.search, again.base, again.told
+            break
     search, base, found, told = looked.search, looked.base, looked.found, looked.told
     before = replace(before, model=search.model)
     as_it_is = before.base(search.model.parameter_values)
     told = _changed(told, search, before, as_it_is)
     single = tuple(e for e in found if len(e.hypotheses) == 1)
-    return Known(search, base, told, sole_cause(search, base, found, told), (before, as_it_is), single, held)
+    return Known(search, base, told, sole_cause(search, base, found, told), (before, as_it_is), single, hidden)
 
 
-def _is_hidden(compared: Comparison, looked: _Looked, there: Explanation) -> bool:
-    """Whether process noise may hide an event: nothing is told, and it is larger than on the reference.
+def _is_hidden(compared: Comparison, looked: _Looked) -> bool:
+    """Whether process noise may hide an event: nothing is told, though a free run errs by many times what is usual.
 
     A store takes up slowly what is switched for a time. Noise that is large enough draws that from row to row, and
-    nothing is left to explain. A free run errs by many times what is usual, and the reference needs no such noise.
+    nothing is left to explain.
     """
     far = any(c.before > FAR * c.noise for c in compared.verdict.error)
-    silent = looked.told.word not in WITH_A_NAME and not looked.search.time_is_up
-    return far and silent and looked.base.fit.size[0] > LARGER * there.fit.size[0]
-
-
-def _tells_events(told: Told) -> bool:
-    return told.word in WITH_A_NAME and all(h.kind in EVENTS for h in told.effects)
+    return far and compared.verdict.word == "abstain" and looked.told.word not in WITH_A_NAME
 
 
 def _less_noise(looked: _Looked, there: Explanation) -> list[tuple[float, float]]:
     """Sizes of the noise with less process noise, to be tried in turn; measurement noise is that of the reference.
 
-    Half way to the reference in logarithms, and as there, where that is at least a NEAR part. Beside far less, a model
-    without the event is so far off that times come out wrong, and another part may draw what is left.
+    None where the reference asks for about as much (LARGER): then it is how the process wanders. Half way to the
+    reference in logarithms, and as there, where that is at least a NEAR part. Beside far less, a model without the
+    event is so far off that times come out wrong, and another part may draw what is left.
     """
     (theta, _), (usual, rho) = looked.base.fit.size, there.fit.size
+    if theta <= LARGER * usual:
+        return []
     tried = [float(np.sqrt(theta * usual)), usual]
     return [(size, rho) for size in tried[: 2 if usual >= NEAR * theta else 1]]
 
