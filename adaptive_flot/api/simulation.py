@@ -123,10 +123,10 @@ class Simulation:
 def simulate(model: AnyModel, inputs: AnyRecord, *, accurate: bool = False) -> Simulation:
     """Simulate a table of inputs: every state, output and signal comes out.
 
-    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs. A
-    model with `starts_steady=False` starts where outputs show its states, and else at its `initial_guess`. Each further
-    row holds the inputs during the interval that ends at its time. What the table has of an output comes out beside it,
-    with `_measured` behind the name of the column.
+    Row 0 is the initial condition: the states in it if it holds all of them, else the steady state of its inputs, or
+    the `initial_guess` of a model that has none. With `starts_steady=False` a state starts where an output shows it.
+    Each further row holds the inputs during the interval that ends at its time. What the table has of an output comes
+    out beside it, with `_measured` behind the name of the column.
 
     Parameters
     ----------

@@ -90,9 +90,9 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
 def start_of(record: Dataset, model: Model) -> Start:
     """Where the simulation of a record starts.
 
-    The states in the first row, if it holds all of them. Else, of a model that starts steady, the steady state of that
-    row's inputs. Of another model each state starts where an output of its name shows it, or at its `initial_guess`;
-    what has neither starts at the steady state, or where there is none, at its scale.
+    The states in the first row, if it holds all of them. Else the steady state of that row's inputs, or the
+    `initial_guess` of a model that has none and need not start steady. In such a model a state starts where an output
+    of its name shows it.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def start_of(record: Dataset, model: Model) -> Start:
     except RangeError:
         if model.starts_steady:
             raise
-        state, elsewhere = model.first_guess, "its scale"  # a battery never rests
+        state, elsewhere = model.first_guess, "the initial_guess"  # a battery never rests
     if model.starts_steady:
         return Start(state, at_rest)
     shown = {(q.name, q.unit): y for q, y in zip(model.outputs, record.outputs[0], strict=True) if np.isfinite(y)}
@@ -123,8 +123,6 @@ def start_of(record: Dataset, model: Model) -> Start:
     for j, q in enumerate(model.states):
         if (q.name, q.unit) in shown:
             state[j], source = shown[q.name, q.unit], "as measured in the first row"
-        elif q.name in model.initial_guess:
-            state[j], source = model.initial_guess[q.name], "at its initial_guess"
         else:
             source = f"at {elsewhere}"
         parts.setdefault(source, []).append(q.name)
