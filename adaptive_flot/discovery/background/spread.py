@@ -45,8 +45,8 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
     that is far from linear must not be taken for a background. Where it explains more than any effect does nowhere,
     all that were tried count. Each is looked for once more, along the fit that has it. Of those beside more or fewer
     effects, that one counts whose fit together with them is best, by LEAST_EVIDENCE for each more: a wrong effect
-    leaves more for the background. It must be better than the effects alone; constants that are off need only be as
-    good. A store whose sizes were 3 to 10 % off was named as one that depends on the water that is drawn.
+    leaves more for the background. It must be better than the effects alone. Constants that are off, by themselves,
+    need only be as good. A store whose sizes were 3 to 10 % off was named as one that depends on the water drawn.
 
     Parameters
     ----------
@@ -75,16 +75,16 @@ def spread_of(problem: Problem, base: Fit, responses: Responses, scorer: Scorer 
             break
         fit, responses = extended, Responses(problem, extended)
         scorer, alone = scorer_of(problem, fit, responses)[0], min(alone, fit.bic)
-    chosen, least = None, np.inf
+    chosen, least, by_itself = None, np.inf, False
     for t in [t for t in tried if t.explains] or tried:
         spread, own = min(_fitted(problem, t, feeds), key=lambda found: found[1], default=(None, np.inf))
         if own < least - LEAST_EVIDENCE:
-            chosen, least = spread, own
+            chosen, least, by_itself = spread, own, t.fit is base
     if chosen is None or chosen.share >= LARGEST:  # what fits best as far as the last of the sizes is something else
         return None
-    # constants are always a little off: where they explain as much as an effect, that is what they are
-    sure = LEAST_EVIDENCE if chosen.course is not None or alone == base.bic else -LEAST_EVIDENCE
-    return chosen if least < alone - sure else None
+    # constants are always a little off: where they alone explain as much as an effect, that is what they are
+    as_good = by_itself and chosen.course is None and alone < base.bic
+    return chosen if least < alone + (LEAST_EVIDENCE if as_good else -LEAST_EVIDENCE) else None
 
 
 @dataclass(frozen=True)

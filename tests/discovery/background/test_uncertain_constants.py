@@ -125,7 +125,7 @@ def test_constants_that_explain_as_much_as_an_effect_are_what_is_off(
     extended = spread_module._with_best_effect(problem, base, scorer)
     assert extended is not None and extended.bic < base.bic - 20  # an effect that is there
     wandering = Course("heat_loss", 1.0, 3600.0, False) if course else None
-    background = Spread(course=wandering, constants=0.05, evidence=50.0)
+    background = Spread(course=wandering, constants=0.05, evidence=1e6)
 
     def as_good(*_: object) -> list[tuple[Spread, float]]:
         return [(background, extended.bic + worse)]
