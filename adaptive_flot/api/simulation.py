@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,10 +80,11 @@ class Simulation:
                 raise ResultError(f"plot: no column {given!r} here; {near_match(given, (*by_name, *known))}")
             q, values = known[column], self.table[column].to_numpy(dtype=float)
             time = self.table[TIME_COLUMN].to_numpy(dtype=float)
-            traces = [Trace("", time, values, Role.ESTIMATE, held=column in inputs)]
-            if column + MEASURED in self.table:
-                seen = self.table[column + MEASURED].to_numpy(dtype=float)
-                traces = [Trace("measured", time, seen, Role.TRUTH), replace(traces[0], label="simulated")]
+            seen = self.table.get(column + MEASURED)
+            label = "" if seen is None else "simulated"
+            traces = [Trace(label, time, values, Role.ESTIMATE, held=column in inputs)]
+            if seen is not None:
+                traces.insert(0, Trace("measured", time, seen.to_numpy(dtype=float), Role.TRUTH))
             panels.append(Panel(q.name.replace("_", " "), q.unit, tuple(traces), height=0.8))
         return time_figure(panels)
 

@@ -34,6 +34,9 @@ def simulate(
     With --draws the constants of a file of ranges are drawn, and quantiles of each output come out. Without a table
     the air then goes up in four steps over the operating range of the cell.
     """
+    from dataclasses import replace
+
+    from adaptive_flot.charts.units import amount
     from adaptive_flot.console.lines import print_sentences
     from adaptive_flot.greybox.data.dataset import read_dataset
     from adaptive_flot.greybox.data.tables import check_table_path, write_table
@@ -54,11 +57,12 @@ def simulate(
     check_table_path(out)
     made = make_model(model, cell=cell, folder=inputs.parent)
     record = read_dataset(inputs, made)
-    table = simulate_record(record, made, accurate=accurate)
+    start = start_of(record, made)
+    table = simulate_record(replace(record, initial_state=start.state), made, accurate=accurate)
     write_table(table, out)
-    told = [f"It starts from {start_of(record, made).words}.", *record.notes]
-    units = {q.name: "" if q.unit == "-" else f" {q.unit}" for q in made.outputs}
-    errors = [f"{name} {size:.3g}{units[name]}" for name, size in misfit(table, made).items()]
+    told = [f"It starts {start.words}.", *record.notes]
+    units = {q.name: q.unit for q in made.outputs}
+    errors = [f"{name} {amount(size, units[name])}" for name, size in misfit(table, made).items()]
     if errors:
         told.append(f"Measured minus simulated, root mean square: {', '.join(errors)}.")
     print_sentences(f"- {sentence}" for sentence in told)

@@ -1,6 +1,7 @@
 """What the filter of a record gains by a loop of steps, and by derivatives along a run: ratios in one run.
 
-Command: `python -m benchmarks.timing.filter_steps` (a minute or two).
+Command: `python -m benchmarks.timing.filter_steps` (half a minute). In a second run the filter itself is faster: its
+equations have been compiled then, and are kept.
 
 The cell, 900 rows at 10 s, ten steps an interval. The filter is made and run once with its steps as a loop, and once
 with all of an interval as one function. Then eight sizes of the process noise are tried, by the filter itself and by
@@ -9,7 +10,8 @@ its derivatives along one run. Both ways agree; how closely is printed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from contextlib import nullcontext
 from dataclasses import replace
 from unittest.mock import patch
 
@@ -25,7 +27,7 @@ from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
-from benchmarks.timing.speed import in_turn, seconds
+from benchmarks.timing.speed import in_turn
 
 ROWS, DT = 900, 10.0
 SHARES = (0.3, 0.5, 0.7, 0.9, 1.1, 1.4, 2.0, 3.0)
@@ -49,33 +51,29 @@ def record_of(model: Model) -> tuple[Dataset, FloatArray, NoiseModel]:
     return Dataset("steps", DT * np.arange(ROWS, dtype=float), DT, inputs, outputs), start, noise
 
 
+def timed_first_run(
+    record: Dataset, noise: NoiseModel, given: tuple[FloatArray, FloatArray, FloatArray], *, as_loop: bool
+) -> tuple[float, Filtered]:
+    """Seconds of the processor in which a filter is made and run, with nothing kept from before, and its run."""
+    begin = time.process_time()
+    model = flotation.make_model()
+    with nullcontext() if as_loop else patch.object(module, "steps_along", lambda *_: None):
+        run = RecordFilter(model, DT, range(len(model.outputs))).run(record, noise, *given)
+    return time.process_time() - begin, run
+
+
 def main() -> None:
     """Measure and print."""
     model = flotation.make_model()
     record, start, noise = record_of(model)
     spread = np.diag((1e-3 * np.array([q.scale for q in model.states])) ** 2)
     given = (start, spread, model.parameter_values)
-    outputs = range(len(model.outputs))
 
-    def first_run() -> Filtered:
-        fresh = flotation.make_model()  # nothing is kept of functions that were made before
-        return RecordFilter(fresh, DT, outputs).run(record, noise, *given)
+    whole_s, whole = timed_first_run(record, noise, given, as_loop=False)
+    loop_s, loop = timed_first_run(record, noise, given, as_loop=True)
+    apart = np.max(np.abs(loop.log_likelihood - whole.log_likelihood))
 
-    found: dict[str, Filtered] = {}
-    made: dict[str, float] = {}
-
-    def timed(name: str, work: Callable[[], Filtered]) -> None:
-        def keep() -> None:
-            found[name] = work()
-
-        made[name] = seconds(keep)
-
-    timed("loop", first_run)
-    with patch.object(module, "steps_along", lambda *_: None):
-        timed("whole", first_run)
-    apart = np.max(np.abs(found["loop"].log_likelihood - found["whole"].log_likelihood))
-
-    own = RecordFilter(model, DT, outputs)
+    own = RecordFilter(model, DT, range(len(model.outputs)))
     run = own.run(record, noise, *given)
     sized = [replace(noise, process={k: s * v for k, v in noise.process.items()}) for s in SHARES]
     cases = [(n, *given) for n in sized]
@@ -89,8 +87,8 @@ def main() -> None:
 
     table = Table("figure", "as before", "now", "ratio", "largest difference", title="Filter of a record")
     table.add_row(
-        "filter made and run once", f"{made['whole']:.2f} s", f"{made['loop']:.2f} s",
-        f"{made['whole'] / made['loop']:.1f}", f"{apart:.1e} in the log-density of a row",
+        "filter made and run once", f"{whole_s:.2f} s", f"{loop_s:.2f} s", f"{whole_s / loop_s:.1f}",
+        f"{apart:.1e} in the log-density of a row",
     )  # fmt: skip
     table.add_row(
         f"{len(SHARES)} sizes of the noise", f"{1e3 * beside:.0f} ms", f"{1e3 * along:.0f} ms", f"{ratio:.1f}",

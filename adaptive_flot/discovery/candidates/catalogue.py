@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from adaptive_flot.discovery.candidates.dynamics import late, leaking, limited
+from adaptive_flot.discovery.candidates.dynamics import BOUNDS, bounded, late
 from adaptive_flot.discovery.candidates.responses import Responses, TimeProfile
 from adaptive_flot.discovery.candidates.spline import knots_of, spline_values, through
 from adaptive_flot.discovery.candidates.turns import turning, turns
@@ -58,7 +58,7 @@ def catalogue(model: Model, responses: Responses) -> list[Candidate]:
     signals = {s.name for s in model.signals} - set(model.late_drivers)
     for site in model.sites:
         unknown = signals - set(site.signals)  # defined further down: no effect here can depend on it
-        for driver in ("constant", "time", *responses.drivers, "lag", "delay", "saturation", "own_value"):
+        for driver in ("constant", "time", *responses.drivers, "lag", "delay", *BOUNDS):
             if (site.name, driver) in taken or driver in unknown or not _makes_sense(site, driver):
                 continue
             variants = tuple(_variants(site, driver, time, responses))
@@ -81,7 +81,7 @@ def _is_absorbed(variant: Variant, site: Site, absorbed: frozenset[tuple[str, st
 def _makes_sense(site: Site, driver: str) -> bool:
     if driver in LATE:
         return site.role in ("sensor", "actuator", "feed") and site.passed == 1
-    if driver in ("saturation", "own_value"):  # a sensor at its limit shows in the data screening
+    if driver in BOUNDS:  # a sensor at its limit shows in the data screening
         return site.role == "actuator" and site.passed == 1
     return True
 
@@ -134,10 +134,8 @@ def _variants(site: Site, driver: str, time: FloatArray, responses: Responses) -
         yield from _in_time(site, time, offset)
     elif driver in LATE:
         yield from late(site, driver, responses)
-    elif driver == "saturation":
-        yield from limited(site, responses)
-    elif driver == "own_value":
-        yield from leaking(site, responses)
+    elif driver in BOUNDS:
+        yield from bounded(site, driver, responses)
     else:
         model = responses.fit.model
         quantity = next(q for q in (*model.inputs, *model.states, *model.signals) if q.name == driver)

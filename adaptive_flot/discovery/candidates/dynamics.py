@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.signal import lfilter
@@ -27,10 +27,12 @@ DELAYS = (3.0, 10.0, 30.0, 60.0, 120.0, 240.0)
 """Dead times that are tried, in sampling intervals."""
 LONGEST_DELAY = 0.2
 """Longest dead time that is tried, as a share of the record."""
-LIMIT_QUANTILES = (0.6, 0.75, 0.9)
-"""An actuator is scored with a limit at these quantiles of what is asked of it."""
-FLOOR_QUANTILES = (0.1, 0.25, 0.4)
-"""An actuator is scored with a floor at these quantiles of what is asked of it."""
+BOUNDS: Mapping[str, tuple[str, str, tuple[float, ...], np.ufunc]] = {
+    "saturation": ("saturation", "limit", (0.6, 0.75, 0.9), np.minimum),
+    "own_value": ("leak", "level", (0.1, 0.25, 0.4), np.maximum),
+}
+"""Drivers of an actuator that reaches a limit, or does not close: form, its coefficient, the quantiles of what is asked
+at which it is scored, and what is left of the distance to the bound where it acts."""
 LIMIT_WIDTH = 0.01
 """Rounding of the limit, as a share of the range of what is asked."""
 BANDS = (0.3, 1.0)
@@ -80,31 +82,19 @@ def _delayed(site: Site, responses: Responses) -> Iterator[Variant]:
         yield Variant(effect, (TimeProfile(site.name, delayed - v, True),), ("amplitude",), (("dead_time", dead_time),))
 
 
-def limited(site: Site, responses: Responses) -> Iterator[Variant]:
-    """What is asked of an actuator, cut at a limit."""
+def bounded(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
+    """What is asked of an actuator, cut at a limit ("saturation"), or not below a floor: it leaks ("own_value")."""
     v = responses.site_values[site.name]
     if not _moves(v):
         return
-    spread = float(np.ptp(v))
-    effect = Effect(site.name, "saturation", "saturation", settings={"width": LIMIT_WIDTH * spread})
-    for share in LIMIT_QUANTILES:
-        limit = float(np.quantile(v, share))
-        if limit < float(np.max(v)):
-            profile = TimeProfile(site.name, -np.maximum(v - limit, 0.0), True)
-            yield Variant(effect, (profile,), ("amplitude",), (("limit", limit),))
-
-
-def leaking(site: Site, responses: Responses) -> Iterator[Variant]:
-    """What is asked of an actuator, that lets something through when less is asked: it does not close."""
-    v = responses.site_values[site.name]
-    if not _moves(v):
-        return
-    effect = Effect(site.name, "own_value", "leak", settings={"width": LIMIT_WIDTH * float(np.ptp(v))})
-    for share in FLOOR_QUANTILES:
-        floor = float(np.quantile(v, share))
-        if floor > float(np.min(v)):
-            profile = TimeProfile(site.name, np.maximum(floor - v, 0.0), True)
-            yield Variant(effect, (profile,), ("amplitude",), (("level", floor),))
+    form, coefficient, shares, beyond = BOUNDS[driver]
+    effect = Effect(site.name, driver, form, settings={"width": LIMIT_WIDTH * float(np.ptp(v))})
+    for share in shares:
+        bound = float(np.quantile(v, share))
+        change = beyond(bound - v, 0.0)
+        if change.any():
+            profile = TimeProfile(site.name, change, True)
+            yield Variant(effect, (profile,), ("amplitude",), ((coefficient, bound),))
 
 
 def _sticking(site: Site, responses: Responses) -> Iterator[Variant]:

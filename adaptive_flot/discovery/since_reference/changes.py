@@ -39,7 +39,7 @@ from adaptive_flot.discovery.results.least_shown import what_is_hidden, what_is_
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.places import with_what_is_nearest, with_words_without_a_site
-from adaptive_flot.discovery.since_reference.process_noise import with_process_noise
+from adaptive_flot.discovery.since_reference.process_noise import Looked, with_process_noise
 from adaptive_flot.discovery.since_reference.searched_change import with_searched_effect
 from adaptive_flot.discovery.since_reference.step import with_step
 from adaptive_flot.discovery.since_reference.supported import unless_alike, unless_unsupported
@@ -138,7 +138,7 @@ def _row_by_row(
         if known is None:
             return None
         if known.hidden is not None:
-            with_it = _with_hidden_event(compared, *known.hidden)
+            with_it = _with_hidden_event(compared, known.hidden)
             if with_it is not compared:
                 return with_it
         search, base, told, sole, before = known.search, known.base, known.told, known.sole, known.before
@@ -172,12 +172,13 @@ def _row_by_row(
         return _with_least_shown(kept, search, base)
 
 
-def _with_hidden_event(compared: Comparison, search: Search, base: Explanation, told: Told) -> Comparison:
+def _with_hidden_event(compared: Comparison, hidden: Looked) -> Comparison:
     """The comparison with events that are told beside less noise; unchanged where an error stays above the usual one.
 
     Beside less noise whatever else is wrong looks like an event. So it must explain all of it.
     """
-    told = unless_hardly_off(unless_without_a_site(search, base, unless_a_trend(base, told)))
+    search, base = hidden.search, hidden.base
+    told = unless_hardly_off(unless_without_a_site(search, base, unless_a_trend(base, hidden.told)))
     if not _has_event(told):
         return compared
     with_it = with_event(compared, search, told)

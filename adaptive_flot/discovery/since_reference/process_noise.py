@@ -38,6 +38,16 @@ AS_LARGE = 0.8
 
 
 @dataclass(frozen=True)
+class Looked:
+    """The search in the new record, the model as it is there, all explanations, and what was judged."""
+
+    search: Search
+    base: Explanation
+    found: list[Explanation]
+    told: Told
+
+
+@dataclass(frozen=True)
 class Known:
     """What is known with process noise.
 
@@ -52,8 +62,8 @@ class Known:
     single
         Explanations of one effect that were found, told or not.
     hidden
-        The search, the model as it is and events that are told beside less noise than this record asks for, where these
-        are not told else (see `_is_hidden`); None without.
+        What tells events beside less noise than this record asks for, where nothing is told else; None without (see
+        `_is_hidden`).
     """
 
     search: Search
@@ -62,17 +72,7 @@ class Known:
     sole: Told | None
     before: tuple[Search, Explanation]
     single: tuple[Explanation, ...]
-    hidden: tuple[Search, Explanation, Told] | None
-
-
-@dataclass(frozen=True)
-class _Looked:
-    """The search in the new record, the model as it is there, all explanations, and what was judged."""
-
-    search: Search
-    base: Explanation
-    found: list[Explanation]
-    told: Told
+    hidden: Looked | None
 
 
 def with_process_noise(
@@ -107,8 +107,8 @@ def with_process_noise(
     if before.time_is_up:
         return None
 
-    def look(there: Explanation, noise: tuple[float, float] | None = None) -> _Looked | None:
-        """The new record, by the model with what an explanation of the reference has, and with its noise if given."""
+    def look(there: Explanation, noise: tuple[float, float] | None = None) -> Looked | None:
+        """The new record, by the model with what an explanation of the reference has; with this noise, if given."""
         extended = before.model_of(there)
         known = constants.about(extended.parameter_values[list(extended.indices("parameters", constants.names))])
         search = Search(
@@ -125,7 +125,7 @@ def with_process_noise(
         )
         base = search.base(extended.parameter_values)
         found = with_pauses_closed(search, best_explanations(search, base, progress))
-        return None if search.time_is_up else _Looked(search, base, found, judge(search, base, found))
+        return None if search.time_is_up else Looked(search, base, found, judge(search, base, found))
 
     there = lacking.best if lacking.word == "named" else start
     progress("events in the new record")
@@ -142,8 +142,10 @@ def with_process_noise(
     for noise in _less_noise(looked, there) if _is_hidden(compared, looked) else ():
         progress("events beside less noise")
         again = look(there, noise)
-        if again is not None and again.told.word in WITH_A_NAME and all(h.kind in EVENTS for h in again.told.effects):
-            hidden = again.search, again.base, again.told
+        if again is None:
+            return None
+        if again.told.word in WITH_A_NAME and all(h.kind in EVENTS for h in again.told.effects):
+            hidden = again
             break
     search, base, found, told = looked.search, looked.base, looked.found, looked.told
     before = replace(before, model=search.model)
@@ -153,7 +155,7 @@ def with_process_noise(
     return Known(search, base, told, sole_cause(search, base, found, told), (before, as_it_is), single, hidden)
 
 
-def _is_hidden(compared: Comparison, looked: _Looked) -> bool:
+def _is_hidden(compared: Comparison, looked: Looked) -> bool:
     """Whether process noise may hide an event: nothing is told, though a free run errs by many times what is usual.
 
     A store takes up slowly what is switched for a time. Noise that is large enough draws that from row to row, and
@@ -163,7 +165,7 @@ def _is_hidden(compared: Comparison, looked: _Looked) -> bool:
     return far and compared.verdict.word == "abstain" and looked.told.word not in WITH_A_NAME
 
 
-def _less_noise(looked: _Looked, there: Explanation) -> list[tuple[float, float]]:
+def _less_noise(looked: Looked, there: Explanation) -> list[tuple[float, float]]:
     """Sizes of the noise with less process noise, to be tried in turn; measurement noise is that of the reference.
 
     None where the reference asks for about as much (LARGER): then it is how the process wanders. Half way to the
@@ -177,7 +179,7 @@ def _less_noise(looked: _Looked, there: Explanation) -> list[tuple[float, float]
     return [(size, rho) for size in tried[: 2 if usual >= NEAR * theta else 1]]
 
 
-def _on_the_reference_too(looked: _Looked, before: Search, there: Explanation) -> Explanation | None:
+def _on_the_reference_too(looked: Looked, before: Search, there: Explanation) -> Explanation | None:
     """What explains the reference with an effect more, beside which an event is best in the new record.
 
     None where something is told, or no event is among the two effects of the best explanation. And where the other one,

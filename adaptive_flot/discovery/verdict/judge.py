@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.direction import listed
+from adaptive_flot.discovery.candidates.dynamics import BOUNDS
 from adaptive_flot.discovery.candidates.shapes.step_events import slow
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
@@ -14,8 +15,6 @@ from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.effects import LATE, STATELESS_DRIVERS
 from adaptive_flot.greybox.model import Model
 
-BOUNDED = ("saturation", "own_value")
-"""Drivers of a part that reaches a limit, or does not close."""
 LEAST_MARGIN = 10.0
 """Alternatives whose information criterion is worse by less are not told apart."""
 MUCH = 0.1
@@ -84,13 +83,13 @@ def _one_way_each(members: Sequence[Name]) -> tuple[Name, ...]:
 
     A lag and a dead time look alike, and so do a limit or a floor and a bent dependence.
     """
-    limited = {site for site, driver in members if driver in BOUNDED}
+    limited = {site for site, driver in members if driver in BOUNDS}
 
     def way(name: Name) -> Name:
         site, driver = name
         if driver in LATE:
             return site, "late"
-        bent = driver in BOUNDED or (site in limited and driver not in STATELESS_DRIVERS)
+        bent = driver in BOUNDS or (site in limited and driver not in STATELESS_DRIVERS)
         return site, "limited" if bent else driver
 
     likeliest = {way(n): n for n in reversed(members)}.values()

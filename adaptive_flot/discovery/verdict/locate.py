@@ -7,6 +7,7 @@ one of each kind of place, and of each kind of cause, says how well it would do.
 
 from __future__ import annotations
 
+from adaptive_flot.discovery.candidates.dynamics import BOUNDS
 from adaptive_flot.discovery.candidates.score_test import Score
 from adaptive_flot.discovery.results import Detection, Location, Place
 from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
@@ -14,7 +15,7 @@ from adaptive_flot.greybox.effects import DYNAMIC_DRIVERS
 CAUSES = {
     "constant": "all the time",
     "time": "with time",
-    **dict.fromkeys((*DYNAMIC_DRIVERS, "own_value"), "late or limited"),
+    **dict.fromkeys((*DYNAMIC_DRIVERS, *BOUNDS), "late or limited"),
 }
 
 

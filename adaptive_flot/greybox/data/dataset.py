@@ -23,6 +23,11 @@ from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
 MOST_STEPS = 5_000_000
 """Most integration steps of one run over a record: some minutes on one core for a flotation cell."""
+UNITS = frozenset(
+    "s ms min h d m mm cm km ft in m3 l L ml lpm cfm gpm kg g t pct percent ppm frac V mV mA kW Pa kPa bar C K degC "
+    "degF".split()
+)
+"""Parts of a suffix that make it one of a unit. Single letters that may be part of a name (A, F, W) are left out."""
 
 
 @dataclass(frozen=True)
@@ -187,28 +192,7 @@ def _other_unit(columns: Sequence[str], name: str, column: str) -> str | None:
 
 
 def _looks_like_unit(suffix: str) -> bool:
-    units = {"s", "ms", "min", "h", "d", "m", "mm", "cm", "km", "m3", "l", "L", "ml", "kg", "g", "t", "pct", "percent"}
-    units |= {
-        "V",
-        "mV",
-        "C",
-        "K",
-        "lpm",
-        "cfm",
-        "ft",
-        "in",
-        "gpm",
-        "ppm",
-        "frac",
-        "mA",
-        "bar",
-        "Pa",
-        "kPa",
-        "kW",
-        "degC",
-        "degF",
-    }
-    return bool(suffix) and all(part in units for part in suffix.split("_"))
+    return bool(suffix) and all(part in UNITS for part in suffix.split("_"))
 
 
 def _input(table: pd.DataFrame, columns: Sequence[str], q: Quantity, file: Path, taken: Collection[str]) -> FloatArray:

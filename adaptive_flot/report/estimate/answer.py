@@ -56,7 +56,7 @@ def troubles(result: RecordEstimate) -> list[str]:
     if bound:
         said.append(f"{joined(bound)} {'ends on a bound' if len(bound) == 1 else 'end on bounds'}")
     if worse:
-        said.append(f"the fit of {joined(worse)} is worse than a constant")
+        said.append(f"the fit of {joined(worse)} is worse than a constant: check the signs and units of the inputs")
     return said
 
 

@@ -13,7 +13,7 @@ from adaptive_flot.contracts import Setup
 from adaptive_flot.contracts.batch import BatchFit
 from adaptive_flot.described import Described
 from adaptive_flot.errors import DataError, ModelError, PluginError, located, near_match
-from adaptive_flot.greybox.model import FloatArray, Model, Quantity
+from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.steady.assumed_start import wrong_start
 from adaptive_flot.greybox.steady.likely_unit import off_by_a_unit
 from adaptive_flot.greybox.stepping.step_functions import check_interval
@@ -29,9 +29,6 @@ from adaptive_flot.runner.scenario.keys import Plugin
 
 BATCH_OPTIONS: Mapping[str, Any] = {"initial_state": "estimated", "starts": 12}
 """Options of the batch fit: the first state is not known, and a fit that leaves much is tried from further starts."""
-
-LITTLE = 0.8
-"""Share of the standard deviation of an output from which a fit that leaves so much explains little of it."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -117,11 +114,6 @@ def estimate_record(
     columns, noise = model.indices("outputs", driving), batch.noise_std
     said = off_by_a_unit(model, blocks.fit.inputs, blocks.fit.outputs)
     said += wrong_start(model, blocks.fit, batch.initial_state, batch.parameters, columns, noise)
-    said += tuple(
-        _explains_little(model.outputs[c], blocks.fit.outputs[:, c], s)
-        for c, s in zip(columns, noise, strict=True)
-        if s > LITTLE * np.nanstd(blocks.fit.outputs[:, c])
-    )
     blocks = replace(blocks, fit=replace(blocks.fit, notes=blocks.fit.notes + said))
     replays = []
     for name, plugin in plugins.items():
@@ -134,14 +126,6 @@ def estimate_record(
         progress("fit with process noise")
         form = estimate_in_innovations_form(setup, blocks, batch)
     return RecordEstimate(blocks, setup, batch, tuple(replays), form)
-
-
-def _explains_little(q: Quantity, measured: FloatArray, left: float) -> str:
-    unit = "" if q.unit == "-" else f" {q.unit}"
-    return (
-        f"{q.name}: the fit leaves {left:.3g}{unit}, where the output itself varies by {float(np.nanstd(measured)):.3g}"
-        f"{unit}: check the signs and units of the inputs, and the model"
-    )
 
 
 def shipped_plugin(name: str) -> Plugin:

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from adaptive_flot.errors import RangeError
-from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset, read_dataset
-from adaptive_flot.greybox.data.tables import Source
+from adaptive_flot.greybox.data.dataset import TIME_COLUMN, Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
@@ -18,20 +17,9 @@ MEASURED = "_measured"
 """Behind the name of a column of an output: what the record has of it."""
 
 
-def simulate_file(path: Source, model: Model, *, accurate: bool = False) -> pd.DataFrame:
-    """Simulate the inputs of a table; see `simulate_record`.
-
-    Raises
-    ------
-    DataError, RangeError
-        The table can not be used, or the simulation leaves the model's physical range.
-    """
-    return simulate_record(read_dataset(path, model), model, accurate=accurate)
-
-
 @dataclass(frozen=True)
 class Start:
-    """Where a simulation starts: the state (nx,), and in words where that is from."""
+    """Where a simulation starts: the state (nx,), and in words where that is from ("at the steady state ...")."""
 
     state: FloatArray
     words: str
@@ -82,8 +70,9 @@ def simulate_record(record: Dataset, model: Model, *, accurate: bool = False) ->
     columns |= {q.column: shown[:, j] for j, q in enumerate((*model.outputs, *model.signals))}
     for j, q in enumerate(model.states):
         columns.setdefault(q.column, states[:, j])
-    measured = {q.name: record.outputs[:, j] for j, q in enumerate(model.outputs)}
-    columns |= {q.column + MEASURED: measured[q.name] for q in model.outputs if q.name in record.measured(model)}
+    for q, values in zip(model.outputs, record.outputs.T, strict=True):
+        if np.isfinite(values).any():
+            columns[q.column + MEASURED] = values
     return pd.DataFrame(columns)
 
 
@@ -105,28 +94,26 @@ def start_of(record: Dataset, model: Model) -> Start:
         A model that starts steady has no steady state there.
     """
     if record.initial_state is not None:
-        return Start(record.initial_state, "the states in the first row")
+        return Start(record.initial_state, "with the states in the first row")
     parameters = model.parameter_values.copy()
     for name, values in record.parameters.items():
         parameters[model.index("parameters", name)] = values[0]
-    at_rest = "the steady state of the first row's inputs"
+    words = "at the steady state of the first row's inputs"
     try:
-        state, elsewhere = steady_state(model, record.inputs[0], parameters, time=float(record.time[0])).state, at_rest
+        state = steady_state(model, record.inputs[0], parameters, time=float(record.time[0])).state.copy()
     except RangeError:
         if model.starts_steady:
             raise
-        state, elsewhere = model.first_guess, "the initial_guess"  # a battery never rests
+        state, words = model.first_guess, "at the initial_guess"  # a battery never rests
     if model.starts_steady:
-        return Start(state, at_rest)
+        return Start(state, words)
     shown = {(q.name, q.unit): y for q, y in zip(model.outputs, record.outputs[0], strict=True) if np.isfinite(y)}
-    parts: dict[str, list[str]] = {}
-    for j, q in enumerate(model.states):
-        if (q.name, q.unit) in shown:
-            state[j], source = shown[q.name, q.unit], "as measured in the first row"
-        else:
-            source = f"at {elsewhere}"
-        parts.setdefault(source, []).append(q.name)
-    return Start(state, "; ".join(f"{', '.join(names)} {source}" for source, names in parts.items()))
+    measured = [j for j, q in enumerate(model.states) if (q.name, q.unit) in shown]
+    for j in measured:
+        state[j] = shown[model.states[j].name, model.states[j].unit]
+    if measured:
+        words += f", but with {', '.join(model.states[j].name for j in measured)} as measured there"
+    return Start(state, words)
 
 
 def misfit(table: pd.DataFrame, model: Model) -> dict[str, float]:

@@ -40,7 +40,7 @@ def test_a_simulated_table_comes_back(call: Call, truth: pd.DataFrame, tmp_path:
     measured = {"level_m", "tails_flow_m3_s", "concentrate_grade", "air_recovery", "concentrate_flow_m3_s", "recovery"}
     assert set(again.columns) == set(truth.columns) | {f"{column}_measured" for column in measured}
     words = " ".join(result.out.split())
-    assert "starts from the states in the first row" in words and "root mean square" in words
+    assert "starts with the states in the first row" in words and "root mean square" in words
     for column in truth.columns:
         np.testing.assert_allclose(again[column], truth[column], rtol=1e-9, err_msg=column)
 

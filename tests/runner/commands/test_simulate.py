@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from adaptive_flot.errors import RangeError
-from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.data.dataset import Dataset, read_dataset
 from adaptive_flot.greybox.data.tables import write_table
 from adaptive_flot.greybox.model import Model, Quantity, Scope
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping.stepper import Stepper
-from adaptive_flot.runner.commands.simulate import misfit, simulate_file, simulate_record, start_of
+from adaptive_flot.runner.commands.simulate import misfit, simulate_record, start_of
 
 ROWS = 30
 
@@ -109,7 +109,7 @@ def test_a_state_starts_where_the_first_row_shows_it() -> None:
     record = Dataset("r", np.arange(4.0), 1.0, np.ones((4, 1)), np.array([[7.0], [np.nan], [6.0], [5.0]]))
     start = start_of(record, cooling)
     np.testing.assert_allclose(start.state, [7.0, 10.0], rtol=1e-6)
-    assert start.words == "heat as measured in the first row; hidden at the steady state of the first row's inputs"
+    assert start.words == "at the steady state of the first row's inputs, but with heat as measured there"
     steady = start_of(record, replace(cooling, starts_steady=True))
     np.testing.assert_allclose(steady.state, [10.0, 10.0], rtol=1e-6)
     unseen = replace(record, outputs=np.full((4, 1), np.nan))
@@ -141,7 +141,7 @@ def test_the_rest_of_a_simulation_can_be_simulated_from_its_table(
     """The states in the first row of a table are its initial condition, whatever its inputs are."""
     whole = simulate_record(record, model)
     write_table(whole.iloc[12:], tmp_path / "rest.parquet")
-    rest = simulate_file(tmp_path / "rest.parquet", model)
+    rest = simulate_record(read_dataset(tmp_path / "rest.parquet", model), model)
     for column in whole.columns:
         np.testing.assert_allclose(rest[column], whole[column].iloc[12:], rtol=1e-9)
 

@@ -112,9 +112,8 @@ class Refitter:
         degrees_of_freedom: float = NU,
         held: tuple[float, float] | None = None,
     ) -> None:
-        self.held = held
         self.model, self.record, self.columns, self.floor = model, record, tuple(columns), floor
-        self.degrees_of_freedom = degrees_of_freedom
+        self.degrees_of_freedom, self.held = degrees_of_freedom, held
         self.free, self.known = tuple(free), known
         self.counted = np.ones(len(record), dtype=bool) if counted is None else counted
         self._functions = ResponseFunctions(model, record.dt, columns, (), free, degrees_of_freedom)
@@ -143,8 +142,6 @@ class Refitter:
         """Fit from parameters (np,) and, where they are known nearly, factors of the noise, which may be held."""
         p = self.space.inside(p)
         first = p[self._where].copy()
-        if self.held is not None:
-            size, hold_noise = self.held, True
         if size is None or not hold_noise:
             size, best = self._search_noise(p, first, size)
         else:
@@ -171,7 +168,7 @@ class Refitter:
     def at(self, p: FloatArray) -> Refit:
         """The noise fitted at parameters (np,) that stay."""
         first = p[self._where].copy()
-        size, cost = self._search_noise(p, first) if self.held is None else (self.held, self._cost(p, self.held, first))
+        size, cost = self._search_noise(p, first)
         return Refit(p.copy(), self.noise(size), size, self._run_at(p, size), -cost)
 
     def response(self, fit: Refit, sites: Sequence[str]) -> LinearResponse:
@@ -231,7 +228,12 @@ class Refitter:
         *,
         near: bool = False,
     ) -> tuple[tuple[float, float], float]:
-        """The size of the noise of least cost at some parameters, and that cost; from a size and its cost."""
+        """The size of the noise of least cost at some parameters, and that cost; from a size and its cost.
+
+        The size that is held, where one is.
+        """
+        if self.held is not None:
+            return self.held, self._cost(p, self.held, first)
 
         def along(middle: tuple[float, float]) -> Costs:
             run = self._run_at(p, middle)
