@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Hashable
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 Value = TypeVar("Value")
 
 MOST_KEPT = 256
 """Entries of a cache. A model needs some ten; records of every length need two for each of the 64 row counts."""
+MOST_MODELS = 192
+"""Models whose functions a thread keeps. A discovery comes to a few hundred, and to most of them several times."""
 
 
 class FunctionCache(Generic[Value]):
@@ -39,3 +42,18 @@ class FunctionCache(Generic[Value]):
 
     def __reduce__(self) -> tuple[type[FunctionCache[Value]], tuple[int]]:
         return FunctionCache, (self._most,)
+
+
+_of_thread = threading.local()
+
+
+def functions_of(content: Hashable) -> FunctionCache[Any]:
+    """The cache of all models with this content that a thread has made.
+
+    A search attaches the same effect at many places of its course, each time to a model of its own. What the models
+    are equal in, `content` tells; then their functions are. Functions with buffers are not for two threads at once.
+    """
+    if not hasattr(_of_thread, "caches"):
+        _of_thread.caches = FunctionCache(MOST_MODELS)
+    caches: FunctionCache[FunctionCache[Any]] = _of_thread.caches
+    return caches.get(content, FunctionCache)

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, TypeVar, TypeVarTuple
 
@@ -29,7 +29,7 @@ from adaptive_flot.described import Described
 from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.build import Built, build, tangent
 from adaptive_flot.greybox.effects import Effect, check_distinct
-from adaptive_flot.greybox.function_cache import FunctionCache
+from adaptive_flot.greybox.function_cache import FunctionCache, functions_of
 from adaptive_flot.greybox.model_checks import Checks
 from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
 from adaptive_flot.greybox.scope import Scope, Site
@@ -42,6 +42,7 @@ MOST_EXTENDED = 64
 STEPS_BESIDE_A_TURN = 4
 """Integration steps, for each of the model's own, beside an effect that turns with the sign of a signal."""
 Made = TypeVar("Made")
+_BESIDE_VALUE = tuple(f.name for f in fields(Parameter) if f.name != "value")
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,8 +125,9 @@ class Model(Checks, Described):
 
     def __post_init__(self) -> None:
         self.check_groups()
-        _ = self._built  # equations are checked when the model is made, not when it is first used
+        content = self._content()  # equations are checked when the model is made, not when it is first used
         self.check_names()
+        object.__setattr__(self, "_functions", functions_of(content))
 
     def described(self) -> Mapping[str, object]:
         """What it is made of; see `Described`."""
@@ -252,7 +254,7 @@ class Model(Checks, Described):
         return tuple(name.startswith(jumping) for name in self.names("states"))
 
     def derived(self, builder: Callable[[Model, *Arguments], Made], *arguments: *Arguments) -> Made:
-        """Return `builder(model, *arguments)`, made once for this model and those of other parameter values.
+        """Return `builder(model, *arguments)`, made once for all models that differ in no more than parameter values.
 
         Parameters
         ----------
@@ -278,6 +280,14 @@ class Model(Checks, Described):
     def site_values(self) -> ca.Function:
         """`(t, x, u, p, z)` to the value at each site (sites,) before any effect; the first of several components."""
         return self._built.site_values
+
+    def _content(self) -> Hashable:
+        """What the functions of a model depend on: all but the values of its parameters."""
+        functions = tuple(f.serialize() for f in (self._built.dae, self._built.decay, self._built.site_values))
+        parameters = tuple(tuple(getattr(p, name) for name in _BESIDE_VALUE) for p in self.parameters)
+        tables = self.states, self.inputs, parameters, self.outputs, self.signals, self.algebraic, self._built.sites
+        how = self.name, self.max_step_s, self.compiled, self.record_code, tuple(e.structure for e in self.effects)
+        return functions, tables, how
 
     @cached_property
     def _built(self) -> Built:

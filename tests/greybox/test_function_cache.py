@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import FrozenInstanceError
+import threading
+from dataclasses import FrozenInstanceError, replace
 
 import casadi as ca
 import numpy as np
@@ -12,7 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.greybox import Model, Stepper
+from adaptive_flot.discovery.further_sites.places import with_further_sites
+from adaptive_flot.greybox import Model, Scope, Stepper
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.function_cache import FunctionCache
 from adaptive_flot.processes.cascaded_tanks import make_model
@@ -51,7 +53,7 @@ def test_copies_of_a_cache_are_empty() -> None:
 def test_records_of_every_length_leave_a_bounded_number_of_functions_and_the_same_bits() -> None:
     """A record that grows row by row asks for one more function a row; what was dropped is made again."""
     model, x0 = make_model(), np.array([5.0, 5.0])
-    model._functions._most = 4
+    object.__setattr__(model, "_functions", FunctionCache(4))  # its own, and few
     inputs = np.linspace(2.0, 4.0, 20)[:, None]
     whole = Stepper(make_model(), 4.0).simulate(x0, inputs).states
     for rows in (*range(1, 21), *range(1, 21)):
@@ -89,6 +91,51 @@ def test_models_of_other_parameter_values_share_functions_and_those_with_effects
     after = np.array(extended.derived(rates)(*AT, extended.parameter_values)).ravel()
     pumped = model.parameter_values[model.index("parameters", "pump_gain")] * 3.0
     np.testing.assert_allclose(after - before, [pumped * np.expm1(1.0), 0.0], atol=1e-12)
+
+
+def test_models_made_one_by_one_share_functions_where_their_content_is_the_same() -> None:
+    model, own = make_model(), rates
+    made = model.derived(own)
+    assert make_model().derived(own) is made
+    assert replace(model, starts_steady=not model.starts_steady).derived(own) is made
+
+    def doubled(m: Scope) -> None:
+        model.equations(m)
+        for name, rate in m.derivatives.items():
+            m.derivatives[name] = 2.0 * rate
+
+    for other in (
+        replace(model, equations=doubled),
+        replace(model, max_step_s=0.5 * model.max_step_s),
+        model.with_effects([Effect("pump_flow", "constant", "shift")]),
+        with_further_sites(model),
+    ):
+        assert other.derived(own) is not made
+
+
+def test_what_equations_read_from_outside_is_no_reason_to_take_the_functions_of_before() -> None:
+    """The same function object, as in a notebook where a constant is given again."""
+    size = [1.0]
+
+    def sized(m: Scope) -> None:
+        make_model().equations(m)
+        for name, rate in m.derivatives.items():
+            m.derivatives[name] = size[0] * rate
+
+    found = []
+    for size[0] in (1.0, 3.0):
+        model = replace(make_model(), equations=sized)
+        found.append(np.array(model.derived(rates)(*AT, model.parameter_values)).ravel())
+    np.testing.assert_allclose(found[1], 3.0 * found[0])
+
+
+def test_threads_do_not_share_functions_of_models_that_each_makes() -> None:
+    """Those with buffers are for one thread at a time."""
+    found: list[object] = [make_model().derived(rates)]
+    thread = threading.Thread(target=lambda: found.append(make_model().derived(rates)))
+    thread.start()
+    thread.join()
+    assert len(found) == 2 and found[0] is not found[1]
 
 
 def test_a_model_stays_frozen_and_compares_by_what_it_is() -> None:
