@@ -10,6 +10,7 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, settings
 
+from adaptive_flot.greybox.function_cache import forget_functions
 from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.processes import flotation
@@ -37,6 +38,12 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One worker more than there are cores: half the time of the live tests is waiting for a clock."""
     return (os.cpu_count() or 1) + 1
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_functions_of_the_module_before() -> None:
+    """What a test finds does not depend on those that ran before it in other files."""
+    forget_functions()
 
 
 @pytest.fixture(scope="session")

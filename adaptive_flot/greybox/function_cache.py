@@ -57,3 +57,8 @@ def functions_of(content: Hashable) -> FunctionCache[Any]:
         _of_thread.caches = FunctionCache(MOST_MODELS)
     caches: FunctionCache[FunctionCache[Any]] = _of_thread.caches
     return caches.get(content, FunctionCache)
+
+
+def forget_functions() -> None:
+    """Models made from now on by this thread share nothing with those before: another compiler, say, is at hand."""
+    _of_thread.__dict__.clear()

@@ -6,6 +6,7 @@ record tells the band as a range, and a fit finds no slope between two bands: th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -31,13 +32,13 @@ LEAST_JUMPS = 3
 
 def jumped(v: FloatArray, band: float, rest: float = 0.0) -> FloatArray:
     """Position (N,) of what stays until a demand (N,) is more than a band away, and then jumps to it, less a rest."""
-    position = np.empty_like(v)
-    at = v[0]
-    for k, demand in enumerate(v):
+    demands = v.tolist()  # a loop over plain numbers takes a fifth of the time
+    position, at = [], demands[0]
+    for demand in demands:
         if abs(demand - at) > band:
-            at = demand - np.copysign(rest, demand - at)
-        position[k] = at
-    return position
+            at = demand - math.copysign(rest, demand - at)
+        position.append(at)
+    return np.array(position)
 
 
 def same_jumps(v: FloatArray, band: float, rest: float = 0.0) -> tuple[float, float]:

@@ -112,7 +112,7 @@ class RecordFilter:
             Wrong shapes.
         """
         n, rows = len(self.model.states) + len(self.walking), len(record)
-        (z, P, predicted, variance, likelihood), each, Q = self._from_first_row(record, noise, z0, P0, p)
+        (z, P, predicted, variance, likelihood), each, Q = self._from_first_row(_Seen(self, record), noise, z0, P0, p)
         if rows == 1:
             ahead, F, H = np.empty((0, n)), np.empty((0, n, n)), np.empty((0, len(self.outputs), n))
             return Filtered(predicted[None], variance[None], likelihood.ravel(), z[None], P[None], ahead, F, H, Q)
@@ -146,9 +146,9 @@ class RecordFilter:
 
         Nothing is integrated, see `filtering.linearised`.
         """
-        starts, noises, found = [], [], np.empty((len(cases), len(record)))
+        starts, noises, found, seen = [], [], np.empty((len(cases), len(record))), _Seen(self, record)
         for i, case in enumerate(cases):
-            (z, P, _, _, likelihood), each, Q = self._from_first_row(record, *case)
+            (z, P, _, _, likelihood), each, Q = self._from_first_row(seen, *case)
             starts.append((z - run.z[0], P))
             noises.append((Q, each["r"]))
             found[i, 0] = likelihood.item()
@@ -171,31 +171,36 @@ class RecordFilter:
         record: Dataset,
         cases: Sequence[tuple[NoiseModel, FloatArray, FloatArray, FloatArray]],
     ) -> FloatArray:
-        members, found = [], np.empty((len(cases), len(record)))
+        members, found, seen = [], np.empty((len(cases), len(record))), _Seen(self, record)
         for i, case in enumerate(cases):
-            (z, P, _, _, likelihood), each, _ = self._from_first_row(record, *case)
+            (z, P, _, _, likelihood), each, _ = self._from_first_row(seen, *case)
             members.append({"z": z, "P": P, **each})
             found[i, 0] = likelihood.item()
         found[:, 1:] = many.side_by_side(members, "log_likelihood")[:, :, 0]
         return found
 
     def _from_first_row(
-        self, record: Dataset, noise: NoiseModel, z0: FloatArray, P0: FloatArray, p: FloatArray
+        self, seen: _Seen, noise: NoiseModel, z0: FloatArray, P0: FloatArray, p: FloatArray
     ) -> tuple[Sequence[FloatArray], dict[str, FloatArray], FloatArray]:
         """The correction by the first row, the arguments of all other rows, and the variance of process noise (n,)."""
         n = len(self.model.states) + len(self.walking)
         if z0.shape != (n,) or P0.shape != (n, n):
             raise ModelError(f"the filter takes z0 ({n},) and P0 ({n}, {n}); got {z0.shape} and {P0.shape}")
-        y = record.outputs[:, list(self.outputs)]
+        r, Q = noise.std(self.model)[list(self.outputs)], noise.variances(self.model, self.dt)
+        first = self._first(z0, P0, seen.begins, seen.inputs, p, r, seen.outputs, seen.there)
+        return first, {**seen.each, "p": p, "Q": Q, "r": r}, Q
+
+
+class _Seen:
+    """A record as a filter takes it: what its first row shows, and the arguments of all others."""
+
+    def __init__(self, to: RecordFilter, record: Dataset) -> None:
+        y = record.outputs[:, list(to.outputs)]
         there = np.isfinite(y).astype(float)
         y = np.where(there > 0, y, 0.0)
-        r, Q = noise.std(self.model)[list(self.outputs)], noise.variances(self.model, self.dt)
-        first = self._first(z0, P0, float(record.time[0]), record.inputs[0], p, r, y[0], there[0])
-        t = record.time[0] + self.dt * np.arange(len(record) - 1, dtype=float)
-        each = {
-            "t": t[:, None], "u": record.inputs[1:], "p": p, "Q": Q, "r": r, "y": y[1:], "there": there[1:],
-        }  # fmt: skip
-        return first, each, Q
+        self.begins, self.inputs, self.outputs, self.there = float(record.time[0]), record.inputs[0], y[0], there[0]
+        t = record.time[0] + to.dt * np.arange(len(record) - 1, dtype=float)
+        self.each = {"t": t[:, None], "u": record.inputs[1:], "y": y[1:], "there": there[1:]}
 
 
 def _calls(

@@ -58,8 +58,8 @@ class TapeStruct(ctypes.Structure):
     ]
 
     def __init__(self, tape: Tape, memory: FloatArray, held: int | None, compiled: int | None) -> None:
-        arrays = tape.held, tape.code, memory, tape.arguments, tape.results
-        super().__init__(*(a.ctypes.data for a in arrays), held, compiled)
+        held_at, code_at, arguments_at, results_at = tape.addresses
+        super().__init__(held_at, code_at, memory.ctypes.data, arguments_at, results_at, held, compiled)
 
 
 _SIZES = ("nx", "nu", "ny", "ns", "np", "nr", "rx", "ne")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -59,6 +59,14 @@ class Tape:
     arguments: NDArray[np.int64]
     results: NDArray[np.int64]
     numbers: tuple[int, int]
+
+    @cached_property
+    def addresses(self) -> tuple[int, int, int, int]:
+        """Where `held`, `code`, `arguments` and `results` are; asked for in every run."""
+        held, code, arguments, results = (
+            int(a.ctypes.data) for a in (self.held, self.code, self.arguments, self.results)
+        )
+        return held, code, arguments, results
 
     def c_functions(self, name: str, *, in_lanes: bool = False) -> str:
         """The same as C functions `void NAME(const double *i, double *o)` and `NAME_held`: both are the memory.

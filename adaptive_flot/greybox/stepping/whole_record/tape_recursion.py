@@ -257,7 +257,9 @@ class _Kept:
 
 
 def _addresses(arrays: Sequence[FloatArray]) -> Any:
-    return (ctypes.c_void_p * len(arrays))(*(a.ctypes.data for a in arrays))
+    at = {id(a): a for a in arrays}  # members have most of their arguments in common
+    known = {key: a.ctypes.data for key, a in at.items()}
+    return (ctypes.c_void_p * len(arrays))(*(known[id(a)] for a in arrays))
 
 
 @lru_cache(maxsize=2)
