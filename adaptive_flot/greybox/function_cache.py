@@ -10,8 +10,11 @@ Value = TypeVar("Value")
 
 MOST_KEPT = 256
 """Entries of a cache. A model needs some ten; records of every length need two for each of the 64 row counts."""
-MOST_MODELS = 192
-"""Models whose functions a thread keeps. A discovery comes to a few hundred, and to most of them several times."""
+MOST_WRITTEN = 2_000_000
+"""Characters of the equations of all models whose functions a thread keeps: 200 small ones, or 25 flotation cells.
+
+A discovery comes to a few hundred models, and to most of them several times. The functions of a cell take some 4 MB.
+"""
 
 
 class FunctionCache(Generic[Value]):
@@ -22,22 +25,28 @@ class FunctionCache(Generic[Value]):
     Parameters
     ----------
     most
-        Number of entries kept.
+        Number of entries kept, or the size of all of them together.
     """
 
     def __init__(self, most: int = MOST_KEPT) -> None:
         self._most = most
         self._values: dict[Hashable, Value] = {}  # in the order of use, the latest last
+        self._sizes: dict[Hashable, int] = {}
+        self._total = 0
 
     def __len__(self) -> int:
         return len(self._values)
 
-    def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
-        """Value of a key; `make` is called when the cache does not hold it."""
+    def get(self, key: Hashable, make: Callable[[], Value], size: int = 1) -> Value:
+        """Value of a key; `make` is called when the cache does not hold it. The latest is kept whatever its size."""
         value = self._values.pop(key) if key in self._values else make()
         self._values[key] = value
-        if len(self._values) > self._most:
-            del self._values[next(iter(self._values))]
+        self._total += size - self._sizes.pop(key, 0)
+        self._sizes[key] = size
+        while self._total > self._most and len(self._values) > 1:
+            oldest = next(iter(self._values))
+            del self._values[oldest]
+            self._total -= self._sizes.pop(oldest)
         return value
 
     def __reduce__(self) -> tuple[type[FunctionCache[Value]], tuple[int]]:
@@ -47,16 +56,16 @@ class FunctionCache(Generic[Value]):
 _of_thread = threading.local()
 
 
-def functions_of(content: Hashable) -> FunctionCache[Any]:
-    """The cache of all models with this content that a thread has made.
+def functions_of(content: Hashable, size: int) -> FunctionCache[Any]:
+    """The cache of all models with this content that a thread has made; `size` is the number of its characters.
 
     A search attaches the same effect at many places of its course, each time to a model of its own. What the models
     are equal in, `content` tells; then their functions are. Functions with buffers are not for two threads at once.
     """
     if not hasattr(_of_thread, "caches"):
-        _of_thread.caches = FunctionCache(MOST_MODELS)
+        _of_thread.caches = FunctionCache(MOST_WRITTEN)
     caches: FunctionCache[FunctionCache[Any]] = _of_thread.caches
-    return caches.get(content, FunctionCache)
+    return caches.get(content, FunctionCache, size)
 
 
 def forget_functions() -> None:

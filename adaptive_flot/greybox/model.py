@@ -125,9 +125,10 @@ class Model(Checks, Described):
 
     def __post_init__(self) -> None:
         self.check_groups()
-        content = self._content()  # equations are checked when the model is made, not when it is first used
+        written = self._written()  # equations are checked when the model is made, not when it is first used
         self.check_names()
-        object.__setattr__(self, "_functions", functions_of(content))
+        functions = functions_of((written, self._tables()), sum(map(len, written)))
+        object.__setattr__(self, "_functions", functions)
 
     def described(self) -> Mapping[str, object]:
         """What it is made of; see `Described`."""
@@ -281,13 +282,16 @@ class Model(Checks, Described):
         """`(t, x, u, p, z)` to the value at each site (sites,) before any effect; the first of several components."""
         return self._built.site_values
 
-    def _content(self) -> Hashable:
-        """What the functions of a model depend on: all but the values of its parameters."""
-        functions = tuple(f.serialize() for f in (self._built.dae, self._built.decay, self._built.site_values))
+    def _written(self) -> tuple[str, ...]:
+        """Its equations as text."""
+        return tuple(f.serialize() for f in (self._built.dae, self._built.decay, self._built.site_values))
+
+    def _tables(self) -> Hashable:
+        """What its functions depend on beside its equations: all but the values of its parameters."""
         parameters = tuple(tuple(getattr(p, name) for name in _BESIDE_VALUE) for p in self.parameters)
         tables = self.states, self.inputs, parameters, self.outputs, self.signals, self.algebraic, self._built.sites
         how = self.name, self.max_step_s, self.compiled, self.record_code, tuple(e.structure for e in self.effects)
-        return functions, tables, how
+        return tables, how
 
     @cached_property
     def _built(self) -> Built:

@@ -41,6 +41,27 @@ def test_it_makes_what_a_list_of_the_latest_keys_lacks(keys: list[int], most: in
         assert len(cache) == len(recent)
 
 
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(1, 6)), max_size=60), st.integers(1, 12))
+def test_it_keeps_the_latest_as_far_as_their_sizes_allow(asked: list[tuple[int, int]], most: int) -> None:
+    """Against a plain list; a size that changes counts as it was told last."""
+    cache: FunctionCache[int] = FunctionCache(most)
+    recent: list[tuple[int, int]] = []
+    made: list[int] = []
+
+    def make() -> int:
+        made.append(1)
+        return 0
+
+    for key, size in asked:
+        made.clear()
+        cache.get(key, make, size)
+        assert bool(made) == all(k != key for k, _ in recent)
+        recent = [*((k, s) for k, s in recent if k != key), (key, size)]
+        while sum(s for _, s in recent) > most and len(recent) > 1:
+            recent.pop(0)
+        assert len(cache) == len(recent)
+
+
 def test_copies_of_a_cache_are_empty() -> None:
     """The values need not pickle."""
     cache: FunctionCache[object] = FunctionCache(3)

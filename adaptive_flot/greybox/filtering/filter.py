@@ -73,6 +73,9 @@ class RecordFilter:
         Names of parameters that walk (w,).
     degrees_of_freedom
         Of the innovations; infinity is the Gaussian filter.
+    beside
+        Names of further parameters by which derivatives of the same steps are asked for elsewhere: both are built from
+        one function. The filter itself does not depend on them, but for rounding.
     """
 
     def __init__(
@@ -82,6 +85,7 @@ class RecordFilter:
         outputs: Sequence[int],
         walking: Sequence[str] = (),
         degrees_of_freedom: float = STUDENT,
+        beside: Sequence[str] = (),
     ) -> None:
         if not outputs:
             raise ModelError(f"model '{model.name}': a filter needs a measured output; name at least one")
@@ -89,7 +93,7 @@ class RecordFilter:
         self.outputs, self.walking = tuple(outputs), tuple(walking)
         self._degrees_of_freedom = degrees_of_freedom
         self._first, self._many = model.derived(
-            _calls, dt, self.outputs, self.walking, degrees_of_freedom, threading.get_ident()
+            _calls, dt, self.outputs, self.walking, degrees_of_freedom, tuple(beside), threading.get_ident()
         )
 
     def run(self, record: Dataset, noise: NoiseModel, z0: FloatArray, P0: FloatArray, p: FloatArray) -> Filtered:
@@ -204,7 +208,13 @@ class _Seen:
 
 
 def _calls(
-    model: Model, dt: float, outputs: tuple[int, ...], walking: tuple[str, ...], degrees_of_freedom: float, thread: int
+    model: Model,
+    dt: float,
+    outputs: tuple[int, ...],
+    walking: tuple[str, ...],
+    degrees_of_freedom: float,
+    beside: tuple[str, ...],
+    thread: int,
 ) -> tuple[FastCall, RowByRow]:
     """The first correction, and the step from row to row, with their working memory: those of one thread.
 
@@ -215,7 +225,7 @@ def _calls(
     many = interval_by_interval(
         None if walking else steps_along(model, dt, ()),
         lambda: filter_after_steps(model, dt, outputs, degrees_of_freedom),
-        lambda: filter_step(model, dt, outputs, walking, degrees_of_freedom),
+        lambda: filter_step(model, dt, outputs, walking, degrees_of_freedom, beside),
         CARRIED,
         HELD,
     )

@@ -30,8 +30,12 @@ NAMES = ["z", "P", "t", "u", "p", "Q", "r", "y", "there"]
 TOLD = ["z_next", "P_next", "ahead", "F", "H", "predicted", "variance", "log_likelihood"]
 
 
-def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequence[str], nu: float) -> ca.Function:
+def filter_step(
+    model: Model, dt: float, outputs: Sequence[int], walking: Sequence[str], nu: float, beside: Sequence[str] = ()
+) -> ca.Function:
     """Build the step for m outputs and w walking parameters, n = nx + w.
+
+    It is built from the derivatives by the parameters `beside` too, where these are asked for anyway.
 
     Returns
     -------
@@ -40,7 +44,7 @@ def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequen
         F (n, n), H (m, n), predicted (m,), variance (m,), log_likelihood)``. `ahead` is f(z), before the sample was
         used; predicted and variance are those of each output before its correction by any.
     """
-    jacobians = Stepper(model, dt).one_step_jacobians(list(walking))
+    jacobians = Stepper(model, dt).one_step_jacobians([*walking, *beside])
     _, t, u, p = jacobians.sx_in()
     nx, w, m = len(model.states), len(walking), len(outputs)
     n, rows = nx + w, list(outputs)
@@ -51,6 +55,7 @@ def filter_step(model: Model, dt: float, outputs: Sequence[int], walking: Sequen
         p_now[model.indices("parameters", walking)] = z[nx:]
     walked = z[nx:] if w else ca.SX(0, 1)  # a slice beyond a vector of one is a row
     x_next, outs, fx, fp, hx, hp = jacobians(z[:nx], t, u, p_now)
+    fp, hp = fp[:, :w], hp[:, :w]
     F = ca.vertcat(ca.horzcat(fx, fp), ca.horzcat(ca.SX(w, nx), ca.SX.eye(w)))
     H = ca.horzcat(hx, hp)[rows, :]
     results = _filtered(P, ca.vertcat(x_next, walked), F, H, outs[rows], (Q, r, y, there), nu)
@@ -106,7 +111,7 @@ def first_correction(model: Model, outputs: Sequence[int], walking: Sequence[str
         ["z_next", "P_next", "predicted", "variance", "log_likelihood"],
     )
     results = [z + moved, corrected, predicted, variance, likelihood]
-    return ca.Function("first_correction", [z, P, t, u, p, r, y, there], results, *names, {"cse": True})
+    return ca.Function("first_correction", [z, P, t, u, p, r, y, there], results, *names)
 
 
 def correct(P: ca.SX, H: ca.SX, residual: ca.SX, r: ca.SX, there: ca.SX, nu: float) -> tuple[ca.SX, ca.SX, ca.SX]:

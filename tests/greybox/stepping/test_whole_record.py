@@ -16,7 +16,7 @@ from adaptive_flot.greybox.model import FloatArray
 from adaptive_flot.greybox.steady.steady_state import steady_state
 from adaptive_flot.greybox.stepping import stepper
 from adaptive_flot.greybox.stepping.compiling import compiled
-from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, compiler_problem
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, Written, compiler_problem
 from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.nodes import NodeStepper
 from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians
@@ -24,7 +24,7 @@ from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.greybox.stepping.whole_record import library
 from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
 from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord
-from adaptive_flot.greybox.stepping.whole_record.source import kernel_source
+from adaptive_flot.greybox.stepping.whole_record.source import kernel_source, kernel_source_in_lanes
 from adaptive_flot.greybox.stepping.whole_record.tape import tape_of
 
 PROBLEM = compiler_problem()
@@ -225,15 +225,27 @@ def test_a_linearised_run_is_the_same_both_ways(n: int, nx: int, r: int, seed: i
 def test_knots_are_numbers_beside_the_code() -> None:
     """A search over many records compiles each kind of effect once."""
 
-    def source(reference: float) -> tuple[str, list[float]]:
+    def source(reference: float) -> tuple[Written, list[float]]:
         effect = Effect("place", "drive", "power", settings={"reference": reference})
         made = kernels(SMALL.with_effects([effect]), ("gain",), True)
         tapes = {name: tape_of(getattr(made, name), (2, 3)) for name in ("rates", "ends")}
         return kernel_source(tapes), [float(v) for tape in tapes.values() for v in tape.memory]
 
     (one, numbers), (other, others) = source(1.5), source(1.7)
-    assert one == other
+    assert (one.key, one.write()) == (other.key, other.write())
     assert numbers != others
+
+
+def test_the_key_of_a_source_tells_it_from_others() -> None:
+    """A library is taken by the key of its source alone: of two sources with one key, one would run for the other."""
+    sources = []
+    for form, set_to in (("power", {"reference": 1.5}), ("linear", {"reference": 1.5}), ("shift", {})):
+        effect = Effect("place", "constant" if form == "shift" else "drive", form, settings=set_to)
+        made = kernels(SMALL.with_effects([effect]), ("gain",), True)
+        for held in ((), (2, 3)):
+            tapes = {name: tape_of(getattr(made, name), held) for name in ("rates", "ends")}
+            sources += [kernel_source(tapes), *(kernel_source_in_lanes("step", tapes["ends"], n) for n in (4, 8))]
+    assert len({s.key for s in sources}) == len({s.write() for s in sources}) == len(sources)
 
 
 @needs_compiler

@@ -64,8 +64,8 @@ class ResponseFunctions:
         self.model, self.columns, self.sites, self.constants = model, tuple(columns), tuple(sites), tuple(constants)
         effects = [_probe(model, site) for site in sites]
         self.extended = model.with_effects(effects) if effects else model
-        self.filter = RecordFilter(self.extended, dt, columns, (), degrees_of_freedom)
         self.wrt = (*(e.parameter(e.terms[0].name) for e in effects), *constants)
+        self.filter = RecordFilter(self.extended, dt, columns, (), degrees_of_freedom, self.wrt)
         self._each_row = self.extended.derived(_jacobians_row_by_row, dt, self.wrt, threading.get_ident())
         self.degrees_of_freedom = degrees_of_freedom
 

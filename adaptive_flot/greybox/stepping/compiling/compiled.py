@@ -96,7 +96,23 @@ def library_of(function: ca.Function) -> ctypes.CDLL:
     return load_library(function.name(), _source(function), FLAGS, lambda library: ctypes.CDLL(str(library)))
 
 
-def load_library(name: str, source: str, flags: Sequence[str], load: Callable[[Path], Loaded]) -> Loaded:
+@dataclass(frozen=True)
+class Written:
+    """C source that is written only where it must be compiled.
+
+    Attributes
+    ----------
+    key
+        Tells the source from every other one: what it is written from, and the program that writes it.
+    write
+        Writes it.
+    """
+
+    key: str
+    write: Callable[[], str]
+
+
+def load_library(name: str, source: str | Written, flags: Sequence[str], load: Callable[[Path], Loaded]) -> Loaded:
     """Compile C source into a shared library, where this was not done before, and load it.
 
     Parameters
@@ -128,7 +144,7 @@ def load_library(name: str, source: str, flags: Sequence[str], load: Callable[[P
         raise CompileError(f"{library} can not be loaded ({_last_line(str(error))})") from error
 
 
-def is_kept(name: str, source: str, flags: Sequence[str]) -> bool:
+def is_kept(name: str, source: str | Written, flags: Sequence[str]) -> bool:
     """Whether C source was compiled before, by the compiler that would be asked now."""
     try:
         return os.path.lexists(_place(name, source, flags, find_compiler()))
@@ -136,8 +152,8 @@ def is_kept(name: str, source: str, flags: Sequence[str]) -> bool:
         return False
 
 
-def _place(name: str, source: str, flags: Sequence[str], compiler: Compiler) -> Path:
-    content = "\0".join([source, compiler.identity, *flags])
+def _place(name: str, source: str | Written, flags: Sequence[str], compiler: Compiler) -> Path:
+    content = "\0".join([source.key if isinstance(source, Written) else source, compiler.identity, *flags])
     return cache_folder() / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:24]}.so"
 
 
@@ -185,14 +201,14 @@ def _source(function: ca.Function) -> str:
         raise CompileError(f"CasADi writes no C for it ({_last_line(str(error))})") from error
 
 
-def _build(source: str, compiler: Compiler, flags: Sequence[str], library: Path) -> None:
+def _build(source: str | Written, compiler: Compiler, flags: Sequence[str], library: Path) -> None:
     """Compile a source and put the result in its place, whole."""
     try:
         make_private(library.parent)
         _check_safe(library.parent, CACHE_LEVELS - 1)
         with tempfile.TemporaryDirectory(prefix=".compiling-", dir=library.parent) as folder:
             code, made = Path(folder) / "function.c", Path(folder) / "function.so"
-            code.write_text(source, encoding="utf-8")
+            code.write_text(source.write() if isinstance(source, Written) else source, encoding="utf-8")
             _run([*compiler.command, *flags, str(code), "-o", str(made), "-lm"], library.name)
             made.chmod(0o700)
             made.replace(library)

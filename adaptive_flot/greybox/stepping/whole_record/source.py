@@ -7,8 +7,14 @@ that every machine gives the same numbers.
 
 from __future__ import annotations
 
+import hashlib
+import inspect
+import sys
 from collections.abc import Mapping
+from functools import lru_cache
 
+from adaptive_flot.greybox.stepping.compiling.compiled import Written
+from adaptive_flot.greybox.stepping.whole_record import statements
 from adaptive_flot.greybox.stepping.whole_record.statements import HELPERS
 from adaptive_flot.greybox.stepping.whole_record.tape import END, ON_VECTORS, OPERATIONS, TEMPLATES, Tape
 
@@ -283,12 +289,32 @@ def recursion_source(lanes: int = 1) -> str:
     return "\n".join([_TAPE, HELPERS, _evaluation(lanes), _RUN, _RECURSION])
 
 
-def kernel_source(tapes: Mapping[str, Tape]) -> str:
+def kernel_source(tapes: Mapping[str, Tape]) -> Written:
     """C source of tapes as functions of their names, for a model that runs many times."""
-    return "\n".join(["#include <math.h>", HELPERS, *(tape.c_functions(name) for name, tape in tapes.items())])
+
+    def write() -> str:
+        return "\n".join(["#include <math.h>", HELPERS, *(tape.c_functions(name) for name, tape in tapes.items())])
+
+    return Written(_key(1, tapes), write)
 
 
-def kernel_source_in_lanes(name: str, tape: Tape, lanes: int) -> str:
+def kernel_source_in_lanes(name: str, tape: Tape, lanes: int) -> Written:
+    """The same of one tape for so many members, see `_in_lanes`."""
+    return Written(_key(lanes, {name: tape}), lambda: _in_lanes(name, tape, lanes))
+
+
+def _key(lanes: int, tapes: Mapping[str, Tape]) -> str:
+    return " ".join([_writer(), str(lanes), *(f"{name} {tape.digest}" for name, tape in tapes.items())])
+
+
+@lru_cache(maxsize=1)
+def _writer() -> str:
+    """What writes the source, as one number: a library of another version of it is another one."""
+    modules = (sys.modules[name] for name in (__name__, Tape.__module__, statements.__name__))
+    return hashlib.sha256("".join(map(inspect.getsource, modules)).encode()).hexdigest()
+
+
+def _in_lanes(name: str, tape: Tape, lanes: int) -> str:
     """C source of one tape for so many members, whose numbers lie beside each other in the memory.
 
     Sums, products and the like are operations on vectors. The others are called for each member. The numbers are those

@@ -10,9 +10,10 @@ its own: a quarter of the operations of a flotation cell, and of its powers.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -68,6 +69,19 @@ class Tape:
         )
         return held, code, arguments, results
 
+    @cached_property
+    def digest(self) -> str:
+        """What its C functions are written from, as one number."""
+        parts = self.held.tobytes(), self.code.tobytes(), repr(self.numbers).encode(), self._form
+        return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
+
+    @property
+    def _form(self) -> bytes:
+        """Numbers of the equations, NaN where one is not part of their form."""
+        first, beyond = self.numbers
+        numbers = self.memory[first:beyond]
+        return np.where(np.isin(numbers, STRUCTURAL), numbers, np.nan).tobytes()
+
     def c_functions(self, name: str, *, in_lanes: bool = False) -> str:
         """The same as C functions `void NAME(const double *i, double *o)` and `NAME_held`: both are the memory.
 
@@ -75,19 +89,13 @@ class Tape:
         part of the form of an equation. In lanes a place of the memory is a vector `V` of numbers, and what C has not
         for vectors is a call `do_KIND` of two vectors.
         """
-        first, beyond = self.numbers
-        numbers = self.memory[first:beyond]
-        form = np.where(np.isin(numbers, STRUCTURAL), numbers, np.nan).tobytes()
+        form, first = self._form, self.numbers[0]
         parts = (f"{name}_held", self.held, True), (name, self.code, False)
         return "\n".join(_c_function(to, code.tobytes(), form, first, holds, in_lanes) for to, code, holds in parts)
 
 
-@lru_cache(maxsize=512)
 def _c_function(name: str, code: bytes, form: bytes, first: int, holds: bool, in_lanes: bool) -> str:
-    """One of them, from the bytes of its operations and of its numbers; NaN where a number is not part of the form.
-
-    Many variants of a model have the same operations, and each asks whether its code was compiled before.
-    """
+    """One of them, from the bytes of its operations and of its numbers; NaN where a number is not part of the form."""
     of = "V" if in_lanes else "double"
     operations = np.frombuffer(code, dtype=np.uint16).reshape(-1, 4)[:-1].tolist()
     numbers = np.frombuffer(form).tolist()

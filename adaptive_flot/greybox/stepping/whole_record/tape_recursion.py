@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adaptive_flot.greybox.model import FloatArray
-from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, is_kept, load_library
+from adaptive_flot.greybox.stepping.compiling.compiled import CompileError, Written, is_kept, load_library
 from adaptive_flot.greybox.stepping.whole_record.instruction_sets import AVX2, AVX512, SCALAR, supported
 from adaptive_flot.greybox.stepping.whole_record.library import KERNEL_FLAGS, LIBRARY_FLAGS, TapeStruct
 from adaptive_flot.greybox.stepping.whole_record.source import (
@@ -269,7 +269,7 @@ def _library(lanes: int) -> Any:
     return load_library(name, recursion_source(lanes), flags, _open)
 
 
-def _kernel(tape: Tape, lanes: int) -> tuple[str, str, Sequence[str]]:
+def _kernel(tape: Tape, lanes: int) -> tuple[str, Written, Sequence[str]]:
     """Name, source and options of a compiled tape."""
     if lanes == 1:
         return "step", kernel_source({"step": tape}), KERNEL_FLAGS
