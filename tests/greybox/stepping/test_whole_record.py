@@ -22,6 +22,7 @@ from adaptive_flot.greybox.stepping.nodes import NodeStepper
 from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians
 from adaptive_flot.greybox.stepping.stepper import Stepper
 from adaptive_flot.greybox.stepping.whole_record import library
+from adaptive_flot.greybox.stepping.whole_record import source as source_module
 from adaptive_flot.greybox.stepping.whole_record.kernels import kernels
 from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord
 from adaptive_flot.greybox.stepping.whole_record.source import kernel_source, kernel_source_in_lanes
@@ -294,3 +295,17 @@ def test_what_rests_with_the_inputs_is_worked_out_once_and_changes_no_bit(monkey
         runs.append(WholeRecord(replace(SMALL, record_code=True), None, 1, ["gain"])(x0, u, p, 5.0, gradient))
     for what in ("states", "outputs", "signals", "gradients", "last_gradient"):
         np.testing.assert_array_equal(getattr(runs[0], what), getattr(runs[1], what))
+
+
+def test_a_program_that_was_installed_without_its_source_has_its_version_in_the_key(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def no_source(module: object) -> str:
+        raise OSError("could not get source code")
+
+    monkeypatch.setattr("inspect.getsource", no_source)
+    monkeypatch.setattr(source_module, "_writer", source_module._writer.__wrapped__)
+    made = kernels(SMALL, ("gain",), True)
+    tapes = {"rates": tape_of(made.rates, (2, 3))}
+    assert kernel_source(tapes).key == kernel_source(tapes).key
+    assert kernel_source(tapes).write().startswith("#include")

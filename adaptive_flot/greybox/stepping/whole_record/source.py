@@ -12,6 +12,7 @@ import inspect
 import sys
 from collections.abc import Mapping
 from functools import lru_cache
+from importlib.metadata import version
 
 from adaptive_flot.greybox.stepping.compiling.compiled import Written
 from adaptive_flot.greybox.stepping.whole_record import statements
@@ -311,7 +312,11 @@ def _key(lanes: int, tapes: Mapping[str, Tape]) -> str:
 def _writer() -> str:
     """What writes the source, as one number: a library of another version of it is another one."""
     modules = (sys.modules[name] for name in (__name__, Tape.__module__, statements.__name__))
-    return hashlib.sha256("".join(map(inspect.getsource, modules)).encode()).hexdigest()
+    try:
+        program = "".join(map(inspect.getsource, modules))
+    except OSError:  # installed without its source
+        program = version("adaptive-flot")
+    return hashlib.sha256(program.encode()).hexdigest()
 
 
 def _in_lanes(name: str, tape: Tape, lanes: int) -> str:
