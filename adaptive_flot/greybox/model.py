@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, TypeVar, TypeVarTuple
@@ -30,7 +30,7 @@ from adaptive_flot.errors import ModelError, near_match
 from adaptive_flot.greybox.build import Built, build, tangent
 from adaptive_flot.greybox.effects import Effect, check_distinct
 from adaptive_flot.greybox.function_cache import FunctionCache, functions_of
-from adaptive_flot.greybox.model_checks import Checks
+from adaptive_flot.greybox.model_checks import GROUPS, Checks
 from adaptive_flot.greybox.quantities import FloatArray, Kind, KnownEffect, Parameter, Quantity
 from adaptive_flot.greybox.scope import Scope, Site
 
@@ -125,6 +125,8 @@ class Model(Checks, Described):
 
     def __post_init__(self) -> None:
         self.check_groups()
+        for name in GROUPS:  # a model file may have lists
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         written = self._written()  # equations are checked when the model is made, not when it is first used
         self.check_names()
         functions = functions_of((written, self._tables()), sum(map(len, written)))
@@ -286,12 +288,15 @@ class Model(Checks, Described):
         """Its equations as text."""
         return tuple(f.serialize() for f in (self._built.dae, self._built.decay, self._built.site_values))
 
-    def _tables(self) -> Hashable:
-        """What its functions depend on beside its equations: all but the values of its parameters."""
+    def _tables(self) -> str:
+        """What its functions depend on beside its equations: all but the values of its parameters, as text.
+
+        A quantity may hold what can not be a key, such as a list.
+        """
         parameters = tuple(tuple(getattr(p, name) for name in _BESIDE_VALUE) for p in self.parameters)
         tables = self.states, self.inputs, parameters, self.outputs, self.signals, self.algebraic, self._built.sites
         how = self.name, self.max_step_s, self.compiled, self.record_code, tuple(e.structure for e in self.effects)
-        return tables, how
+        return repr((tables, how))
 
     @cached_property
     def _built(self) -> Built:

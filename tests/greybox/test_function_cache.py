@@ -150,6 +150,16 @@ def test_what_equations_read_from_outside_is_no_reason_to_take_the_functions_of_
     np.testing.assert_allclose(found[1], 3.0 * found[0])
 
 
+def test_a_model_may_be_written_with_lists() -> None:
+    """They can be no key of what is kept; and effects are added to tuples."""
+    model = make_model()
+    inputs = [replace(q, usual=[0.0, 1.0]) for q in model.inputs]  # type: ignore[arg-type]
+    other = replace(model, states=list(model.states), inputs=inputs, parameters=list(model.parameters))  # type: ignore[arg-type]
+    assert isinstance(other.states, tuple)
+    extended = other.with_effects([Effect("pump_flow", "constant", "shift")])
+    assert len(extended.parameters) == len(model.parameters) + 1
+
+
 def test_threads_do_not_share_functions_of_models_that_each_makes() -> None:
     """Those with buffers are for one thread at a time."""
     found: list[object] = [make_model().derived(rates)]

@@ -34,7 +34,7 @@ SEED = 11
 def test_a_record_is_judged_as_its_answer_says(
     k: int, category: str, rows: slice, outcomes: set[str], tmp_path: Path
 ) -> None:
-    """All rows, or those that tell the effect too: the first ones, or those around its event."""
+    """By the first rows, or those around its event, which tell as much as all."""
     record = make_record(SEED, k)
     assert record.answer.category == category
     write_record(tmp_path, replace(record, table=record.table.iloc[rows].reset_index(drop=True)))

@@ -1,7 +1,9 @@
 """Machine code of whole records gives the numbers of the plain step, for every form of effect."""
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -307,5 +309,5 @@ def test_a_program_that_was_installed_without_its_source_has_its_version_in_the_
     monkeypatch.setattr(source_module, "_writer", source_module._writer.__wrapped__)
     made = kernels(SMALL, ("gain",), True)
     tapes = {"rates": tape_of(made.rates, (2, 3))}
-    assert kernel_source(tapes).key == kernel_source(tapes).key
+    assert hashlib.sha256(version("adaptive-flot").encode()).hexdigest() in kernel_source(tapes).key
     assert kernel_source(tapes).write().startswith("#include")
