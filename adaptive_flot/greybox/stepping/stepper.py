@@ -30,8 +30,9 @@ from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord, who
 MOST_UNROLLED = 4
 """Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
 ten of them, with derivatives, takes longer to make than a record takes to simulate."""
-LEAST_STEPS = 300
-"""Steps from which a run is worth writing the tapes of `whole_record`, where the model asks for it."""
+LEAST_STEPS = 20
+"""Steps from which a run is worth writing the tapes of `whole_record`, where the model asks for it. A function of so
+many intervals takes longer to make."""
 
 
 class Stepper:
