@@ -16,7 +16,7 @@ from adaptive_flot.discovery.record.robust import noise_by_differences
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.stepping.graded_nodes import graded_nodes
-from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, substeps
+from adaptive_flot.greybox.stepping.nodes import Nodes, place_nodes, rows_between_moves, substeps
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
@@ -66,9 +66,10 @@ def placements(record: Dataset, model: Model) -> list[Nodes]:
             parted += [every, graded_nodes(record, first, least=2)]
             parted += [graded_nodes(record, first, 1, *rest, every_row=every) for rest in AT_REST]
         return sorted(parted, key=lambda nodes: len(nodes.rows))
-    placed: list[Nodes] = [place_nodes(record, longest, growth) for longest in LONGEST for growth in GROWTHS]
-    fewest_first = sorted(placed, key=lambda nodes: len(nodes.rows))
-    return [nodes for nodes in fewest_first if len(nodes.rows) <= WORTHWHILE * len(record)]
+    ways = [(longest, growth) for longest in LONGEST for growth in GROWTHS]
+    counts = {each: sum(map(len, rows_between_moves(record, *each))) for each in ways}
+    fewest_first = sorted(ways, key=lambda each: counts[each])
+    return [place_nodes(record, *each) for each in fewest_first if counts[each] <= WORTHWHILE * len(record)]
 
 
 def with_nodes(problem: Problem, fit: Fit, placed: Sequence[Nodes] | None = None) -> Problem:

@@ -67,11 +67,14 @@ def heed_report(state: State) -> State:
         against = _at_the_end(judgement, whole, state.problem_after or whole, before, after, surely)
     if not against and told:
         against = explains_little(error, np.hypot(noise, unknown))
-    if not against and judgement.word == "class" and _many_and_none(judgement, error):
+    none_near = not against and judgement.word == "class" and _many_and_none(judgement, error)
+    if none_near:
         against = "several other sets of effects do about as well, and none comes near the noise"
     if against:
         judgement = replace(judgement, word="abstain", members=(), part=())
-    certain = certain_words(judgement, error, noise) if judgement.word == "abstain" else ""
+    # what they have in common is not certain either
+    judged = replace(judgement, rivals=()) if none_near else judgement
+    certain = certain_words(judged, error, noise) if judgement.word == "abstain" else ""
     if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
         judgement, certain = Judgement("abstain", None, (), judgement.rivals, judgement.margin), left
     elif judgement.word == "none":

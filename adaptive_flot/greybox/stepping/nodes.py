@@ -84,12 +84,7 @@ def substeps(record: Dataset, count: int) -> Substeps:
 
 def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
     """Nodes of a record, one row apart after a move and further by `growth` rows a row since, up to `longest` rows."""
-    u = record.inputs
-    moved = np.zeros(len(u), dtype=bool)
-    moved[1:] = (np.abs(np.diff(u, axis=0)) > MOVE * np.ptp(u, axis=0)).any(axis=1)
-    moved[0] = True
-    starts = np.flatnonzero(moved)
-    parts = [_segment(int(a), int(b), longest, growth) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
+    u, parts = record.inputs, rows_between_moves(record, longest, growth)
     rows = np.concatenate(parts)
     offsets = np.cumsum([0, *map(len, parts[:-1])])
     triplets = [interpolation(part, offset) for part, offset in zip(parts, offsets, strict=True)]
@@ -97,6 +92,16 @@ def place_nodes(record: Dataset, longest: int, growth: float = 0.5) -> Nodes:
     weights = csr_array((weight, (row, node)), shape=(len(u), len(rows)))
     nodes = Nodes(rows, record.time[rows], np.empty(0), weights)
     return replace(nodes, inputs=np.column_stack([nodes.means(u), np.diff(rows) * record.dt]))
+
+
+def rows_between_moves(record: Dataset, longest: int, growth: float) -> list[IntArray]:
+    """Rows that are nodes, an array from each move of an input to the row before the next; see `place_nodes`."""
+    u = record.inputs
+    moved = np.zeros(len(u), dtype=bool)
+    moved[1:] = (np.abs(np.diff(u, axis=0)) > MOVE * np.ptp(u, axis=0)).any(axis=1)
+    moved[0] = True
+    starts = np.flatnonzero(moved)
+    return [_segment(int(a), int(b), longest, growth) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
 
 
 def _segment(start: int, stop: int, longest: int, growth: float) -> IntArray:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange, State
+from adaptive_flot.discovery.verdict import heed_report as stage
 from adaptive_flot.discovery.verdict.outputs import certain_words, settled
 
 NOISE = np.array([0.1, 0.1, 0.1])
@@ -46,6 +48,24 @@ def test_the_sentence_names_the_outputs_and_what_all_near_alternatives_share(dra
     assert said.startswith("In all that come near: bubble_size by air_flow. ")
     assert "bubble_size by air_flow with grade_sensor by lag brings level down to the noise." in said
     assert said.endswith("Still wrong: grade 1 -> 0.9; look for a further cause there.")
+
+
+def test_what_sets_share_is_not_certain_where_none_of_them_comes_near_the_noise(
+    draught: Discovery, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A valve that leaked was told as sets of three, and "in all that come near: supply air by its temperature"."""
+    monkeypatch.setattr(stage, "_many_and_none", lambda *given: True)
+    assert draught.problem is not None
+    coil, room, pipe = ("coil", "power"), ("room", "lag"), ("pipe", "time")
+    judged = replace(_judged(draught, (coil, room), (coil, pipe)), word="class")
+    state = State(
+        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
+        problem=draught.problem, base=draught.before, search=draught.search, judgement=judged,
+        before=draught.before, after=draught.after,
+    )  # fmt: skip
+    left = stage.heed_report(state)
+    assert left.judged.word == "abstain" and "none comes near the noise" in left.contradiction
+    assert "In all" not in left.certain
 
 
 def test_nothing_certain_is_no_sentence(draught: Discovery) -> None:

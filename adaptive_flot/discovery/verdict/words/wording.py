@@ -80,8 +80,8 @@ def reason_words(
         )
     if judgement.word == "none":
         return (
-            "The model explains the record: no effect at any site, with any driver, removes more of the residual than "
-            "noise would, or what it removes does not stand on rows that did not choose it."
+            "The model explains the record: no effect that was tried, at any site, with any driver, removes more of "
+            "the residual than noise would, or what it removes does not stand on rows that did not choose it."
         )
     if not result.rounds[0].compared:
         best = judgement.best
@@ -89,7 +89,7 @@ def reason_words(
         ahead = f", whatever is ahead by now ({so_far})" if so_far else ""
         return f"The time for the search ended before the rivals had been compared: nothing is found yet{ahead}."
     if judgement.word == "abstain" and judgement.best is None:
-        return "Something is missing, and no effect at any site, with any driver, explains it."
+        return "Something is missing, and no effect that was tried explains it, at any site, with any driver."
     evidence = f"{result.verification}" if result.verification else ""
     evidence = evidence[:1].upper() + evidence[1:]
     if judgement.word == "named":
