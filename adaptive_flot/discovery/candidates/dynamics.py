@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -32,7 +33,8 @@ BOUNDS: Mapping[str, tuple[str, str, tuple[float, ...], np.ufunc]] = {
     "own_value": ("leak", "level", (0.1, 0.25, 0.4), np.maximum),
 }
 """Drivers of an actuator that reaches a limit, or does not close: form, its coefficient, the quantiles of what is asked
-at which it is scored, and what is left of the distance to the bound where it acts."""
+at which it is scored, and what is left of the distance to the bound where it acts. Where a quantile is the end of the
+range itself, the share is one of the range."""
 LIMIT_WIDTH = 0.01
 """Rounding of the limit, as a share of the range of what is asked."""
 BANDS = (0.3, 1.0)
@@ -88,12 +90,20 @@ def bounded(site: Site, driver: str, responses: Responses) -> Iterator[Variant]:
     if not _moves(v):
         return
     form, coefficient, shares, beyond = BOUNDS[driver]
-    effect = Effect(site.name, driver, form, settings={"width": LIMIT_WIDTH * float(np.ptp(v))})
+    low, span = float(v.min()), float(np.ptp(v))
+    width = LIMIT_WIDTH * span
+    effect = Effect(site.name, driver, form, settings={"width": width})
+    end = low + span if driver == "saturation" else low
     for share in shares:
         bound = float(np.quantile(v, share))
+        if abs(bound - end) <= width:  # a valve that is shut half of the time: a share of the range is as good
+            bound = low + share * span
         change = beyond(bound - v, 0.0)
         if change.any():
             profile = TimeProfile(site.name, change, True)
+            if responses.is_hidden(site.name, change):
+                told = replace(effect, coefficients={"amplitude": 1.0, coefficient: bound})
+                profile = replace(profile, response=responses.change_by(told))
             yield Variant(effect, (profile,), ("amplitude",), ((coefficient, bound),))
 
 

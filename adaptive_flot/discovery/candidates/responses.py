@@ -18,6 +18,7 @@ from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.linear_run import linear_run
 from adaptive_flot.greybox.stepping.nodes import IntArray, Nodes, NodeStepper, substeps
+from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.greybox.stepping.row_jacobians import row_jacobians
 from adaptive_flot.greybox.stepping.stepper import MOST_UNROLLED, Stepper
 
@@ -25,17 +26,31 @@ FILLED_AT_ONCE = 64
 """Rows of responses that are filled in one go: more would not stay in a cache, and fresh memory is slow."""
 TAKEN_UP = 1.5e-3
 """What is left of a response, as a share of it, that is rounding and curvature: what is free already takes it up."""
+HALF = 0.5
 LEAST_VALUE = 1e-6
 """Share of its largest value below which a site is at zero."""
 
 
 @dataclass(frozen=True)
 class TimeProfile:
-    """A time profile at a site: change of the logarithm of its value, or of the value itself where `offset`, (N,)."""
+    """A time profile at a site.
+
+    Attributes
+    ----------
+    site
+        Name of the site.
+    values
+        Change of the logarithm of its value, or of the value itself where `offset`, (N,).
+    offset
+        Which of the two.
+    response
+        What the measured outputs do (N, m), where that is not the linear response to the values.
+    """
 
     site: str
     values: FloatArray
     offset: bool
+    response: FloatArray | None = None
 
 
 class Responses:
@@ -208,7 +223,41 @@ class Responses:
                 v = v * self.site_values[c.site]
             table[:, j] = v
         table[0] = table[1]
-        return self._propagate(np.zeros((len(self.fit.initial_state), len(profiles))), source, table, rows)
+        found = self._propagate(np.zeros((len(self.fit.initial_state), len(profiles))), source, table, rows)
+        for j, c in enumerate(profiles):
+            if c.response is not None:
+                found[:, :, j] = c.response if rows is None else c.response[rows]
+        return found
+
+    def is_hidden(self, site: str, change: FloatArray) -> bool:
+        """Whether most of a change (N,) falls where no small change at the site shows.
+
+        So it is at a valve that is shut: a factor changes nothing there, nor does an opening below the least that the
+        model knows.
+        """
+        column = self._q + self.sites.index(site)
+        shows = np.any(self._G[:, :, column] != 0, axis=1) | np.any(self._H[:, :, column] != 0, axis=1)
+        by_row = self._spread(np.concatenate([shows[:1], shows]).astype(float)[:, None])[:, 0] > HALF
+        size = np.abs(change)
+        return bool(size[~by_row].sum() > HALF * size.sum())
+
+    def change_by(self, effect: Effect) -> FloatArray:
+        """What an effect changes in the measured outputs (N, m) of a free run, everything else being as it is.
+
+        Raises
+        ------
+        ModelError
+            The fit has an effect of this name already.
+        """
+        problem, fit = self.problem, self.fit
+        runs = []
+        for model in (fit.model, fit.model.with_effects([effect])):
+            simulator = RecordSimulator(model, problem.record.dt, problem.nodes)
+            with np.errstate(all="ignore"):  # one that leaves the model has no finite response, and does not count
+                run = simulator.outputs(problem.record, fit.initial_state, model.parameter_values)
+            runs.append(run[:, list(problem.columns)])
+        changed: FloatArray = runs[1] - runs[0]
+        return changed
 
     def _inverse(self, site: str) -> FloatArray:
         """One over the value at a site (N,), bounded: a pump that is off has no relative change."""

@@ -67,6 +67,16 @@ def shortlist(scorer: Scorer, count: int = SHORTLIST, scores: Sequence[Score] | 
     return _spread(kept, count)
 
 
+def with_hidden(wanted: list[Score], scores: Sequence[Score]) -> list[Score]:
+    """The wanted candidates, and those that act where no small change shows: their scores say little of a fit.
+
+    A valve that is shut for most of the time, and leaks, was the 60th of 128. Its fit was better than all others.
+    """
+    names = {s.candidate.name for s in wanted}
+    hidden = (s for s in scores if any(profile.response is not None for profile in s.variant.profiles))
+    return [*wanted, *(s for s in hidden if s.candidate.name not in names)]
+
+
 def with_each_output(scorer: Scorer, wanted: list[Score], outputs: Sequence[int]) -> list[Score]:
     """The wanted candidates, and those that explain most of each of some outputs (their places).
 

@@ -17,7 +17,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Round
-from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist, with_each_output
+from adaptive_flot.discovery.search.alternatives import SHORTLIST, shortlist, with_each_output, with_hidden
 from adaptive_flot.discovery.search.halving.jobs import ScoredLinearisation
 from adaptive_flot.discovery.search.halving.successive_halving import refit
 from adaptive_flot.discovery.search.simplify import simpler
@@ -72,6 +72,7 @@ def run_round(
             ranking = with_relays(scorer, scorer.scores())
             # a further effect that comes and goes would be whatever the first ones leave
             wanted = shortlist(scorer, most, ranking if before else with_pulses(scorer, ranking))
+            wanted = with_hidden(wanted, ranking)
             if before is not None:
                 # a further effect must have a name: a pair of curves without one would explain anything
                 wanted = [s for s in wanted if s.candidate.known]

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adaptive_flot.discovery.candidates.dynamics import dragged
+from adaptive_flot.discovery.candidates.dynamics import bounded, dragged
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.record.slip_jump import jumped
 from adaptive_flot.greybox.data.dataset import Dataset
+from adaptive_flot.greybox.scope import Site
 from tests.discovery.heated import Truth, heated_tank, moves, tank_record
 
 
@@ -56,6 +59,20 @@ def test_a_heater_that_does_not_close_is_named_with_what_it_lets_through() -> No
     floor = told.effect.coefficients["level"]
     assert floor == pytest.approx(0.9 * 1200.0, rel=0.03)
     assert found.reason.startswith("Heating does not go below 1080 W, whatever is asked"), found.reason
+
+
+@pytest.mark.parametrize(
+    ("driver", "end", "expected"), [("own_value", 0.0, [0.1, 0.25, 0.4]), ("saturation", 1.0, [0.6, 0.75, 0.9])]
+)
+def test_a_part_that_rests_at_its_end_is_scored_at_shares_of_its_range(
+    driver: str, end: float, expected: list[float]
+) -> None:
+    """A valve that is shut for most of the time: all quantiles of what is asked are zero, and no floor was tried."""
+    asked = np.where(np.arange(1000) < 950, end, np.linspace(0.0, 1.0, 1000) if end else np.linspace(1.0, 0.0, 1000))
+    asked[-1] = 1.0 - end
+    responses: Any = SimpleNamespace(site_values={"valve": asked}, is_hidden=lambda site, change: False)
+    bounds = [b for v in bounded(Site("valve", "actuator", "factor", 1), driver, responses) for _, b in v.start]
+    assert bounds == pytest.approx(expected)
 
 
 def test_a_heater_with_play_is_told_with_its_size() -> None:

@@ -10,7 +10,8 @@ from scipy.signal import lfilter
 
 from adaptive_flot.discovery.record.background import Background
 from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange, State
-from adaptive_flot.discovery.verdict.heed_report import heed_report, with_memory
+from adaptive_flot.discovery.verdict import heed_report as stage
+from adaptive_flot.discovery.verdict.heed_report import with_memory
 from adaptive_flot.discovery.verdict.report_veto import (
     contradiction,
     contradiction_at_the_end,
@@ -137,8 +138,8 @@ def test_the_stage_turns_a_contradicted_name_into_an_abstention(draught: Discove
         problem=draught.problem, base=draught.before, search=draught.search, judgement=_judged(draught),
         before=draught.before, after=draught.after,
     )  # fmt: skip
-    assert heed_report(state).judged.word == "named"
-    exchanged = heed_report(replace(state, before=draught.after, after=draught.before))
+    assert stage.heed_report(state).judged.word == "named"
+    exchanged = stage.heed_report(replace(state, before=draught.after, after=draught.before))
     assert exchanged.judged.word == "abstain" and "larger" in exchanged.contradiction
 
 
@@ -193,6 +194,24 @@ def test_the_stage_turns_a_none_that_explains_nothing_into_an_abstention(draught
         problem=draught.problem, base=draught.before, search=draught.search, judgement=nothing,
         before=draught.before, after=draught.before,
     )  # fmt: skip
-    left = heed_report(state)
-    assert left.judged.word == "abstain" and "times)" in left.certain
-    assert heed_report(replace(state, after=draught.after)).judged.word == "none"
+    left = stage.heed_report(state)
+    assert left.judged.word == "abstain" and "times)" in left.certain and "nearest" not in left.certain
+    assert stage.heed_report(replace(state, after=draught.after)).judged.word == "none"
+
+
+def test_an_abstention_says_which_drift_took_up_most_of_the_error(
+    draught: Discovery, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A drive whose friction grew at 7 s: no effect explained it, it said, beside an error ten times smaller."""
+    assert draught.problem is not None and draught.before is not None and draught.after is not None
+    monkeypatch.setattr(stage, "unexplained", lambda changes, noise: "The error is far above the noise.")
+    drifting = Judgement("none", _judged(draught).best, (), (), 10.0)
+    state = State(
+        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
+        problem=draught.problem, base=draught.before, search=draught.search, judgement=drifting,
+        before=draught.before, after=draught.after,
+    )  # fmt: skip
+    left = stage.heed_report(state)
+    assert left.judged.word == "abstain"
+    assert "What comes nearest is a change of what is fitted: heat loss changes by about" in left.certain
+    assert "nearest" not in stage.heed_report(replace(state, after=draught.before, before=draught.after)).certain
