@@ -94,11 +94,6 @@ class RecordSimulator:
         outputs, gradient = np.vstack([y0, tail.outputs]), np.concatenate([first[None], tail.gradient])
         return self._spread(outputs), self._spread(gradient), tail.last_state_gradient
 
-    def has_quick_slopes(self, record: Dataset, wrt: Sequence[str]) -> bool:
-        """Whether derivatives by some parameters cost no function of their own, see `Stepper.record_code`."""
-        stepper = self.stepper
-        return isinstance(stepper, Stepper) and stepper.record_code(len(self._inputs(record)), tuple(wrt)) is not None
-
     def _inputs(self, record: Dataset) -> FloatArray:
         return record.inputs[1:] if self.nodes is None else self.nodes.inputs
 

@@ -7,6 +7,5 @@ usual_errors.py  How large errors usually are, by where the plant is.
 at_noise.py      Whether errors are noise, or the usual ones but for outliers.
 known_before.py  Constants with their uncertainty, first guesses of initial states.
 unknowns.py      Everything that a fit moves, as one vector with its bounds.
-slopes.py        Derivatives of errors and priors by these, along the run.
 fit.py           The fit, by robust least squares.
 """

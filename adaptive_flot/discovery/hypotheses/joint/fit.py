@@ -1,8 +1,8 @@
 """One model fitted to several records at once, each with an initial state of its own, by robust least squares.
 
 Unknowns are coefficients of a hypothesis, the model's constants, which keep to what a reference says of them, and the
-initial states. Derivatives are exact where a compiler is at hand. Without one they are differences of runs: a function
-for exact ones would have to be made anew for every hypothesis, and takes longer than a fit.
+initial states. Derivatives are differences of runs: a run takes milliseconds, a function for exact derivatives would
+have to be made anew for every hypothesis.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from scipy.optimize import least_squares
 
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants, first_states
 from adaptive_flot.discovery.hypotheses.joint.rows import TAIL, Rows
-from adaptive_flot.discovery.hypotheses.joint.slopes import exact_slopes
 from adaptive_flot.discovery.hypotheses.joint.unknowns import JointUnknowns
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
@@ -271,19 +270,13 @@ class JointFitter:
         return JointFit(values, self.coefficients, z, jacobian, states, errors, self.cost(z, errors))
 
     def jacobian(self, z: FloatArray, count: int | None = None) -> FloatArray:
-        """Derivatives of residuals by the first `count` unknowns, exact ones by all of them, the default."""
-        last = self._last
-        errors = last[1] if last is not None and np.array_equal(last[0], z) else self.errors(z)
-        exact = exact_slopes(self._simulator, self.rows, self.unknowns, z, errors) if count is None else None
-        return exact if exact is not None else self.differences(z, errors, len(z) if count is None else count)
-
-    def differences(self, z: FloatArray, errors: Sequence[FloatArray], count: int) -> FloatArray:
-        """The same derivatives as differences of runs, from the errors at z; quicker for few unknowns."""
-        u = self.unknowns
+        """Derivatives of residuals by the first `count` unknowns, all by default, as differences of runs."""
+        u, last = self.unknowns, self._last
         p, shared = u.parameters(z), u.q + u.c
+        errors = last[1] if last is not None and np.array_equal(last[0], z) else self.errors(z)
         base = self._residuals(z, errors)
         columns = []
-        for i in range(count):
+        for i in range(len(z) if count is None else count):
             step = u.difference(i, z)
             moved = list(errors)
             touched = range(len(errors)) if i < shared else [(i - shared) // u.nx]

@@ -36,8 +36,6 @@ class JointUnknowns:
         How many of each there are.
     scale
         Scales of the coefficients (q,): an unknown of 1 is so much.
-    state_scale
-        Scales of the states (nx,): an unknown of 1 moves an initial state by so much.
     lower, upper
         Bounds (q + c + nx records,): of coefficients, and of constants of which each has an unknown of its own.
     """
@@ -49,7 +47,7 @@ class JointUnknowns:
         self._own = model.indices("parameters", coefficients)
         self._shared = model.indices("parameters", constants.names)
         self.scale = np.array([model.parameters[i].scale or 1.0 for i in self._own])
-        self.state_scale = np.array([s.scale for s in model.states])
+        self._state_scale = np.array([s.scale for s in model.states])
         self._ends = np.array([[p.lower for p in model.parameters], [p.upper for p in model.parameters]])
         self.q, self.c, self.nx = len(self._own), len(self._shared), len(model.states)
         scales = np.array([model.parameters[i].scale or 1.0 for i in self._shared])
@@ -107,19 +105,6 @@ class JointUnknowns:
         inside: FloatArray = np.clip(p, *self._ends)
         return inside
 
-    def parameter_slopes(self, z: FloatArray) -> FloatArray:
-        """Derivatives of coefficients and constants by their unknowns (q + c, q + c).
-
-        By differences, to the side on which bounds leave room: each is a line or an exponential.
-        """
-        where = [*self._own, *self._shared]
-        base = self.parameters(z)[where]
-        slopes = np.empty((len(where), len(where)))
-        for i in range(len(where)):
-            step = self.difference(i, z)
-            slopes[:, i] = (self.parameters(z + step)[where] - base) / step[i]
-        return slopes
-
     def _constants(self, z: FloatArray) -> FloatArray:
         return self.constants.at(z[self.q : self.q + self.c])
 
@@ -133,5 +118,5 @@ class JointUnknowns:
     def first(self, which: int, z: FloatArray) -> FloatArray:
         """Initial state of one record (nx,)."""
         begin = self.q + self.c + which * self.nx
-        first: FloatArray = self.initial[which] + self.state_scale * z[begin : begin + self.nx]
+        first: FloatArray = self.initial[which] + self._state_scale * z[begin : begin + self.nx]
         return first
