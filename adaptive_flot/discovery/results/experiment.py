@@ -93,26 +93,28 @@ class Experiment:
         return [(float(k * self.dt), self.inputs[k]) for k in (0, *changed)]
 
     def __str__(self) -> str:
-        closest = self.pairs[0]
+        closest, shared = self.pairs[0], _shared(self.compared)
+        compared = [_without(n, shared) for n in self.compared]
         said = "A test that would tell" if self.tells else "No test tried would tell them all apart; the best"
         said += f": {self.name}, {self.dt * len(self.inputs):g} s"
-        told = _powers(self.compared, self.power)
+        beside = f" All have {_words(shared)}, beside what is listed." if shared else ""
+        told = _powers(compared, self.power)
         alone = f" Left alone: {', '.join(f'{n} ({why})' for n, why in self.held)}." if self.held else ""
-        pair = f"{_words(closest.one)} and {_words(closest.other)}"
+        pair = " and ".join(_words(_without(n, shared)) for n in (closest.one, closest.other))
         known = np.isfinite(self.watching)
         watched = f" Watching without a move would give {self.watching:.0f}." if known else ""
         if max(self.power) < HARDLY:
-            each = ", or ".join(_words(n) for n in self.compared)
+            each = ", or ".join(map(_words, compared))
             length, apart = self.dt * len(self.inputs), closest.separation
             return (
-                f"No test tried would tell any of these apart: {each}. With the best, {self.name}, {length:g} s, the "
-                f"closest two would differ by about {apart:.0f} in their criterion, where {self.needed:.0f} is needed."
-                f"{alone}"
+                f"No test tried would tell any of these apart: {each}.{beside} With the best, {self.name}, "
+                f"{length:g} s, the closest two would differ by about {apart:.0f} in their criterion, where "
+                f"{self.needed:.0f} is needed.{alone}"
             )
         return (
-            f"{said}. Simulated with each alternative as the truth, it tells the right one: {told}. The closest two, "
-            f"{pair}, would differ by about {closest.separation:.0f} in their criterion, where {self.needed:.0f} is "
-            f"needed.{watched}{alone}"
+            f"{said}.{beside} Simulated with each alternative as the truth, it tells the right one: {told}. The "
+            f"closest two, {pair}, would differ by about {closest.separation:.0f} in their criterion, where "
+            f"{self.needed:.0f} is needed.{watched}{alone}"
         )
 
     @property
@@ -150,6 +152,16 @@ def _powers(compared: Sequence[Names], power: Sequence[float]) -> str:
         return ", ".join(words for words, _ in each)
     rest = f"{'each of the other' if len(hardly) < len(each) else 'each of all'} {len(hardly)}"
     return ", ".join([words for words, p in each if p >= HARDLY] + [f"{rest} in at most {100 * max(hardly):.0f} %"])
+
+
+def _shared(compared: Sequence[Names]) -> Names:
+    """Effects that all alternatives have, where each has another one besides."""
+    shared = tuple(n for n in compared[0] if all(n in names for names in compared))
+    return shared if all(len(names) > len(shared) for names in compared) else ()
+
+
+def _without(names: Names, shared: Names) -> Names:
+    return tuple(n for n in names if n not in shared)
 
 
 def _words(names: Names) -> str:
