@@ -30,7 +30,6 @@ from adaptive_flot.discovery.verdict.report_veto import (
     surely_better,
     unexplained,
 )
-from adaptive_flot.discovery.verdict.words.wording import drift_words
 from adaptive_flot.greybox.model import FloatArray
 
 FITTED = ("estimate", "confirm")
@@ -77,7 +76,7 @@ def heed_report(state: State) -> State:
     judged = replace(judgement, rivals=()) if none_near else judgement
     certain = certain_words(judged, error, noise) if judgement.word == "abstain" else ""
     if judgement.word == "none" and (left := unexplained(error, np.hypot(noise, unknown))):
-        certain = f"{left}{_nearest_drift(judgement, after, error)}"
+        certain = f"{left}{_nearest_drift(judgement, error)}"
         judgement = Judgement("abstain", None, (), judgement.rivals, judgement.margin)
     elif judgement.word == "none":
         certain = rests_on_memory(error, np.hypot(noise, unknown))
@@ -86,15 +85,17 @@ def heed_report(state: State) -> State:
     return replace(_with_rows_said(state, whole, problem), likelihood=by_likelihood)
 
 
-def _nearest_drift(judgement: Judgement, after: Fit, error: Sequence[OutputChange]) -> str:
+def _nearest_drift(judgement: Judgement, error: Sequence[OutputChange]) -> str:
     """What is fitted and surely takes up a part of the error as it drifts, in words: the error after is that beside it.
+
+    Without its size: a free curve goes too far where something else is the matter.
 
     Friction that grew at 7 s, which the constants of a drive follow, left a tenth of the error.
     """
     if judgement.best is None or not any(c.reduction95[0] > 0 for c in error):
         return ""
-    drift = "; ".join(drift_words(judgement, after)).replace("_", " ")
-    return f" What comes nearest is a change of what is fitted: {drift}."
+    moved = " and ".join(site.replace("_", " ") for site, _ in judgement.best.names)
+    return f" What comes nearest is a change of what is fitted: {moved}, in time."
 
 
 def _many_and_none(judgement: Judgement, error: Sequence[OutputChange]) -> bool:

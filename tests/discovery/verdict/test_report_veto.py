@@ -213,5 +213,5 @@ def test_an_abstention_says_which_drift_took_up_most_of_the_error(
     )  # fmt: skip
     left = stage.heed_report(state)
     assert left.judged.word == "abstain"
-    assert "What comes nearest is a change of what is fitted: heat loss changes by about" in left.certain
+    assert "What comes nearest is a change of what is fitted: heat loss, in time." in left.certain
     assert "nearest" not in stage.heed_report(replace(state, after=draught.before, before=draught.after)).certain
