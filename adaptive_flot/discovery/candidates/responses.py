@@ -249,10 +249,9 @@ class Responses:
         ModelError
             The fit has an effect of this name already.
         """
-        problem, fit = self.problem, self.fit
-        runs = []
+        problem, fit, runs = self.problem, self.fit, []
         for model in (fit.model, fit.model.with_effects([effect])):
-            simulator = RecordSimulator(model, problem.record.dt, problem.nodes)
+            simulator = RecordSimulator(model, problem.record.dt, self._nodes)
             with np.errstate(all="ignore"):  # one that leaves the model has no finite response, and does not count
                 run = simulator.outputs(problem.record, fit.initial_state, model.parameter_values)
             runs.append(run[:, list(problem.columns)])
