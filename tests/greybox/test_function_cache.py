@@ -17,6 +17,7 @@ from adaptive_flot.discovery.further_sites.places import with_further_sites
 from adaptive_flot.greybox import Model, Scope, Stepper
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.function_cache import FunctionCache
+from adaptive_flot.greybox.stepping import stepper
 from adaptive_flot.processes.cascaded_tanks import make_model
 
 AT = 0.0, [5.0, 5.0], [3.0]
@@ -71,8 +72,14 @@ def test_copies_of_a_cache_are_empty() -> None:
     assert len(cache) == 1
 
 
-def test_records_of_every_length_leave_a_bounded_number_of_functions_and_the_same_bits() -> None:
-    """A record that grows row by row asks for one more function a row; what was dropped is made again."""
+def test_records_of_every_length_leave_a_bounded_number_of_functions_and_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A record that grows row by row asks for one more function a row; what was dropped is made again.
+
+    So it is without a compiler. A tape is the same for all lengths.
+    """
+    monkeypatch.setattr(stepper, "LEAST_STEPS", 10**9)
     model, x0 = make_model(), np.array([5.0, 5.0])
     object.__setattr__(model, "_functions", FunctionCache(4))  # its own, and few
     inputs = np.linspace(2.0, 4.0, 20)[:, None]
