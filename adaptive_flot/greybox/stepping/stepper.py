@@ -30,9 +30,9 @@ from adaptive_flot.greybox.stepping.whole_record.library import WholeRecord, who
 MOST_UNROLLED = 4
 """Substeps an interval up to which a whole record is run interval by interval. More are run one by one: a function of
 ten of them, with derivatives, takes longer to make than a record takes to simulate."""
-LEAST_STEPS = 20
+LEAST_STEPS, LEAST_IF_COMPILED = 20, 300
 """Steps from which a run is worth writing the tapes of `whole_record`, where the model asks for it. A function of so
-many intervals takes longer to make."""
+many intervals takes longer to make. Of a compiled model the step is there, and shorter runs go by it."""
 
 
 class Stepper:
@@ -191,7 +191,8 @@ class Stepper:
 
     def record_code(self, rows: int, wrt: tuple[str, ...] | None) -> WholeRecord | None:
         """Machine code for a run of so many intervals, where the model asks for it and it is worth it."""
-        if not self.model.record_code or self.accurate or rows * self.substeps < LEAST_STEPS:
+        least = LEAST_IF_COMPILED if self.model.compiled else LEAST_STEPS
+        if not self.model.record_code or self.accurate or rows * self.substeps < least:
             return None
         return self.model.derived(whole_record, self.interval, wrt)
 
