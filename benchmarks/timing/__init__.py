@@ -5,7 +5,7 @@ Map
 speed.py             Simulation and estimation, beside SciPy.
 solve_times.py       The economic MPC in closed loop, solver beside solver.
 lanes.py             Many members side by side, beside SciPy and JAX.
-short_runs.py       Short runs, beside a function of so many intervals.
+short_runs.py        Short runs, beside a function of so many intervals.
 filter_steps.py      The filter of a record, beside its steps as one function and without derivatives along a run.
 scaling.py           Whether an update costs more the longer a record is.
 throughput.py        Runs of a study a second.

@@ -27,6 +27,7 @@ FILLED_AT_ONCE = 64
 TAKEN_UP = 1.5e-3
 """What is left of a response, as a share of it, that is rounding and curvature: what is free already takes it up."""
 HALF = 0.5
+"""Share of a change, and weight of the rows around a row, that are most of it."""
 LEAST_VALUE = 1e-6
 """Share of its largest value below which a site is at zero."""
 
@@ -249,14 +250,21 @@ class Responses:
         ModelError
             The fit has an effect of this name already.
         """
-        problem, fit, runs = self.problem, self.fit, []
-        for model in (fit.model, fit.model.with_effects([effect])):
-            simulator = RecordSimulator(model, problem.record.dt, self._nodes)
-            with np.errstate(all="ignore"):  # one that leaves the model has no finite response, and does not count
-                run = simulator.outputs(problem.record, fit.initial_state, model.parameter_values)
-            runs.append(run[:, list(problem.columns)])
-        changed: FloatArray = runs[1] - runs[0]
-        return changed
+        return self._outputs_of(self.fit.model.with_effects([effect])) - self._plain_outputs
+
+    @cached_property
+    def _plain_outputs(self) -> FloatArray:
+        return self._outputs_of(self.fit.model)
+
+    def _outputs_of(self, model: Model) -> FloatArray:
+        """Measured outputs (N, m) of a free run; one that leaves the model has no finite ones."""
+        record = self.problem.record
+        with np.errstate(all="ignore"):
+            run = RecordSimulator(model, record.dt, self._nodes).outputs(
+                record, self.fit.initial_state, model.parameter_values
+            )
+        measured: FloatArray = run[:, list(self.problem.columns)]
+        return measured
 
     def _inverse(self, site: str) -> FloatArray:
         """One over the value at a site (N,), bounded: a pump that is off has no relative change."""

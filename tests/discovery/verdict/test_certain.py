@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange, State
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange
 from adaptive_flot.discovery.verdict import heed_report as stage
 from adaptive_flot.discovery.verdict.outputs import certain_words, settled
+from tests.discovery.verdict.states import state_of
 
 NOISE = np.array([0.1, 0.1, 0.1])
 CHANGES = (
@@ -58,11 +59,7 @@ def test_what_sets_share_is_not_certain_where_none_of_them_comes_near_the_noise(
     assert draught.problem is not None
     coil, room, pipe = ("coil", "power"), ("room", "lag"), ("pipe", "time")
     judged = replace(_judged(draught, (coil, room), (coil, pipe)), word="class")
-    state = State(
-        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
-        problem=draught.problem, base=draught.before, search=draught.search, judgement=judged,
-        before=draught.before, after=draught.after,
-    )  # fmt: skip
+    state = state_of(draught, judged)
     left = stage.heed_report(state)
     assert left.judged.word == "abstain" and "none comes near the noise" in left.contradiction
     assert "In all" not in left.certain

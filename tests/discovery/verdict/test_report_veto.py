@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from adaptive_flot.discovery.record.background import Background
-from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange, State
+from adaptive_flot.discovery.results import Alternative, Discovery, Judgement, OutputChange
 from adaptive_flot.discovery.verdict import heed_report as stage
 from adaptive_flot.discovery.verdict.heed_report import with_memory
 from adaptive_flot.discovery.verdict.report_veto import (
@@ -23,6 +23,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
 )
 from adaptive_flot.greybox import Effect
 from tests.discovery.heated import heated_tank
+from tests.discovery.verdict.states import state_of
 
 NOISE = np.array([0.1])
 
@@ -133,11 +134,7 @@ def test_the_last_report_rows_are_the_last_contiguous_ones(draught: Discovery) -
 def test_the_stage_turns_a_contradicted_name_into_an_abstention(draught: Discovery) -> None:
     """With before and after exchanged, the same record contradicts the same name; as they are it does not."""
     assert draught.problem is not None and draught.before is not None and draught.after is not None
-    state = State(
-        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
-        problem=draught.problem, base=draught.before, search=draught.search, judgement=_judged(draught),
-        before=draught.before, after=draught.after,
-    )  # fmt: skip
+    state = state_of(draught, _judged(draught))
     assert stage.heed_report(state).judged.word == "named"
     exchanged = stage.heed_report(replace(state, before=draught.after, after=draught.before))
     assert exchanged.judged.word == "abstain" and "larger" in exchanged.contradiction
@@ -189,11 +186,7 @@ def test_the_stage_turns_a_none_that_explains_nothing_into_an_abstention(draught
     """The plain model of a tank in a draught leaves ten times its noise; the extended one nothing but noise."""
     assert draught.problem is not None and draught.before is not None and draught.after is not None
     nothing = Judgement("none", None, (), (), 10.0)
-    state = State(
-        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
-        problem=draught.problem, base=draught.before, search=draught.search, judgement=nothing,
-        before=draught.before, after=draught.before,
-    )  # fmt: skip
+    state = state_of(draught, nothing, draught.before)
     left = stage.heed_report(state)
     assert left.judged.word == "abstain" and "times)" in left.certain and "nearest" not in left.certain
     assert stage.heed_report(replace(state, after=draught.after)).judged.word == "none"
@@ -206,11 +199,7 @@ def test_an_abstention_says_which_drift_took_up_most_of_the_error(
     assert draught.problem is not None and draught.before is not None and draught.after is not None
     monkeypatch.setattr(stage, "unexplained", lambda changes, noise: "The error is far above the noise.")
     drifting = Judgement("none", _judged(draught).best, (), (), 10.0)
-    state = State(
-        draught.model, draught.problem.adapted, None, None, 1, lambda stage: None, draught.screening,
-        problem=draught.problem, base=draught.before, search=draught.search, judgement=drifting,
-        before=draught.before, after=draught.after,
-    )  # fmt: skip
+    state = state_of(draught, drifting)
     left = stage.heed_report(state)
     assert left.judged.word == "abstain"
     assert "What comes nearest is a change of what is fitted: heat loss, in time." in left.certain
