@@ -12,6 +12,8 @@ screening.py     Which further effects are worth a refit.
 search           A few effects together.
 telling_apart.py Whether the record tells one explanation from another.
 given_up.py      What draws only what is left of a wrong model.
+told.py          What is said, as plain data.
+late.py          Where a lag may be: lags in a row commute.
 judge.py         What is certain, and what predicts rows that did not fit it.
 in_words.py      What is told, in words.
 places           Names beside what acts where the model has no site.

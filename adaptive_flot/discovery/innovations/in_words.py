@@ -5,9 +5,9 @@ from __future__ import annotations
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.wording import words_of
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results import NamedEffect
 from adaptive_flot.discovery.verdict.words.sizes import words_of_effect
 
@@ -22,7 +22,10 @@ def told_in_words(search: Search, told: Told) -> str:
         )
     if told.word != "class":
         return said
-    members = "; or ".join(_open_one(search, told, e, h) for e, h in told.open)
+    together: dict[int, list[str]] = {}  # what one explanation has of the class acts at once
+    for e, h in told.open:
+        together.setdefault(id(e), []).append(_open_one(search, told, e, h))
+    members = "; or ".join(", and ".join(words) for words in together.values())
     members += f"; or as if {told.beside.words}, and {NO_SITE}" if told.beside and not sure else ""
     first = "Besides, one of these" if sure else "One of these"
     return f"{said} {first}, which the record can not tell apart: {members}.".strip()

@@ -3,76 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
-from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.filter.refit import Refitter
 from adaptive_flot.discovery.innovations.given_up import at_steps_of_an_input, overlapping, why_given_up
+from adaptive_flot.discovery.innovations.late import late_anywhere, late_somewhere
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import low_end, told_apart
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray
 
 SMALL = 0.15
 """An effect beside another one, that brings less than this share of the gain, is not told."""
-SAME_LAG = 0.8
-"""Share of the gain from which a lag at another place is not told apart."""
-SAME_DEAD_TIME = 0.4
-"""The same of a dead time. What wanders in a process is as likely before it as behind it, but the filter has a chain of
-lags for it, which smooths what wanders: a tank whose gauge is late keeps 56 % of the gain by its pump there."""
 TOO_LARGE = "what fits best would have to be larger than such a fault can be"
 FOLDS = 5
-
-Word = Literal["none", "named", "class", "abstain"]
-
-
-@dataclass(frozen=True)
-class Told:
-    """What the innovations form says.
-
-    Attributes
-    ----------
-    word
-        `none`, `named`, `class` or `abstain`.
-    best
-        The best explanation; of a name, with what is certain and nothing else.
-    certain
-        Its effects that every explanation about as good has, too.
-    open
-        Effects of a class, one a site, the best one's first.
-    alike
-        Explanations that the record does not tell from the best one, this one first.
-    why
-        What decided, in words, where nothing is told.
-    beside
-        What explains about as much as a name where the model has no site; None where nothing does.
-    """
-
-    word: Word
-    best: Explanation
-    certain: tuple[Hypothesis, ...]
-    open: tuple[tuple[Explanation, Hypothesis], ...]
-    alike: tuple[Explanation, ...]
-    why: str
-    beside: WithoutSite | None = None
-
-    @property
-    def effects(self) -> tuple[Hypothesis, ...]:
-        """What is certain, then what is one of a few."""
-        return (*self.certain, *(h for _, h in self.open))
-
-    @property
-    def sites(self) -> frozenset[str]:
-        """Sites of every effect of the explanations that are not told apart."""
-        return frozenset(h.site for e in self.alike for h in e.hypotheses)
 
 
 def judge(search: Search, base: Explanation, found: Sequence[Explanation]) -> Told:
@@ -202,6 +154,9 @@ def _told(
     if 2 <= len(members) <= LARGEST_CLASS and one_open:
         return _certain_alone(search, base, Told("class", best, certain, members, alike, ""), without)
     if not certain:
+        late = late_somewhere(search, base, alike)
+        if late is not None and not _contradicted(search, late.best, {late.best.hypotheses[0].effect.label: base}):
+            return late
         why = f"{len(alike)} explanations are about as good, and have no effect in common"
         return Told("abstain", best, (), (), alike, why)
     open_one = next(h for h in best.hypotheses if h not in certain)
@@ -228,41 +183,6 @@ def _certain_alone(search: Search, base: Explanation, told: Told, without: Mappi
     if best.criterion - rest.criterion >= SMALL * (best.criterion - base.criterion):
         return told
     return late_anywhere(search, base, replace(told, word="named", best=rest, open=()))
-
-
-def late_anywhere(search: Search, base: Explanation, told: Told) -> Told:
-    """A lag or a dead time that is named, as a class with each other place where it explains about as much."""
-    dead_time = any(h.kind == "lag" and h.driver == "delay" for h in told.certain)
-    least = (SAME_DEAD_TIME if dead_time else SAME_LAG) * (told.best.criterion - base.criterion)
-    return late_where(search, told, lambda e, _: e.criterion - base.criterion >= least)
-
-
-def late_where(search: Search, told: Told, alike: Callable[[Explanation, str], bool]) -> Told:
-    """A lag that is named, as a class with each other place where it may be as well.
-
-    Lags in a row commute: what an input does through them is the same in any order. Only what wanders within the
-    process tells the order, and how it wanders is an assumption of the filter.
-
-    Parameters
-    ----------
-    search, told
-        What the innovations form says.
-    alike
-        Whether the explanation with the lag at another site, which is given, is about as good.
-    """
-    late = [h for h in told.certain if h.kind == "lag"]
-    if told.word != "named" or len(late) != 1:
-        return told
-    others = [e for e in search.late_elsewhere(told.best, late[0]) if alike(e, e.hypotheses[-1].site)]
-    if not others:
-        return told
-    found = sorted([told.best, *others], key=lambda e: -e.criterion)
-    members = tuple((e, next(h for h in e.hypotheses if h.kind == "lag")) for e in found)
-    if len(members) > LARGEST_CLASS:
-        why = f"a lag explains about as much at any of {len(members)} places"
-        return Told("abstain", found[0], (), (), tuple(found), why)
-    certain = tuple(h for h in told.certain if h is not late[0])
-    return Told("class", found[0], certain, members, tuple(found), "")
 
 
 def _alike(search: Search, base: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:

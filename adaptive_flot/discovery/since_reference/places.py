@@ -19,11 +19,11 @@ from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows, fi
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.places.row_by_row import best_of_each, change_at, words_at
 from adaptive_flot.discovery.innovations.search.explanation import Explanation, worth
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.rivals import explains_too_little
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.taken_back import taken_back

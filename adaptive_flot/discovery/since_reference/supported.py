@@ -15,9 +15,9 @@ from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_wi
 from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 from adaptive_flot.discovery.since_reference.taken_back import leaves_more, taken_back
 

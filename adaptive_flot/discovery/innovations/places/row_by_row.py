@@ -22,11 +22,11 @@ from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.hypotheses.seen import AT_REST
 from adaptive_flot.discovery.hypotheses.wording import cycle_times
 from adaptive_flot.discovery.innovations.given_up import wanders
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME, in_seconds
 from adaptive_flot.greybox.scope import Site
 

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.judge import judge
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 

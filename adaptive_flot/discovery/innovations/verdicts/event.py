@@ -24,8 +24,8 @@ from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
 from adaptive_flot.discovery.hypotheses.judgement import Judged, WithoutSite
 from adaptive_flot.discovery.hypotheses.procedure import Comparison
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, verdict_of
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.reach import outputs_in_reach
 from adaptive_flot.discovery.innovations.verdicts.rivals import hardly_explained
 from adaptive_flot.discovery.results.words import WITH_A_NAME

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 
 DEPENDENCES = ("depends", "turns")

@@ -17,12 +17,14 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
 from adaptive_flot.discovery.innovations.in_words import told_in_words
-from adaptive_flot.discovery.innovations.judge import Told, judge, late_where
+from adaptive_flot.discovery.innovations.judge import judge
+from adaptive_flot.discovery.innovations.late import late_where
 from adaptive_flot.discovery.innovations.places.row_by_row import unless_without_a_site
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.pauses import with_pauses_closed
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.alternatives import among_alternatives
 from adaptive_flot.discovery.innovations.verdicts.common import one_that_all_have
 from adaptive_flot.discovery.innovations.verdicts.in_time import or_in_time

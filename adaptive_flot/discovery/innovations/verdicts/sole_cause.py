@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from adaptive_flot.discovery.hypotheses.families import STRUCTURE
-from adaptive_flot.discovery.innovations.judge import Told, late_anywhere
+from adaptive_flot.discovery.innovations.late import late_anywhere
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results.words import WITH_A_NAME
 
 

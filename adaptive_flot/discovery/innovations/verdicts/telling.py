@@ -17,9 +17,9 @@ from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
 from adaptive_flot.discovery.innovations.in_words import told_in_words
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.alternatives import beside_alternatives
 from adaptive_flot.discovery.innovations.verdicts.common import in_all_that_is_near
 from adaptive_flot.discovery.innovations.verdicts.members import alternative, others

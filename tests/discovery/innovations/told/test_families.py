@@ -8,10 +8,11 @@ import pytest
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.courses import suspects
 from adaptive_flot.discovery.innovations.in_words import told_in_words
-from adaptive_flot.discovery.innovations.judge import Told, judge
+from adaptive_flot.discovery.innovations.judge import judge
 from adaptive_flot.discovery.innovations.places.row_by_row import _period
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.greybox import Model, Parameter, Quantity, Scope
 from tests.discovery.innovations.thermostat import BAND, DT, FOR, LAMP, ON, PERIOD, SWING, ZONE, Wrong, model, record
 

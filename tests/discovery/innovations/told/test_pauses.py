@@ -13,10 +13,10 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.pauses import has_blip, has_short_pause, without_short_pauses
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_hardly_off
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.innovations.verdicts.test_without_a_site import judged, record

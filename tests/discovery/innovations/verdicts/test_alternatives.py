@@ -9,9 +9,9 @@ import pytest
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.wording import words_of
-from adaptive_flot.discovery.innovations.judge import Told
 from adaptive_flot.discovery.innovations.search.beam import best_explanations
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import alternatives as asking
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.innovations.late_tank import LATE, model, record

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import common
 from tests.discovery.innovations.verdicts.test_alternatives import Given, hypothesis
 

@@ -9,7 +9,7 @@ import pytest
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
-from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals, telling
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.results import Judgement, OutputChange, State

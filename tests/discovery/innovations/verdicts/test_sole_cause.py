@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
-from adaptive_flot.discovery.innovations.judge import Told
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import sole_cause as tested
 from adaptive_flot.greybox import Effect
 

@@ -11,6 +11,7 @@ import numpy as np
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.innovations import judge as judging
 from adaptive_flot.discovery.innovations.search.explanation import worth
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.effects import Effect
@@ -85,14 +86,14 @@ def shift(site: str) -> Hypothesis:
     return Hypothesis(site, "constant", "offset", Effect(site, "constant", "shift"), ("amplitude",), ({},))
 
 
-def told(*found: Given, since_reference: bool = False) -> judging.Told:
+def told(*found: Given, since_reference: bool = False) -> Told:
     base = Given((), 0.0, 0.0)
     search: Any = Stand(base, *found, since_reference=since_reference)
     ranked: Any = sorted([base, *found], key=lambda e: -worth(e))
     return judging.judge(search, ranked[-1], ranked)
 
 
-def asked_again(said: judging.Told, *found: Given) -> judging.Told:
+def asked_again(said: Told, *found: Given) -> Told:
     """What is told by the rule on two effects; `found` is what the search knows."""
     base: Any = Given((), 0.0, 0.0)
     search: Any = Stand(base, *found)

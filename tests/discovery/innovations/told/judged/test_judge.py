@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from adaptive_flot.discovery.innovations import judge as judging
+from adaptive_flot.discovery.innovations.late import late_where
 from tests.discovery.innovations.told.judged.given import SPAN, Given, Stand, event, lag, told
 
 
@@ -137,7 +138,7 @@ def test_a_lag_that_a_free_run_does_not_tell_from_another_is_a_class_with_that(a
     search: Any = Stand(Given((), 0.0, 0.0))
     named = told(Given((lag("sensor"),), 500.0, 1.0))
     assert named.word == "named"
-    again = judging.late_where(search, named, lambda _, site: site == alike)
+    again = late_where(search, named, lambda _, site: site == alike)
     assert again.word == word
     assert {h.site for h in again.effects} == ({"sensor", "elsewhere"} if word == "class" else {"sensor"})
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.innovations import judge as judging
+from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals
 from tests.discovery.innovations.told.judged.given import Given, asked_again, event, lag, told
 
@@ -63,7 +63,7 @@ def test_a_class_of_events_that_all_need_a_second_effect_is_not_told(alone: bool
     one, two, offset = event("amplifier", (25.0, 20.0)), event("load", (25.0, 20.0)), lag("sensor")
     first = (one,) if alone else (one, offset)
     best: Any = [Given(first, 500.0, 0.9), Given((two, offset), 498.0, 0.9)]
-    said = judging.Told("class", best[0], (), ((best[0], one), (best[1], two)), tuple(best), "")
+    said = Told("class", best[0], (), ((best[0], one), (best[1], two)), tuple(best), "")
     asked = asked_again(said)
     assert asked.word == word and (alone or "one of amplifier switch, load switch" in asked.why)
 
@@ -75,7 +75,7 @@ def test_an_event_with_one_of_a_class_beside_it_is_told_where_it_stands_by_itsel
     """Two effects are needed here, too, whichever the second one is: a healthy wall had a late thermometer so."""
     load, one, two = event("load", (250.0, 1e7)), lag("sensor"), lag("motor")
     best: Any = [Given((load, one), 600.0, 0.9), Given((load, two), 598.0, 0.9)]
-    said = judging.Told("class", best[0], (load,), ((best[0], one), (best[1], two)), tuple(best), "")
+    said = Told("class", best[0], (load,), ((best[0], one), (best[1], two)), tuple(best), "")
     asked = asked_again(said, *best, Given((load,), alone, 0.5), Given((one,), 100.0, 0.5))
     assert asked.word == word and [h.site for h in asked.effects] == sites
     assert word == "named" or "load switch and one of sensor lag, motor lag" in asked.why
