@@ -18,6 +18,8 @@ from adaptive_flot.discovery.innovations.search.search import Search
 SHORT = 0.15
 """Share of the shorter spell beside it below which a pause of an event is short. Of eight right events of several
 spells the shortest pause was a third; of five that stood in for a lasting change 3 to 26 %."""
+MOSTLY = 2 / 3
+"""Share of the time from its first beginning to its last end from which an event with a short pause is hardly off."""
 BLIP = 2.5
 """Rows up to which a spell beside one that lasts is a blip: as long as an outlier, and the row that forgets it."""
 ASKED = 12
@@ -28,6 +30,18 @@ def has_short_pause(h: Hypothesis) -> bool:
     """Whether an event stops for much less long (SHORT) than it is there before and after."""
     pairs = itertools.pairwise(h.pulses if h.kind == "switch" else ())
     return any(b - (a + long) < SHORT * min(long, after) for (a, long), (b, after) in pairs)
+
+
+def is_hardly_off(h: Hypothesis) -> bool:
+    """Whether an event has a short pause, and is there for most (MOSTLY) of the time from its beginning to its end.
+
+    Beside long pauses a short one only says that the event is not as large all the time: someone leans on a slide three
+    times, and hardly for a moment.
+    """
+    if not has_short_pause(h):
+        return False
+    begin, (last, long) = h.pulses[0][0], h.pulses[-1]
+    return sum(spell for _, spell in h.pulses) > MOSTLY * (last + long - begin)
 
 
 def has_blip(h: Hypothesis, dt: float) -> bool:

@@ -12,7 +12,7 @@ from adaptive_flot.discovery.hypotheses.families import EVENTS, FOREVER, Hypothe
 from adaptive_flot.discovery.hypotheses.telling import FAR_ABOVE
 from adaptive_flot.discovery.innovations.given_up import WANDERS, changes_within, stands_by_itself, wanders
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
-from adaptive_flot.discovery.innovations.search.pauses import has_short_pause
+from adaptive_flot.discovery.innovations.search.pauses import is_hardly_off
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import NEAR
 from adaptive_flot.discovery.innovations.told import Told
@@ -230,13 +230,13 @@ def unless_a_trend(base: Explanation, told: Told) -> Told:
 
 
 def unless_hardly_off(told: Told) -> Told:
-    """Nothing where an event is told that stops for short pauses only, which the record asks for.
+    """Nothing where an event is told that stops for little but short pauses, which the record asks for.
 
     What is switched off for 6 s between spells of 180 s is hardly switched. A lasting change of another form looks like
     that: a ship whose inertia has doubled was told as a rudder, in five spells. Where what has no site is told beside
     it, that is said already.
     """
-    event = next((h for h in told.best.hypotheses if has_short_pause(h) and h in told.effects), None)
+    event = next((h for h in told.best.hypotheses if is_hardly_off(h) and h in told.effects), None)
     if told.word not in WITH_A_NAME or event is None or told.beside:
         return told
     why = f"{event.site} would be as usual only for short pauses, so that it stands in for something that lasts"

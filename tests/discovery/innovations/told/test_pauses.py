@@ -14,7 +14,12 @@ import pytest
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
-from adaptive_flot.discovery.innovations.search.pauses import has_blip, has_short_pause, without_short_pauses
+from adaptive_flot.discovery.innovations.search.pauses import (
+    has_blip,
+    has_short_pause,
+    is_hardly_off,
+    without_short_pauses,
+)
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_hardly_off
@@ -53,6 +58,19 @@ def fitted(search: Search, base: Explanation, h: Hypothesis) -> Explanation:
 )
 def test_a_pause_is_short_beside_the_spells_about_it(spells: tuple[tuple[float, float], ...], short: bool) -> None:
     assert has_short_pause(switched(*spells)) == short
+
+
+@pytest.mark.parametrize(
+    ("spells", "hardly"),
+    [
+        (((100.0, 180.0), (286.0, 180.0), (472.0, 180.0)), True),  # a ship whose inertia has doubled
+        (((100.0, 50.0), (2000.0, 900.0), (2950.0, FOREVER)), True),
+        (((1.6, 2.8), (9.4, 0.3), (9.9, 1.2), (15.0, 1.1), (16.2, 1.6)), False),  # leant on three times
+        (((1000.0, 900.0), (3000.0, 900.0)), False),
+    ],
+)
+def test_beside_long_pauses_a_short_one_leaves_the_event(spells: tuple[tuple[float, float], ...], hardly: bool) -> None:
+    assert is_hardly_off(switched(*spells)) == hardly
 
 
 @pytest.mark.parametrize(
