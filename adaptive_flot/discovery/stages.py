@@ -28,7 +28,7 @@ from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.onsets import with_onset_sought
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
-from adaptive_flot.discovery.fitting.unseen_end import with_unseen_ends
+from adaptive_flot.discovery.fitting.unseen_times import with_unseen_changes, with_unseen_ends
 from adaptive_flot.discovery.record.even_steps import steps_evenly
 from adaptive_flot.discovery.record.problem import CYCLE, WITHOUT_REPORT, Problem
 from adaptive_flot.discovery.record.robust import noise_by_differences
@@ -271,7 +271,10 @@ def fit_without_report(state: State) -> State:
         return replace(state, before=before, after=before)
     own = replace(best.problem or problem, deadline=state.ends)
     beside, fit = without_constants(own, best.fit, constants_told(state.judged))
-    return replace(state, before=before, after=final(beside, fit), problem_after=beside)
+    after, times = with_unseen_changes(Fitter(beside, splits), final(beside, fit))
+    said = tuple(f"the change at {t:.4g} s lies within the report split, and its time was read from it" for t in times)
+    screening = replace(state.screening, notes=(*state.screening.notes, *said))
+    return replace(state, before=before, after=after, problem_after=beside, screening=screening)
 
 
 def plan_test(state: State) -> State:

@@ -9,7 +9,7 @@ normal_equations.py  Its linear problem along one run.
 fitter.py            Fits to one problem.
 fit.py               A fitted alternative and its criterion.
 onsets.py            Whether an event begins at another time.
-unseen_end.py        Events of which no row that was fitted has seen an end.
+unseen_times.py      Times of events that no row that was fitted has seen.
 step_length.py       Steps of the integration that are short enough for the record.
 node_spacing.py      How far apart a densely sampled record may be simulated.
 parallel.py          Independent fits on several processes.

@@ -118,15 +118,18 @@ class Descent:
             if np.isfinite(least):
                 return
 
-    def run(self, rounds: int, steps: int, first: bool) -> Fit | None:
-        """Steps for as many noise models as `rounds`; `first` chooses the directions of the initial state itself."""
+    def run(self, rounds: int, steps: int, first: bool, noise: Noise | None = None) -> Fit | None:
+        """Steps for as many noise models as `rounds`; `first` chooses the directions of the initial state itself.
+
+        They begin with a `noise` model that is given, or with white noise that is large.
+        """
         if first:
             self.unknowns.turn(self._telling_directions())
         z = self.unknowns.centre.copy()
         predicted, slope = self._jacobian(z)
         if not (np.isfinite(predicted).all() and _moderate(slope)):
             return None
-        noise, exact = self._first_noise(predicted), True
+        noise, exact = noise or self._first_noise(predicted), True
         for turn in range(rounds):
             if not exact:
                 predicted, slope = self._derived(z, predicted, slope)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from adaptive_flot.discovery.fitting.descent import Descent
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.unknowns import Unknowns
+from adaptive_flot.discovery.record.noise import Noise
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.greybox.model import Model
 
@@ -43,6 +44,7 @@ class Fitter:
         rounds: int = NOISE_ROUNDS,
         steps: int = MOST_STEPS,
         shrink: Sequence[str] = (),
+        noise: Noise | None = None,
     ) -> Fit | None:
         """Fit the adapted parameters, the initial state and the parameters `free`.
 
@@ -64,6 +66,8 @@ class Fitter:
             Most steps for one noise model.
         shrink
             Free parameters that start from smaller values than given where these are nearer to the record.
+        noise
+            Noise model to begin with, where the start is near the end; else white noise that is large.
 
         Returns
         -------
@@ -74,7 +78,7 @@ class Fitter:
         descent = Descent(self.problem, self.rows, model, unknowns)
         if shrink:
             descent.shrink(shrink)
-        return descent.run(rounds, steps, like is None)
+        return descent.run(rounds, steps, like is None, noise)
 
     def settled(self, fit: Fit, bounds: Mapping[str, tuple[float, float]] | None = None, least: float = SETTLED) -> Fit:
         """The fit started again from where it ended until that gains less than `least`.

@@ -43,17 +43,32 @@ def at_every_row(fitter: Fitter, fit: Fit, bounds: Mapping[str, tuple[float, flo
     The nodes were placed for the model as it is: an effect may have made it faster.
     """
     problem = fitter.problem
-    if nodes_for(problem, fit.model) is None:
+    if nodes_for(problem, fit.model) is None or _says_the_same(fitter, fit, None):
         return fit
-    every = replace(problem, nodes=None)
-    run = RecordSimulator(fit.model, problem.record.dt)
+    every = Fitter(replace(problem, nodes=None), fitter.splits)
+    return every.fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
+
+
+def fitter_about(fitter: Fitter, fit: Fit) -> Fitter:
+    """The fitter for a comparison with a fit: one at every row where a run at its nodes does not say the same of it.
+
+    Such a fit was made at every row, and one at nodes would look worse than it is beside it.
+    """
+    nodes = nodes_for(fitter.problem, fit.model)
+    if nodes is None or _says_the_same(fitter, fit, nodes):
+        return fitter
+    return Fitter(replace(fitter.problem, nodes=None), fitter.splits)
+
+
+def _says_the_same(fitter: Fitter, fit: Fit, nodes: Nodes | None) -> bool:
+    """Whether a run at nodes, or at every row, differs from a fit by less than NOTICED."""
+    problem = fitter.problem
+    run = RecordSimulator(fit.model, problem.record.dt, nodes)
     free = run.outputs(problem.record, fit.initial_state, fit.model.parameter_values)[:, problem.columns]
     if problem.background is not None:
         free = free + problem.background.outputs(fit.background, fit.model)
     own = fit.loss if problem.background is None else loss_of(problem, fit.predicted, fitter.rows)[0]
-    if np.isfinite(free).all() and abs(loss_of(problem, free, fitter.rows)[0] - own) < NOTICED:
-        return fit
-    return Fitter(every, fitter.splits).fit(fit.model, fit.names, like=fit, bounds=bounds, rounds=2) or fit
+    return bool(np.isfinite(free).all()) and abs(loss_of(problem, free, fitter.rows)[0] - own) < NOTICED
 
 
 def placements(record: Dataset, model: Model) -> list[Nodes]:

@@ -43,10 +43,13 @@ def _middle(effect: Effect) -> float:
     return float(np.mean(effect.levels)) if effect.levels else 0.0
 
 
-def refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], middle: float = 0.0) -> Fit | None:
+def refitted(
+    fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], middle: float = 0.0, *, near: bool = False
+) -> Fit | None:
     """Fit of other effects, from where those that an alternative has as well stand in it; None when that can not be.
 
-    A constant that it does not have starts at `middle`.
+    A constant that it does not have starts at `middle`. Where all else is as it was, the fit stays `near` that: it
+    begins with the same noise model. By large white noise it may come to rest elsewhere, far worse.
     """
     held = [fixed_coefficients(e) for e in effects]
     model = base.model.with_effects([replace(e, coefficients=h) for e, h in zip(effects, held, strict=True)])
@@ -58,4 +61,4 @@ def refitted(fitter: Fitter, base: Fit, a: Alternative, effects: list[Effect], m
         bounds |= effect_bounds(fitter.problem, model, effect)
         if effect.driver == "constant" and effect.parameter("amplitude") not in a.fit.names:
             start |= limited(model, effect, {effect.parameter("amplitude"): middle})
-    return fitter.fit(model, tuple(free), start, a.fit, bounds, rounds=2)
+    return fitter.fit(model, tuple(free), start, a.fit, bounds, rounds=2, noise=a.fit.noise if near else None)

@@ -10,6 +10,7 @@ from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.fitting.node_spacing import fitter_about
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, SearchResult
 from adaptive_flot.discovery.results.words import WITH_A_NAME
@@ -83,9 +84,10 @@ def without_what_vanished(problem: Problem, result: SearchResult, judged: Judgem
 
 
 def _without(fitter: Fitter, result: SearchResult, a: Alternative, k: int) -> Alternative | None:
-    """An alternative without its k-th effect, fitted again from where it stands."""
+    """An alternative without its k-th effect, fitted again from where it stands, at every row where that was needed."""
+    fitter = fitter_about(fitter, a.fit)
     others = [replace(e, coefficients={}) for i, e in enumerate(a.effects) if i != k]
-    fit = refitted(fitter, result.base, a, others) if others else None
+    fit = refitted(fitter, result.base, a, others, near=True) if others else None
     if fit is None:
         return None
     names, known = (*a.names[:k], *a.names[k + 1 :]), (*a.known[:k], *a.known[k + 1 :])

@@ -11,7 +11,7 @@ from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.descent import nodes_for
 from adaptive_flot.discovery.fitting.fit import Fit, loss_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.fitting.node_spacing import NOTICED, UNNOTICED, at_every_row, with_nodes
+from adaptive_flot.discovery.fitting.node_spacing import NOTICED, UNNOTICED, at_every_row, fitter_about, with_nodes
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.stepping.nodes import place_nodes, substeps
@@ -71,6 +71,19 @@ def test_a_leader_that_the_nodes_deceive_is_fitted_at_every_row(still: tuple[Pro
     led = at_every_row(Fitter(replace(problem, nodes=wrong)), deceived, {})
     assert led.loss == pytest.approx(fit.loss, abs=1.0)
     np.testing.assert_allclose(led.values, fit.values, atol=float(fit.std().min()))
+
+
+def test_a_fit_at_every_row_is_compared_with_one_at_every_row(still: tuple[Problem, Fit]) -> None:
+    """By nodes that deceive, a fit without an idle effect looked worse than the one with it."""
+    problem, fit = still
+    nodes = place_nodes(problem.record, 6)
+    wrong = replace(problem, nodes=replace(nodes, inputs=np.roll(nodes.inputs, 3, axis=0)))
+    assert fitter_about(Fitter(wrong), fit).problem.nodes is None
+    again = fitter_about(Fitter(wrong), fit).fit(fit.model, fit.names, like=fit, noise=fit.noise)
+    assert again is not None and again.loss == pytest.approx(fit.loss, abs=1.0)
+    coarse = Fitter(with_nodes(problem, fit))
+    assert fitter_about(coarse, fit) is coarse  # nodes that make no difference
+    assert fitter_about(Fitter(problem), fit).problem.nodes is None
 
 
 def test_a_leader_whose_run_is_right_is_left_alone(still: tuple[Problem, Fit]) -> None:

@@ -158,3 +158,14 @@ def test_a_settled_fit_is_no_worse_and_stays(base: tuple[Problem, Fit]) -> None:
     assert settled.loss == pytest.approx(fit.loss, abs=1.0)
     assert fitter.settled(settled).loss <= settled.loss
     np.testing.assert_allclose(fitter.settled(settled).values, settled.values, rtol=1e-3)
+
+
+def test_a_fit_that_begins_with_its_own_noise_stays_where_it_is(base: tuple[Problem, Fit]) -> None:
+    """By large white noise a limit came to rest elsewhere, with half of the noise more: an idle effect was told."""
+    problem, fit = base
+    fitter = Fitter(problem)
+    settled = fitter.settled(fit)
+    again = fitter.fit(settled.model, settled.names, like=settled, rounds=2, noise=settled.noise)
+    assert again is not None
+    assert again.loss <= settled.loss + SETTLED
+    np.testing.assert_allclose(again.values, settled.values, rtol=1e-3)

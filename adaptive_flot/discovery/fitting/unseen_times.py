@@ -1,0 +1,157 @@
+"""Times of events that no fitted row has seen: an end after all of them, and a change within a held-out stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from adaptive_flot.discovery.fitting.fit import Fit
+from adaptive_flot.discovery.fitting.fitter import Fitter
+from adaptive_flot.discovery.record.problem import BoolArray, Problem
+from adaptive_flot.greybox.effects import Effect
+from adaptive_flot.greybox.forms.form import CoefficientRole, number
+from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.greybox.stepping.record import RecordSimulator
+
+EDGES = 2.0
+"""Rows, and widths of its edges, before the last fitted row from which an event counts as there in that."""
+LEAST = 1.0
+"""Drop of the squares of all rows, in variances of the noise, from which a time within a held-out stretch is moved."""
+TRIED = 16
+"""Times of a stretch that are tried before the best of them is refined."""
+
+
+def with_unseen_ends(fitter: Fitter, fit: Fit) -> Fit:
+    """The fit, its events that are there in the last fitted row held to the end of the record, and no time of an end.
+
+    An analyser that stayed 12 % low was told to be right again from the first row on that nobody had fitted.
+    """
+    time, dt = fitter.problem.record.time, fitter.problem.record.dt
+    last = float(time[np.flatnonzero(fitter.rows)[-1]])
+    held = {}
+    for effect in fit.model.fitted_effects():
+        begins, lasts = (effect.names(role) for role in (CoefficientRole.ONSET, CoefficientRole.DURATION))
+        if not effect.family.passes or len(begins) != len(lasts):
+            continue
+        settings = effect.full_settings
+        width = number(settings, "width") if "width" in settings else 0.0
+        for begin, long in zip(begins, lasts, strict=True):
+            onset, end = effect.coefficients[begin], effect.coefficients[begin] + effect.coefficients[long]
+            if last - EDGES * (dt + width) <= end < time[-1] and effect.parameter(long) in fit.names:
+                held[effect.parameter(long)] = float(time[-1] - onset + EDGES * (dt + width))
+    if not held:
+        return fit
+    names = tuple(name for name in fit.names if name not in held)
+    return fitter.fit(fit.model.with_parameters(held), names, held, fit, rounds=2) or fit
+
+
+def with_unseen_changes(fitter: Fitter, fit: Fit) -> tuple[Fit, tuple[float, ...]]:
+    """The fit, its changes that fell into held-out stretches moved to where these have them, and their times [s].
+
+    Fitted rows on both sides of a stretch only say that something begins or ends between them. A meter that jumped in
+    the middle of a stretch was told at its end, and what was wrong until then took the name back. Nothing but the time
+    is read from rows that were held out.
+    """
+    problem, moved = fitter.problem, list[float]()
+    time = problem.record.time
+    for told, shares in list(_changes(fit)):
+        stretch = _unseen(time, fitter.rows, told)
+        if stretch is None or problem.time_is_up:
+            continue
+        best, at = _moved(fitter, fit, told, shares, stretch)
+        if _squares(problem, fit, best) < _squares(problem, fit, fit) - LEAST:
+            fit = best
+            moved.append(at)
+    return fit, tuple(moved)
+
+
+def _changes(fit: Fit) -> Iterator[tuple[float, Mapping[str, float]]]:
+    """Each time [s] that a fit has come to, and how the free parameters change with it: an end stays where it is."""
+    for effect in fit.model.fitted_effects():
+        begins, lasts = (effect.names(role) for role in (CoefficientRole.ONSET, CoefficientRole.DURATION))
+        paired = lasts if len(begins) == len(lasts) else ("",) * len(begins)
+        for begin, long in zip(begins, paired, strict=True):
+            onset, free = effect.coefficients[begin], _free(fit, effect, begin)
+            if free:
+                yield onset, {free: 1.0} | ({_free(fit, effect, long): -1.0} if _free(fit, effect, long) else {})
+            if _free(fit, effect, long):
+                yield onset + effect.coefficients[long], {_free(fit, effect, long): 1.0}
+
+
+def _free(fit: Fit, effect: Effect, coefficient: str) -> str:
+    """Full name of a coefficient that is fitted; empty where it is not."""
+    name = effect.parameter(coefficient) if coefficient else ""
+    return name if name in fit.names else ""
+
+
+def _unseen(time: FloatArray, fitted: BoolArray, told: float) -> tuple[float, float] | None:
+    """Times [s] of the last fitted row before a change, and of the first one after it; None where none lies between."""
+    seen = np.flatnonzero(fitted)
+    after = int(np.searchsorted(time[seen], told))
+    if not 0 < after < len(seen) or seen[after] - seen[after - 1] <= EDGES:
+        return None
+    return float(time[seen[after - 1]]), float(time[seen[after]])
+
+
+def _moved(
+    fitter: Fitter, fit: Fit, told: float, shares: Mapping[str, float], stretch: tuple[float, float]
+) -> tuple[Fit, float]:
+    """The fit with a change at the time of a stretch that leaves the least squares of all rows, and that time [s].
+
+    Its variance is, with the curvature of the squares S over d = two rows, at most that of a uniform law over the
+    stretch::
+
+        2 d^2 / (S(t + d) - 2 S(t) + S(t - d))
+    """
+    problem = fitter.problem
+    record, columns = problem.record, list(problem.columns)
+    where = {name: fit.names.index(name) for name in shares}
+
+    def free_run(values: FloatArray) -> FloatArray:
+        model = fit.model.with_parameters(dict(zip(fit.names, map(float, values), strict=True)))
+        run = RecordSimulator(model, record.dt)
+        return run.outputs(record, fit.initial_state, model.parameter_values)[:, columns]
+
+    beside = fit.predicted - free_run(fit.values)  # what a background adds
+
+    def at(t: float) -> Fit:
+        values = fit.values.copy()
+        for name, share in shares.items():
+            values[where[name]] += share * (t - told)
+        model = fit.model.with_parameters(dict(zip(fit.names, map(float, values), strict=True)))
+        predicted = free_run(values) + beside
+        innovations = fit.noise.whiten((problem.measured - predicted) / problem.weights)
+        return replace(fit, model=model, values=values, predicted=predicted, innovations=innovations)
+
+    def left(t: float) -> float:
+        return _squares(problem, fit, at(t))
+
+    shortest = [fit.values[where[name]] for name, share in shares.items() if share < 0]
+    times = np.linspace(stretch[0], min([stretch[1], *(told + long - record.dt for long in shortest)]), TRIED)
+    losses = [left(float(t)) for t in times]
+    k = int(np.argmin(losses))
+    bounds = float(times[max(k - 1, 0)]), float(times[min(k + 1, TRIED - 1)])
+    found = minimize_scalar(lambda t: left(float(t)), bounds=bounds, options={"xatol": record.dt / 4})
+    best = float(found.x) if found.fun < losses[k] else float(times[k])
+    moved, d = at(best), 2 * record.dt
+    curvature = max(left(best + d) - 2 * left(best) + left(best - d), 0.0)
+    variance = min(2 * d**2 / max(curvature, 1e-12), (stretch[1] - stretch[0]) ** 2 / 12)
+    covariance = moved.covariance.copy()
+    for i in where.values():
+        covariance[i, :] = covariance[:, i] = 0.0
+        covariance[i, i] = variance
+    return replace(moved, covariance=covariance), best
+
+
+def _squares(problem: Problem, fit: Fit, run: Fit) -> float:
+    """Squares of what a run leaves of all rows, in variances of the noise of a fit; infinite where it runs off.
+
+    They are not whitened: a noise model with a memory takes up an error that lasts.
+    """
+    size = problem.weights * fit.noise.stationary_std()
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = float(np.nansum(((run.residual(problem) / size) ** 2)[problem.rows()]))
+    return total if np.isfinite(run.predicted).all() else np.inf
