@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -56,29 +56,45 @@ def with_unseen_changes(fitter: Fitter, fit: Fit) -> tuple[Fit, tuple[float, ...
     is read from rows that were held out.
     """
     problem, moved = fitter.problem, list[float]()
-    time = problem.record.time
-    for told, shares in list(_changes(fit)):
-        stretch = _unseen(time, fitter.rows, told)
+    for k in range(len(_changes(fit, problem.record.dt))):
+        change = _changes(fit, problem.record.dt)[k]  # a beginning that has moved bounds its end
+        stretch = _unseen(problem.record.time, fitter.rows, change)
         if stretch is None or problem.time_is_up:
             continue
-        best, at = _moved(fitter, fit, told, shares, stretch)
+        best, at = _moved(fitter, fit, change, stretch)
         if _squares(problem, fit, best) < _squares(problem, fit, fit) - LEAST:
             fit = best
             moved.append(at)
     return fit, tuple(moved)
 
 
-def _changes(fit: Fit) -> Iterator[tuple[float, Mapping[str, float]]]:
-    """Each time [s] that a fit has come to, and how the free parameters change with it: an end stays where it is."""
+@dataclass(frozen=True)
+class _Change:
+    """A time [s] that a fit has come to, its range, and by how much free parameters change with it."""
+
+    told: float
+    shares: Mapping[str, float]
+    least: float = -np.inf
+    most: float = np.inf
+
+
+def _changes(fit: Fit, dt: float) -> list[_Change]:
+    """Beginnings and ends of the events of a fit: the other one of an event stays, a row of `dt` [s] away at least."""
+    found = []
     for effect in fit.model.fitted_effects():
         begins, lasts = (effect.names(role) for role in (CoefficientRole.ONSET, CoefficientRole.DURATION))
         paired = lasts if len(begins) == len(lasts) else ("",) * len(begins)
         for begin, long in zip(begins, paired, strict=True):
-            onset, free = effect.coefficients[begin], _free(fit, effect, begin)
-            if free:
-                yield onset, {free: 1.0} | ({_free(fit, effect, long): -1.0} if _free(fit, effect, long) else {})
-            if _free(fit, effect, long):
-                yield onset + effect.coefficients[long], {_free(fit, effect, long): 1.0}
+            onset, end = effect.coefficients[begin], np.inf
+            lasting = _free(fit, effect, long)
+            if lasting:
+                end = onset + effect.coefficients[long]
+            if _free(fit, effect, begin):
+                shares = {_free(fit, effect, begin): 1.0, **({lasting: -1.0} if lasting else {})}
+                found.append(_Change(onset, shares, most=end - dt))
+            if lasting:
+                found.append(_Change(end, {lasting: 1.0}, least=onset + dt))
+    return found
 
 
 def _free(fit: Fit, effect: Effect, coefficient: str) -> str:
@@ -87,28 +103,27 @@ def _free(fit: Fit, effect: Effect, coefficient: str) -> str:
     return name if name in fit.names else ""
 
 
-def _unseen(time: FloatArray, fitted: BoolArray, told: float) -> tuple[float, float] | None:
-    """Times [s] of the last fitted row before a change, and of the first one after it; None where none lies between."""
+def _unseen(time: FloatArray, fitted: BoolArray, change: _Change) -> tuple[float, float] | None:
+    """Times [s] between which a change may be: those of the fitted rows about it; None where none lies between."""
     seen = np.flatnonzero(fitted)
-    after = int(np.searchsorted(time[seen], told))
+    after = int(np.searchsorted(time[seen], change.told))
     if not 0 < after < len(seen) or seen[after] - seen[after - 1] <= EDGES:
         return None
-    return float(time[seen[after - 1]]), float(time[seen[after]])
+    first, last = max(float(time[seen[after - 1]]), change.least), min(float(time[seen[after]]), change.most)
+    return (first, last) if first < last else None
 
 
-def _moved(
-    fitter: Fitter, fit: Fit, told: float, shares: Mapping[str, float], stretch: tuple[float, float]
-) -> tuple[Fit, float]:
+def _moved(fitter: Fitter, fit: Fit, change: _Change, stretch: tuple[float, float]) -> tuple[Fit, float]:
     """The fit with a change at the time of a stretch that leaves the least squares of all rows, and that time [s].
 
-    Its variance is, with the curvature of the squares S over d = two rows, at most that of a uniform law over the
-    stretch::
+    Its variance is, with the curvature of the squares S over d = two rows or less, at most that of a uniform law over
+    the stretch::
 
         2 d^2 / (S(t + d) - 2 S(t) + S(t - d))
     """
     problem = fitter.problem
     record, columns = problem.record, list(problem.columns)
-    where = {name: fit.names.index(name) for name in shares}
+    where = {name: fit.names.index(name) for name in change.shares}
 
     def free_run(values: FloatArray) -> FloatArray:
         model = fit.model.with_parameters(dict(zip(fit.names, map(float, values), strict=True)))
@@ -119,8 +134,8 @@ def _moved(
 
     def at(t: float) -> Fit:
         values = fit.values.copy()
-        for name, share in shares.items():
-            values[where[name]] += share * (t - told)
+        for name, share in change.shares.items():
+            values[where[name]] += share * (t - change.told)
         model = fit.model.with_parameters(dict(zip(fit.names, map(float, values), strict=True)))
         predicted = free_run(values) + beside
         innovations = fit.noise.whiten((problem.measured - predicted) / problem.weights)
@@ -129,16 +144,17 @@ def _moved(
     def left(t: float) -> float:
         return _squares(problem, fit, at(t))
 
-    shortest = [fit.values[where[name]] for name, share in shares.items() if share < 0]
-    times = np.linspace(stretch[0], min([stretch[1], *(told + long - record.dt for long in shortest)]), TRIED)
+    times = np.linspace(*stretch, TRIED)
     losses = [left(float(t)) for t in times]
     k = int(np.argmin(losses))
     bounds = float(times[max(k - 1, 0)]), float(times[min(k + 1, TRIED - 1)])
     found = minimize_scalar(lambda t: left(float(t)), bounds=bounds, options={"xatol": record.dt / 4})
     best = float(found.x) if found.fun < losses[k] else float(times[k])
-    moved, d = at(best), 2 * record.dt
-    curvature = max(left(best + d) - 2 * left(best) + left(best - d), 0.0)
-    variance = min(2 * d**2 / max(curvature, 1e-12), (stretch[1] - stretch[0]) ** 2 / 12)
+    moved = at(best)
+    d = min(2 * record.dt, best - stretch[0], stretch[1] - best)
+    curvature = left(best + d) - 2 * left(best) + left(best - d)
+    widest = (stretch[1] - stretch[0]) ** 2 / 12
+    variance = min(2 * d**2 / curvature, widest) if d > 0 and curvature > 0 else widest
     covariance = moved.covariance.copy()
     for i in where.values():
         covariance[i, :] = covariance[:, i] = 0.0

@@ -95,3 +95,24 @@ def test_a_time_that_fitted_rows_have_seen_stays() -> None:
     fit = fitter.fit(base.model.with_effects([event]), names, start, base)
     assert fit is not None
     assert with_unseen_changes(fitter, fit) == (fit, ())
+
+
+def test_both_ends_of_a_spell_within_one_stretch_keep_their_order() -> None:
+    """A spell of ten rows, told as two rows at another time of the same report stretch."""
+    record = tank_record(Truth(exponent=0.0))
+    begins, ends = make_problem(record, heated_tank(), ADAPTED, burn_in=30, guard=5).spans("report")[1]
+    first = begins + 0.5 * (ends - begins)
+    y = record.outputs + OFF * ((record.time >= first) & (record.time < first + 10 * DT))[:, None]
+    problem = make_problem(replace(record, outputs=y), heated_tank(), ADAPTED, burn_in=30, guard=5)
+    fitter = Fitter(problem, ("estimate", "confirm"))
+    event = Effect("thermometer", "time", "switch", settings={"count": 1.0, "width": DT})
+    amplitude, onset, long = (event.parameter(c.name) for c in event.terms)
+    base = fitter.fit(heated_tank())
+    assert base is not None
+    start = {amplitude: OFF, onset: first - 3 * DT, long: 2 * DT}
+    fit = fitter.fit(base.model.with_effects([event]), (amplitude, onset, long), start, base, rounds=0)
+    assert fit is not None
+    again, times = with_unseen_changes(fitter, fit)
+    assert len(times) == 2 and times[1] - times[0] >= DT
+    left = [np.sum(f.residual(problem)[problem.rows("report")] ** 2) for f in (fit, again)]
+    assert left[1] < left[0]
