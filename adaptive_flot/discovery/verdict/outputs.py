@@ -8,6 +8,8 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.verification import AT_NOISE
 from adaptive_flot.discovery.results import Judgement, OutputChange
+from adaptive_flot.discovery.verdict.words.sizes import spaced
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS
 from adaptive_flot.greybox.model import FloatArray
 
 
@@ -36,6 +38,22 @@ def common(judgement: Judgement) -> tuple[tuple[str, str], ...]:
     return tuple(n for n in judgement.best.names if all(n in a.names for a in near))
 
 
+def common_driver(judgement: Judgement) -> str:
+    """What some effect of the best alternative and of every one near it has to do with, in a sentence; else empty.
+
+    Where the place stays open, this tells when it acts: with a signal, in time, or late. A constant tells nothing.
+    """
+    near = [a for a in judgement.rivals if judgement.near(a)]
+    if judgement.best is None or not near:
+        return ""
+    shared = set.intersection(*({driver for _, driver in a.names} for a in (judgement.best, *near)))
+    told = [d for d in dict.fromkeys(d for _, d in judgement.best.names) if d in shared]
+    signals = [spaced(d) for d in told if d not in STATELESS_DRIVERS]
+    if signals:
+        return f"All that come near depend on {' and '.join(signals)}."
+    return "All that come near change in time." if "time" in told else ""
+
+
 def certain_words(judgement: Judgement, changes: Sequence[OutputChange], noise: FloatArray) -> str:
     """What is certain of a record that is not told: sentences, empty where nothing is."""
     if judgement.best is None:
@@ -44,6 +62,8 @@ def certain_words(judgement: Judgement, changes: Sequence[OutputChange], noise: 
     in_all = common(judgement)
     if in_all:
         said.append(f"In all that come near: {', '.join(f'{s} by {d}' for s, d in in_all)}.")
+    elif driver := common_driver(judgement):
+        said.append(driver)
     repaired, wrong = settled(changes, noise)
     name = " with ".join(f"{s} by {d}" for s, d in judgement.best.names)
     if repaired:

@@ -51,6 +51,27 @@ def test_the_sentence_names_the_outputs_and_what_all_near_alternatives_share(dra
     assert said.endswith("Still wrong: grade 1 -> 0.9; look for a further cause there.")
 
 
+@pytest.mark.parametrize(
+    ("sets", "told"),
+    [
+        (((("gangue", "feed_flow"),), (("sensor", "feed_flow"),)), "All that come near depend on feed flow. "),
+        (((("gangue", "time"),), (("sensor", "time"), ("pump", "lag"))), "All that come near change in time. "),
+        (((("gangue", "constant"),), (("sensor", "constant"),)), ""),  # that says nothing of when
+        (((("gangue", "feed_flow"),), (("sensor", "time"),)), ""),
+        (
+            ((("gangue", "feed_flow"), ("pump", "time")), (("gangue", "feed_flow"),)),
+            "In all that come near: gangue by ",
+        ),
+    ],
+)
+def test_the_driver_that_all_share_is_told_where_no_place_is(
+    draught: Discovery, sets: tuple[tuple[tuple[str, str], ...], ...], told: str
+) -> None:
+    """Four parts may have done it, and all of them with the feed flow."""
+    said = certain_words(_judged(draught, *sets), CHANGES, NOISE)
+    assert said.startswith(told or sets[0][0][0])
+
+
 def test_what_sets_share_is_not_certain_where_none_of_them_comes_near_the_noise(
     draught: Discovery, monkeypatch: pytest.MonkeyPatch
 ) -> None:
