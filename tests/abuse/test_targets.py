@@ -130,6 +130,19 @@ def test_no_result_in_a_folder_overwrites_an_input(
     check(call(*command, "--out", folder), inputs, tmp_path, "--out: ", "is an input", command[1])
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_no_json_overwrites_a_table_that_was_not_read(
+    call: Call, inputs: dict[Path, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: bool
+) -> None:
+    """`--json old.csv` in place of `--reference old.csv` took the only copy of a record."""
+    monkeypatch.chdir(tmp_path)
+    result = call("discover", "rec.csv", "--no-report", "--json", "pem.csv" if there else "new.csv")
+    if there:
+        check(result, inputs, tmp_path, "--json: pem.csv is there, and no JSON file by its name")
+    else:
+        assert result.code == 0 and (tmp_path / "new.csv").is_file()
+
+
 def test_no_output_of_draws_overwrites_another(call: Call, inputs: dict[Path, bytes], tmp_path: Path) -> None:
     result = call("simulate", "rec.csv", *DRAWS, "--out", "new.csv", "--report", "nowhere/../new.csv")
     check(result, inputs, tmp_path, "--report: ", "is written by --out already")
