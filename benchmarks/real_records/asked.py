@@ -19,10 +19,9 @@ from benchmarks.hidden_effects.score.summary import rates
 from benchmarks.plant_like.score import figures
 
 BENCHMARKS = Path(__file__).parents[1]
-SIMULATED = BENCHMARKS / "hidden_effects" / "published" / "discover.csv"
-SIMULATED_BY = "1430e2e, published"
-PLANT_LIKE = BENCHMARKS / "plant_like" / "published" / "discover_5f354d4_seed_2053.csv"
-PLANT_LIKE_BY = "5f354d4, published"
+SIMULATED = BENCHMARKS / "hidden_effects" / "published" / "discover_2f630032.csv"
+PLANT_LIKE = BENCHMARKS / "plant_like" / "published" / "discover_23226a9_seed_2083.csv"
+"""The last tables of all records that one commit has judged, `discover_COMMIT[_seed_SEED].csv`."""
 OF_THE_300 = {
     "truth named or in a class of 3, single ordinary": "the 300: told",
     "wrong name, of records with an effect": "the 300: wrong names",
@@ -115,16 +114,16 @@ def of_simulated_records() -> list[Asked]:
         if rate.what in OF_THE_300:
             bound = float(rate.asked.split()[1]) / 100
             met = rate.share <= bound if rate.asked.startswith("<") else rate.share >= bound
-            asked.append(Asked(OF_THE_300[rate.what], rate.asked, str(rate), met, SIMULATED_BY))
+            asked.append(Asked(OF_THE_300[rate.what], rate.asked, str(rate), met, _by(SIMULATED)))
     table = pd.read_csv(PLANT_LIKE, keep_default_na=False)
     for row in figures(table).itertuples():
         share = float(str(row.share).split()[0])
         measured = f"{row.share} ({str(row.count).replace(' of ', '/')})"
         if row.figure == "told, records with an effect":
-            asked.append(Asked("plant-like: told", ">= 75 %", measured, share >= 75, PLANT_LIKE_BY))
+            asked.append(Asked("plant-like: told", ">= 75 %", measured, share >= 75, _by(PLANT_LIKE)))
         elif row.figure == "wrong name, all records":
-            asked.append(Asked("plant-like: wrong names", "<= 3 %", measured, share <= 3, PLANT_LIKE_BY))
-    return [*asked, _times(table.seconds, "plant-like", PLANT_LIKE_BY)]
+            asked.append(Asked("plant-like: wrong names", "<= 3 %", measured, share <= 3, _by(PLANT_LIKE)))
+    return [*asked, _times(table.seconds, "plant-like", _by(PLANT_LIKE))]
 
 
 def table_of(asked: Sequence[Asked]) -> Table:
@@ -135,6 +134,11 @@ def table_of(asked: Sequence[Asked]) -> Table:
     for a in asked:
         table.add_row(a.figure, a.target, a.measured, "yes" if a.met else "no", a.by)
     return table
+
+
+def _by(table: Path) -> str:
+    """The commit in the name of a published table."""
+    return f"{table.stem.split('_')[1]}, published"
 
 
 def _times(seconds: Sequence[float] | pd.Series, of: str, by: str = "this run") -> Asked:
