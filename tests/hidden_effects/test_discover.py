@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ from benchmarks.hidden_effects.score.outcome import classify
 from benchmarks.hidden_effects.score.verdict import SubmittedVerdict
 
 SEED = 11
+
+made = cache(make_record)
 
 
 @pytest.mark.parametrize(
@@ -35,7 +38,7 @@ def test_a_record_is_judged_as_its_answer_says(
     k: int, category: str, rows: slice, outcomes: set[str], tmp_path: Path
 ) -> None:
     """By the first rows, or those around its event, which tell as much as all."""
-    record = make_record(SEED, k)
+    record = made(SEED, k)
     assert record.answer.category == category
     write_record(tmp_path, replace(record, table=record.table.iloc[rows].reset_index(drop=True)))
     model = replace(flotation.make_model(), record_code=True)  # as the command does; less time with a compiler
@@ -50,7 +53,7 @@ def test_a_record_is_judged_as_its_answer_says(
 
 def test_a_record_may_start_anywhere_and_lose_a_sensor(tmp_path: Path) -> None:
     """Cut in the middle of a move, one meter frozen for half of the rest: the gate says so, and no name is wrong."""
-    record = make_record(SEED, 2)
+    record = made(SEED, 2)
     table = record.table.iloc[517:1217].reset_index(drop=True)
     meter = table["air_recovery"].to_numpy(dtype=float, copy=True)
     meter[350:] = meter[350]
