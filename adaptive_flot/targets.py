@@ -20,8 +20,10 @@ if TYPE_CHECKING:  # imported by the commands, late
 
 Identity = tuple[int, int] | str
 
+NO_TABLES = ("--json", "--report")
+"""Options whose file is neither a table, nor settings, nor a module: they replace none, also where it was not read."""
 OTHER_SUFFIXES = (".csv", ".gz", ".parquet", ".py", ".yaml", ".yml")
-"""Ends of names of tables, settings and modules: a file that is there with one of these is no JSON file."""
+"""Ends of names of these."""
 
 
 def check_targets(inputs: Iterable[Path | None], targets: Iterable[tuple[str, Path | None]]) -> None:
@@ -37,8 +39,8 @@ def check_targets(inputs: Iterable[Path | None], targets: Iterable[tuple[str, Pa
     Raises
     ------
     OutputError
-        A target is an input, under whatever path, or another target; it can not be written, or it is to hold JSON and
-        is a table, settings or a module by its name.
+        A target is an input, under whatever path, or another target; it can not be written, or it is there and a
+        table, settings or a module, for an option of NO_TABLES.
     """
     read = {_identity(path): path for path in inputs if path is not None and path.is_file()}
     taken: dict[Identity, str] = {}
@@ -49,10 +51,8 @@ def check_targets(inputs: Iterable[Path | None], targets: Iterable[tuple[str, Pa
         identity = _identity(path)
         if identity in read:
             raise OutputError(f"{option}: {path} is an input ({read[identity]}) and would be lost; give another path")
-        if option.endswith("json") and path.suffix.lower() in OTHER_SUFFIXES and path.exists():
-            raise OutputError(
-                f"{option}: {path} is there, and no JSON file by its name; give a path that ends in .json"
-            )
+        if option in NO_TABLES and path.suffix.lower() in OTHER_SUFFIXES and path.exists():
+            raise OutputError(f"{option}: {path} is there, and a table, settings or a module; give another path")
         if identity in taken:
             raise OutputError(f"{option}: {path} is written by {taken[identity]} already; give another path")
         taken[identity] = option

@@ -138,7 +138,7 @@ def test_no_json_overwrites_a_table_that_was_not_read(
     monkeypatch.chdir(tmp_path)
     result = call("discover", "rec.csv", "--no-report", "--json", "pem.csv" if there else "new.csv")
     if there:
-        check(result, inputs, tmp_path, "--json: pem.csv is there, and no JSON file by its name")
+        check(result, inputs, tmp_path, "--json: pem.csv is there, and a table")
     else:
         assert result.code == 0 and (tmp_path / "new.csv").is_file()
 

@@ -62,7 +62,7 @@ def with_unseen_changes(fitter: Fitter, fit: Fit) -> tuple[Fit, tuple[float, ...
         if stretch is None or problem.time_is_up:
             continue
         best, at = _moved(fitter, fit, change, stretch)
-        if _squares(problem, fit, best) < _squares(problem, fit, fit) - LEAST:
+        if _squares(problem, fit, best.predicted) < _squares(problem, fit, fit.predicted) - LEAST:
             fit = best
             moved.append(at)
     return fit, tuple(moved)
@@ -132,17 +132,14 @@ def _moved(fitter: Fitter, fit: Fit, change: _Change, stretch: tuple[float, floa
 
     beside = fit.predicted - free_run(fit.values)  # what a background adds
 
-    def at(t: float) -> Fit:
+    def values_at(t: float) -> FloatArray:
         values = fit.values.copy()
         for name, share in change.shares.items():
             values[where[name]] += share * (t - change.told)
-        model = fit.model.with_parameters(dict(zip(fit.names, map(float, values), strict=True)))
-        predicted = free_run(values) + beside
-        innovations = fit.noise.whiten((problem.measured - predicted) / problem.weights)
-        return replace(fit, model=model, values=values, predicted=predicted, innovations=innovations)
+        return values
 
     def left(t: float) -> float:
-        return _squares(problem, fit, at(t))
+        return _squares(problem, fit, free_run(values_at(t)) + beside)
 
     times = np.linspace(*stretch, TRIED)
     losses = [left(float(t)) for t in times]
@@ -150,24 +147,30 @@ def _moved(fitter: Fitter, fit: Fit, change: _Change, stretch: tuple[float, floa
     bounds = float(times[max(k - 1, 0)]), float(times[min(k + 1, TRIED - 1)])
     found = minimize_scalar(lambda t: left(float(t)), bounds=bounds, options={"xatol": record.dt / 4})
     best = float(found.x) if found.fun < losses[k] else float(times[k])
-    moved = at(best)
     d = min(2 * record.dt, best - stretch[0], stretch[1] - best)
     curvature = left(best + d) - 2 * left(best) + left(best - d)
     widest = (stretch[1] - stretch[0]) ** 2 / 12
     variance = min(2 * d**2 / curvature, widest) if d > 0 and curvature > 0 else widest
-    covariance = moved.covariance.copy()
+    covariance = fit.covariance.copy()
     for i in where.values():
         covariance[i, :] = covariance[:, i] = 0.0
         covariance[i, i] = variance
-    return replace(moved, covariance=covariance), best
+    values = values_at(best)
+    predicted = free_run(values) + beside
+    innovations = fit.noise.whiten((problem.measured - predicted) / problem.weights)
+    model = fit.model.with_parameters(dict(zip(fit.names, map(float, values), strict=True)))
+    moved = replace(
+        fit, model=model, values=values, covariance=covariance, predicted=predicted, innovations=innovations
+    )
+    return moved, best
 
 
-def _squares(problem: Problem, fit: Fit, run: Fit) -> float:
-    """Squares of what a run leaves of all rows, in variances of the noise of a fit; infinite where it runs off.
+def _squares(problem: Problem, fit: Fit, predicted: FloatArray) -> float:
+    """Squares of what a run (N, m) leaves of all rows, in variances of the noise of a fit; infinite where it runs off.
 
     They are not whitened: a noise model with a memory takes up an error that lasts.
     """
     size = problem.weights * fit.noise.stationary_std()
     with np.errstate(over="ignore", invalid="ignore"):
-        total = float(np.nansum(((run.residual(problem) / size) ** 2)[problem.rows()]))
-    return total if np.isfinite(run.predicted).all() else np.inf
+        total = float(np.nansum((((problem.measured - predicted) / size) ** 2)[problem.rows()]))
+    return total if np.isfinite(predicted).all() else np.inf
