@@ -7,6 +7,7 @@ from pathlib import Path
 
 from adaptive_flot.console.lines import print_fits, progress_bar
 from adaptive_flot.greybox.stepping.compiling.compiled import compiler_problem
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.report.run.page import write_run_report
 from adaptive_flot.runner.commands.runs.run import run_scenario
 from adaptive_flot.runner.commands.runs.run_files import run_summary, write_json
@@ -28,7 +29,7 @@ def main() -> None:
     with progress_bar("runs", sum(runs_each)) as advance:
         results = [(s, run_scenario(s, seeds=SEEDS, progress=advance)) for s in scenarios]
     write_json(FOLDER / "summary.json", [run_summary(s, runs) for s, runs in results])
-    write_run_report(results, FOLDER / "report.html", command="make demo")
+    write_run_report(results, FOLDER / "report.html", command="make demo", processes=available_processes())
     print_fits(results)
     print(f"{time.perf_counter() - begin:.0f} s. Report: {(FOLDER / 'report.html').resolve()}")
 

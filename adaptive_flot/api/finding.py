@@ -16,12 +16,12 @@ from adaptive_flot.api.progress import staged
 from adaptive_flot.api.records import AnyMap, AnyRecord, SeveralRecords, read_map, record_files, record_name
 from adaptive_flot.api.shown import check_kind, error_table, html_of, text_of
 from adaptive_flot.discovery.discover import discover as search_record
-from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery, Verdict
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve, effect_curves
 from adaptive_flot.errors import DataError, ModelError, ResultError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.runner.commands.discover import discover_file
 from adaptive_flot.runner.commands.discover_records import discover_records
 from adaptive_flot.targets import check_targets

@@ -53,9 +53,9 @@ def discover(
     """
     from adaptive_flot.child_processes import undisturbed
     from adaptive_flot.console.lines import print_verdict, stage_bar
-    from adaptive_flot.discovery.fitting.parallel import available_processes
     from adaptive_flot.errors import ModelError
     from adaptive_flot.files import write_text
+    from adaptive_flot.parallel import available_processes
     from adaptive_flot.processes.registry import make_model
     from adaptive_flot.records.tag_map import load_tag_map
     from adaptive_flot.runner.commands.discover import check_model_path, discover_file, read_limits, save_discovered

@@ -63,7 +63,8 @@ def run(
         write_json(target, summary)
     print_closed_loop(loaded, runs)
     print_fits([(loaded, runs)])
+    from adaptive_flot.parallel import available_processes
     from adaptive_flot.report.run.page import write_run_report
 
-    write_run_report([(loaded, runs)], folder / "report.html", command=command_line())
+    write_run_report([(loaded, runs)], folder / "report.html", command=command_line(), processes=available_processes())
     typer.echo(f"Report: {folder / 'report.html'}")

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
-from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.innovations.places.constants import with_constants_alike
 from adaptive_flot.discovery.innovations.places.free_run import compare_with_what_has_no_site
@@ -48,6 +47,7 @@ from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.parallel import one_thread
 
 SEARCH_SHARE = 0.7
 """Share of a budget that the search may take; the rest is for the last fits, the report and the proposed test."""

@@ -18,11 +18,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from adaptive_flot.charts.palette import colour
-from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Discovery
 from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.files import replace_path
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.report.kit import style
 from adaptive_flot.runner.commands.discover import discover_file

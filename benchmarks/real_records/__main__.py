@@ -13,11 +13,11 @@ from rich.table import Table
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Verdict
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset
 from adaptive_flot.greybox.stepping.record import RecordSimulator
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.processes import cascaded_tanks
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
 from benchmarks.real_records.asked import Judged, of_measured_records, of_simulated_records, table_of

@@ -16,8 +16,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.results import Verdict
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.runner.commands.discover import discover_file
 

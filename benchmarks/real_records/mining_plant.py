@@ -20,7 +20,6 @@ from adaptive_flot.discovery.assessment.verification import whiteness
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.record.problem import Problem, make_problem
 from adaptive_flot.discovery.search.search import search
 from adaptive_flot.discovery.test_design.separation import hold_time
@@ -28,6 +27,7 @@ from adaptive_flot.discovery.verdict.judge import judge
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.processes.iron_columns import make_model, read_record
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "mining-flotation-plant" / "hourly.csv"

@@ -15,9 +15,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from adaptive_flot.discovery.fitting.parallel import available_processes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.processes import cascaded_tanks
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp
 from benchmarks.real_records.folder import SHARED, has_records

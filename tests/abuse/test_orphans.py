@@ -14,8 +14,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.errors import AdaptiveFlotError, DataError
+from adaptive_flot.parallel import parallel_map
 from tests.cli.discover.test_discover import write_tank
 
 PATIENCE_S = 120.0

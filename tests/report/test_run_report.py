@@ -83,6 +83,7 @@ def test_page_is_self_contained(result: Result, tmp_path: Path) -> None:
 def test_same_runs_same_page(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(provenance, "now", lambda: "2026-01-01 00:00 UTC")
     assert run_report([result]) == run_report([result])
+    assert run_report([result, result], processes=2) == run_report([result, result])
 
 
 def test_text_is_escaped(result: Result) -> None:

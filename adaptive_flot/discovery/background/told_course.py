@@ -25,7 +25,6 @@ from adaptive_flot.discovery.background.two_courses import TwoCourses
 from adaptive_flot.discovery.candidates.responses import Responses
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter, at_its_constants
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.background import Background, Course, knots_of_course
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, SearchResult
@@ -34,6 +33,7 @@ from adaptive_flot.discovery.search.rounds import scorer_of
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.rescaled import factors_of, rescaled
+from adaptive_flot.parallel import parallel_map
 
 MOST_SITES = 6
 """Sites at which a second course is fitted: those that explain most to first order."""

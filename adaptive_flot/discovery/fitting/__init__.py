@@ -12,5 +12,4 @@ onsets.py            Whether an event begins at another time.
 unseen_times.py      Times of events that no row that was fitted has seen.
 step_length.py       Steps of the integration that are short enough for the record.
 node_spacing.py      How far apart a densely sampled record may be simulated.
-parallel.py          Independent fits on several processes.
 """

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import one_thread, parallel_map
 from adaptive_flot.discovery.hypotheses.calibration import Calibration, calibrate, excluded_by
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, blocks_of
 from adaptive_flot.discovery.hypotheses.cross_validation import (
@@ -36,6 +35,7 @@ from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.step_size import with_short_steps
+from adaptive_flot.parallel import one_thread, parallel_map
 
 FAR_OPEN = 1.5
 """Standard deviation of the logarithm of a constant from which a fit asks for all derivatives at each step."""

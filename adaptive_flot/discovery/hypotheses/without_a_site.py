@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import (
     AMOUNT,
     BALANCE,
@@ -40,6 +39,7 @@ from adaptive_flot.discovery.hypotheses.judgement import Judged, UsualLoss, With
 from adaptive_flot.discovery.hypotheses.seen import seen_values
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.parallel import parallel_map
 
 LEAVES_MORE = ", and even so the errors stay above those of the reference"
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import EVENTS, Hypothesis
 from adaptive_flot.discovery.hypotheses.plausible import rests_at_edge
 from adaptive_flot.discovery.innovations.filter.refit import Refitter
@@ -20,6 +19,7 @@ from adaptive_flot.discovery.innovations.telling_apart import low_end, told_apar
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray
+from adaptive_flot.parallel import parallel_map
 
 SMALL = 0.15
 """An effect beside another one, that brings less than this share of the gain, is not told."""

@@ -15,12 +15,12 @@ from adaptive_flot.discovery.assessment.verification import verify
 from adaptive_flot.discovery.candidates.catalogue import finer
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, SearchResult
 from adaptive_flot.discovery.search.alternatives import fit_variant, variant_model
 from adaptive_flot.discovery.search.rounds import scorer_of, threshold_of, what_is_left
 from adaptive_flot.greybox.forms.form import FormKind
+from adaptive_flot.parallel import parallel_map
 
 MINOR = 0.5
 """What is left must be less than this share of what the best has gained: else it is the matter, and not beside it."""

@@ -12,7 +12,6 @@ from adaptive_flot.discovery.candidates.direction import nameable
 from adaptive_flot.discovery.candidates.score_test import Score, Scorer
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.effective_samples import correlation_times
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative
@@ -21,6 +20,7 @@ from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, FormKind
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.stepping.stepper import Stepper
+from adaptive_flot.parallel import parallel_map
 
 BEAM = 3
 """Alternatives of one round that the next extends."""

@@ -18,7 +18,6 @@ import numpy as np
 
 from adaptive_flot.discovery.assessment.swings import swing_notes
 from adaptive_flot.discovery.discover import discover
-from adaptive_flot.discovery.fitting.parallel import one_thread
 from adaptive_flot.discovery.fitting.step_length import steps_words
 from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE
@@ -53,6 +52,7 @@ from adaptive_flot.discovery.since_reference.taken_back import (
 from adaptive_flot.discovery.verdict.words.suspects import suspect_notes
 from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.parallel import one_thread
 
 SPENT = "The budget ended before events, effects of other shapes and two effects were looked for."
 NOT_ASKED = "the budget ended before it could be compared with process noise, which may explain as much"

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import further_sites, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_same_part
 from adaptive_flot.discovery.further_sites.wording import NO_SITE, change_in_words
@@ -30,6 +29,7 @@ from adaptive_flot.discovery.innovations.verdicts.event import with_hypotheses
 from adaptive_flot.discovery.results.words import LARGEST_CLASS
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
+from adaptive_flot.parallel import parallel_map
 
 LEAST = 3.0
 """An error so many times its usual one, in the model as it is, asks for a step."""

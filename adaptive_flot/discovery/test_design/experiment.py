@@ -10,12 +10,12 @@ from itertools import combinations
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import SURE, Alternative, Experiment, Pair, Tried
 from adaptive_flot.discovery.test_design.power import power
 from adaptive_flot.discovery.test_design.separation import predictions, separation, stays_near
 from adaptive_flot.discovery.test_design.signals import candidate_tests, input_range, watching
+from adaptive_flot.parallel import parallel_map
 
 TEST_ROWS = 900
 CLOSE = 30.0

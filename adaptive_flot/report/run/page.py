@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from adaptive_flot.files import write_text
+from adaptive_flot.parallel import parallel_map
 from adaptive_flot.report.compare import answer as compared
 from adaptive_flot.report.compare.page import comparison_parts
 from adaptive_flot.report.kit.album import Album
 from adaptive_flot.report.kit.page import Page, made_by, render
-from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Section, Text, present
+from adaptive_flot.report.kit.parts import Bullets, Fact, Heading, Part, Picture, Section, Text, present
 from adaptive_flot.report.kit.wording import joined, seed_list, spaced
 from adaptive_flot.report.run import answer, series
 from adaptive_flot.report.run.chapter import Topic, spread_picture, title, topics
@@ -27,7 +28,7 @@ from adaptive_flot.runner.scenario.scenario import Scenario
 Results = Sequence[tuple[Scenario, Sequence[Run]]]
 
 
-def write_run_report(results: Results, path: Path | str, command: str = "") -> None:
+def write_run_report(results: Results, path: Path | str, command: str = "", processes: int = 1) -> None:
     """Write the report of one or several scenarios as a single HTML file without external parts.
 
     Parameters
@@ -38,11 +39,13 @@ def write_run_report(results: Results, path: Path | str, command: str = "") -> N
         File to write, whole or not at all.
     command
         Command line that made the runs, for the foot.
+    processes
+        Cases that are drawn at once. The page is the same with any number.
     """
-    write_text(Path(path), run_report(results, command))
+    write_text(Path(path), run_report(results, command, processes))
 
 
-def run_report(results: Results, command: str = "") -> str:
+def run_report(results: Results, command: str = "", processes: int = 1) -> str:
     """Return the page that `write_run_report` writes."""
     cases, album = series.cases(results), Album()
     loops = [(compare_runs(s, runs), [c for c in cases if c.scenario is s]) for s, runs in results if _earned(runs)]
@@ -56,7 +59,7 @@ def run_report(results: Results, command: str = "") -> str:
         answer=[*discovered, *(s for c, _ in loops for s in compared.sentences(c)), *answer.sentences(opened)],
         facts=_facts(loops[0][0], discovered) if loops else answer.facts(opened),
         first=_first(loops, opened, album),
-        sections=[*_compared(loops, album), *_sections(cases, album)],
+        sections=[*_compared(loops, album), *_sections(cases, album, processes)],
         made=made_by(command, _made(cases), dict.fromkeys(file for c in cases for file in _files(c.scenario))),
     )
     return render(page, album)
@@ -118,11 +121,17 @@ def _compared(loops: Sequence[tuple[Comparison, list[CaseRuns]]], album: Album) 
     ]
 
 
-def _sections(cases: Sequence[CaseRuns], album: Album) -> list[Section]:
+def _sections(cases: Sequence[CaseRuns], album: Album, processes: int) -> list[Section]:
     """The topics of each case: a chapter each where there is one case, else one chapter a case, with theirs within."""
+
+    def told(i: int) -> tuple[list[Topic], list[Picture]]:
+        own = Album()
+        return [_fits(cases[i], own), *topics(cases[i], own)], own.pictures
+
     sections = []
-    for i, case in enumerate(cases, 1):
-        found = [_fits(case, album), *topics(case, album)]
+    each = parallel_map(told, range(len(cases)), processes)
+    for i, (case, (found, pictures)) in enumerate(zip(cases, each, strict=True), 1):
+        album.pictures += pictures
         if len(cases) == 1:
             sections += [Section(f"part-{k}", t.title, t.inside, t.parts) for k, t in enumerate(found, 1)]
             continue

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from adaptive_flot.discovery.fitting.parallel import available_processes
+from adaptive_flot.parallel import available_processes
 from adaptive_flot.processes.registry import make_model
 from adaptive_flot.runner.commands.discover import discover_file
 

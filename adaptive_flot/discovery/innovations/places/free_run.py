@@ -18,7 +18,6 @@ from adaptive_flot.discovery.assessment.likelihood import loglik_difference_sds
 from adaptive_flot.discovery.candidates.catalogue import nameable, passed_on
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
 from adaptive_flot.discovery.further_sites.wording import as_if, change_in_words
@@ -30,6 +29,7 @@ from adaptive_flot.discovery.verdict.judge import LEAST_MARGIN
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import Model
+from adaptive_flot.parallel import parallel_map
 
 
 def compare_with_what_has_no_site(state: State) -> State:

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.families import EVENTS, SWITCHED
 from adaptive_flot.discovery.innovations.screening import Screened, Screening
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, distinct, worth
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.search.turned_over import with_events_turned_over
+from adaptive_flot.parallel import parallel_map
 
 REFITTED, SAME_SITE = 6, 2
 """Suspects that are refitted, and of these at one site: causes of the whole record, and events."""

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.events.at_times import times_of_switch
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation, worth
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.parallel import parallel_map
 
 SHORT = 0.15
 """Share of the shorter spell beside it below which a pause of an event is short. Of eight right events of several

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import SWITCHED, Hypothesis, Kind
 from adaptive_flot.discovery.hypotheses.joint.known_before import Constants
@@ -20,6 +19,7 @@ from adaptive_flot.greybox.data.dataset import Dataset
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.forms.form import CoefficientRole
 from adaptive_flot.greybox.model import FloatArray, Model
+from adaptive_flot.parallel import parallel_map
 
 SLOW = ("lag", "store")
 """Kinds of effects that the fit of the model as it is hides in its constants: its stores have become larger."""

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.hypotheses.cross_validation import model_with
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.innovations.events.at_times import switch_at
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import SHORT
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.parallel import parallel_map
 
 ABOUT_HALF = 0.4
 """Share of a record from which an event that is there at first may be the usual state. A shorter one must explain

@@ -12,10 +12,10 @@ from adaptive_flot.discovery.candidates.shapes.relays import moves_often
 from adaptive_flot.discovery.candidates.shapes.step_events import refined
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import MOST_STEPS, Fitter
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.alternatives import fit_variant, variant_model
 from adaptive_flot.discovery.search.halving.jobs import FittedJob, Job, ScoredLinearisation
+from adaptive_flot.parallel import parallel_map
 
 TIED = 0.95
 """Share of the best first-order gain from which several may tie."""

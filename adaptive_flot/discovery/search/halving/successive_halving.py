@@ -16,7 +16,6 @@ from dataclasses import replace
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
-from adaptive_flot.discovery.fitting.parallel import parallel_map
 from adaptive_flot.discovery.results import Alternative
 from adaptive_flot.discovery.search.alternatives import effect_bounds
 from adaptive_flot.discovery.search.halving import constants, events, first_rungs, freedom, late, restarts
@@ -25,6 +24,7 @@ from adaptive_flot.discovery.search.halving.jobs import CLOSE_GAIN, ScoredLinear
 from adaptive_flot.discovery.search.halving.refits import Refit
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.rescaled import as_it_came, factors_of, rescaled
+from adaptive_flot.parallel import parallel_map
 
 LEADERS = 4
 """Alternatives that are run at every row in the end."""

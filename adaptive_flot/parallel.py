@@ -1,4 +1,4 @@
-"""Independent fits on several processes, where the system can fork; else one after the other, with the same results."""
+"""Independent work on several processes, where the system can fork; else one after the other, with the same results."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def parallel_map(
         return _forked_map(function, items, min(processes, len(items)), done)
     except BrokenProcessPool as error:
         raise AdaptiveFlotError(
-            "a process of the search ended without a result (not enough memory?); give fewer processes"
+            "a process ended without a result (not enough memory?); give fewer processes"
         ) from error
 
 
