@@ -1,4 +1,4 @@
-"""Short pauses and spells of an event that lasts: chance may part it in two, and an outlier may be told with it."""
+"""Short pauses and spells of an event that lasts: chance may part or end it, and an outlier may be told with it."""
 
 from __future__ import annotations
 
@@ -50,6 +50,12 @@ def has_blip(h: Hypothesis, dt: float) -> bool:
     return bool(spells) and min(spells) <= min(BLIP * dt, SHORT * max(spells))
 
 
+def ends_with_the_record(h: Hypothesis, end: float) -> bool:
+    """Whether an event is over before a record is, which ends at `end` [s], and by much less (SHORT) than it lasts."""
+    begin, long = h.pulses[-1] if h.kind == "switch" else (end, FOREVER)
+    return long < FOREVER and end - (begin + long) < SHORT * long
+
+
 def with_pauses_closed(search: Search, found: Sequence[Explanation]) -> list[Explanation]:
     """Explanations, the best first; what is short of the best ones' events is left out where it gains little."""
     closed = parallel_map(lambda e: without_short_pauses(search, e), found[:ASKED], search.processes)
@@ -59,13 +65,18 @@ def with_pauses_closed(search: Search, found: Sequence[Explanation]) -> list[Exp
 def without_short_pauses(search: Search, explanation: Explanation) -> Explanation:
     """The explanation, its event without what is short and gains less than LEAST_GAIN beside its numbers.
 
-    That is a pause, or a blip. An outlier of a gauge was told as a leak of two rows, before the one that stayed.
+    That is a pause, a blip, or the end before that of the record. An outlier of a gauge was told as a leak of two rows,
+    before the one that stayed; a brine that is weaker from some time on, as if it were so until four rows before the end.
     """
-    dt = search.record.dt
-    parted = next((h for h in explanation.hypotheses if has_short_pause(h) or has_blip(h, dt)), None)
+    dt, end = search.record.dt, float(search.record.time[-1])
+
+    def has_short_part(h: Hypothesis) -> bool:
+        return has_short_pause(h) or has_blip(h, dt) or ends_with_the_record(h, end)
+
+    parted = next((h for h in explanation.hypotheses if has_short_part(h)), None)
     if parted is None or search.time_is_up:
         return explanation
-    whole, rest = _whole(parted, dt), search.without(explanation, parted)
+    whole, rest = _whole(parted, dt, end), search.without(explanation, parted)
     model, extended = search.model_of(explanation), model_with(search.model_of(rest), whole)
     held = {whole.effect.parameter(c) for c in whole.effect.coefficients} - set(whole.parameters)  # its times
     known = {q.name: q.value for q in model.parameters if q.name not in held}
@@ -74,8 +85,8 @@ def without_short_pauses(search: Search, explanation: Explanation) -> Explanatio
     return again if again.criterion > explanation.criterion - LEAST_GAIN else explanation
 
 
-def _whole(parted: Hypothesis, dt: float) -> Hypothesis:
-    """The event without its blips, and with its short pauses closed."""
+def _whole(parted: Hypothesis, dt: float, end: float) -> Hypothesis:
+    """The event without its blips, with its short pauses closed, and up to the end of the record if nearly so."""
     longest = max(long for _, long in parted.pulses)
     lasting = [(begin, long) for begin, long in parted.pulses if long > min(BLIP * dt, SHORT * longest)]
     spells = [list(lasting[0])]
@@ -85,6 +96,8 @@ def _whole(parted: Hypothesis, dt: float) -> Hypothesis:
             last[1] = begin + long - last[0]
         else:
             spells.append([begin, long])
+    if ends_with_the_record(parted, end) and spells[-1][0] + spells[-1][1] == sum(parted.pulses[-1]):
+        spells[-1][1] = FOREVER
     told = times_of_switch([(begin, min(long, FOREVER)) for begin, long in spells])
     settings = {**parted.effect.settings, "count": float(len(spells))}
     return replace(parted, effect=replace(parted.effect, coefficients=told, settings=settings))

@@ -36,11 +36,13 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
     two_and_more,
 )
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
+from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
 from adaptive_flot.discovery.results.words import TELLING, WITH_A_NAME
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.large_drift import unexpected_drift
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
+from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.discovery.verdict.words.wording import beside_a_part
 from adaptive_flot.greybox.model import Model
 
@@ -93,7 +95,7 @@ def tell(state: State, search: Search, base: Explanation, told: Told, among: boo
         error=error,
         contradiction="",
         certain=beside_a_part(replace(state.judged, part=names)).rstrip() if beside and left else "",
-        sentence=told_in_words(search, told) + (_over_words(over) if stands else ""),
+        sentence=told_in_words(search, told) + (_over_words(over, problem) if stands else ""),
     )
 
 
@@ -232,9 +234,14 @@ def _over_stretches(state: State, search: Search, base: Explanation, best: Expla
     return errors_over_stretches(search, base, best, held_out, report)
 
 
-def _over_words(changes: tuple[OutputChange, ...]) -> str:
+def _over_words(changes: tuple[OutputChange, ...], problem: Problem) -> str:
+    """Errors over stretches, and why those of free runs may be alike: a course may take an event up."""
     said = ", ".join(c.words for c in changes)
-    return f" Error on held-out stretches, each predicted from the filter's state before it: {said}."
+    words = f" Error on held-out stretches, each predicted from the filter's state before it: {said}."
+    if problem.background is None or problem.background.course is None:
+        return words
+    site = spaced(problem.background.course.site)
+    return f"{words} Both free runs have a {site} that wanders, which may take the event up."
 
 
 def _free_run(state: State, search: Search, explanation: Explanation, before: Fit) -> Fit | None:
