@@ -24,14 +24,15 @@ from tests.studies.conftest import WriteStudy
 PROGRAM = str(Path(sys.executable).with_name("adaptive-flot"))
 SEEDS = 16
 PATIENCE_S = 120.0
-# a run takes a while on any machine, so that a kill falls into the middle of the study
-SLOW = """
-import time
+SECONDS = "SECONDS_OF_A_RUN"
+"""Name of the variable that says how long a run takes at least: where a kill is to fall into the middle of the study."""
+SLOW = f"""
+import os, time
 from estimators.fixed import Fixed
 
 class Slow(Fixed):
     def init(self, prior):
-        time.sleep(0.2)
+        time.sleep(float(os.environ.get("{SECONDS}", "0")))
         return super().init(prior)
 """
 
@@ -44,12 +45,13 @@ def _heed_interrupts() -> None:
 class Sweep:
     """A sweep as a process of its own."""
 
-    def __init__(self, folder: Path, *options: str) -> None:
+    def __init__(self, folder: Path, *options: str, seconds: float = 0.2) -> None:
         self.out = folder / "out"
         command = [PROGRAM, "sweep", "study.yaml", "--out", "out", *options]
         self.process = subprocess.Popen(
             command,
             cwd=folder,
+            env={**os.environ, SECONDS: str(seconds)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -81,7 +83,7 @@ class Sweep:
 
 @pytest.fixture
 def slow(write_study: WriteStudy, tmp_path: Path) -> Path:
-    """Folder of a study of 16 runs that take at least 0.2 s each."""
+    """Folder of a study of 16 runs."""
     (tmp_path / "slow.py").write_text(SLOW)
     write_study({"estimators": {"slow": {"use": "slow:Slow"}}, "seeds": {"count": SEEDS}})
     return tmp_path
@@ -115,7 +117,7 @@ def test_killed_worker_ctrl_c_and_killed_main_process(slow: Path, undisturbed: p
     more = second.done()
     assert len(set(more)) == len(more) < SEEDS and set(kept) < set(more)
 
-    third = Sweep(slow, "--workers", "1")
+    third = Sweep(slow, "--workers", "1", seconds=0.0)
     code, out, err = third.end()
     assert code == 0, err
     assert f"{SEEDS} runs, {len(more)} of them from before" in " ".join(out.split())
@@ -154,7 +156,8 @@ def _real_cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]
         [dask, "scheduler", "--port", str(port), *here],
         [dask, "worker", address, "--nthreads", "1", "--no-nanny", *here],
     ]
-    processes = [subprocess.Popen(command, cwd=folder, **quiet) for command in commands]  # type: ignore[call-overload]
+    env = {**os.environ, SECONDS: "0.2"}  # of the worker, in which runs are made
+    processes = [subprocess.Popen(command, cwd=folder, env=env, **quiet) for command in commands]  # type: ignore[call-overload]
     try:
         yield address, processes[0]
     finally:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,15 @@ def test_an_alarm_starts_a_search_whose_verdict_is_said(watched: Link) -> None:
     assert words[-1].endswith("with 150 rows, 0 effects"), "no record is longer than asked"
 
 
+@pytest.fixture
+def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Searches run in a thread: a process of their own takes seconds to start, and the other tests have one."""
+    with ThreadPoolExecutor(1) as pool:
+        monkeypatch.setattr(LiveDiscovery, "_executor", lambda self: pool)
+        yield
+
+
+@pytest.mark.usefixtures("in_a_thread")
 def test_a_few_lost_samples_are_rows_without_values_and_no_new_beginning(watched: Link) -> None:
     discovery = LiveDiscovery(watched, judge)
     try:
