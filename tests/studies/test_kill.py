@@ -25,7 +25,7 @@ PROGRAM = str(Path(sys.executable).with_name("adaptive-flot"))
 SEEDS = 16
 PATIENCE_S = 120.0
 SECONDS = "SECONDS_OF_A_RUN"
-"""Name of the variable that says how long a run takes at least: where a kill is to fall into the middle of the study."""
+"""Name of the variable that says how long a run takes at least, where a kill is to fall into the middle of a study."""
 SLOW = f"""
 import os, time
 from estimators.fixed import Fixed

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -84,6 +85,12 @@ def record(
     return Dataset("basin", DT * np.arange(ROWS, dtype=float), DT, np.column_stack([flow, feed]), seen[:, None])
 
 
+@cache
+def fresh_water(seed: int) -> tuple[Search, Explanation, Told]:
+    """What is told of water that runs for a third of the record; two tests ask what comes of it."""
+    return judged(record(seed, fresh=6.0))
+
+
 def judged(data: Dataset) -> tuple[Search, Explanation, Told]:
     model = basin()
     search = Search(model, data, (0,), noise_floor([data], (0,)), ("volume",))
@@ -94,7 +101,7 @@ def judged(data: Dataset) -> tuple[Search, Explanation, Told]:
 
 @pytest.mark.parametrize("seed", [2])
 def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
-    search, base, told = judged(record(seed, fresh=6.0))
+    search, base, told = fresh_water(seed)
     assert any(h.kind == "switch" for h in told.effects), "without the rule an event at a site is told"
     kept = unless_without_a_site(search, base, told)
     assert kept.word == "abstain" and not kept.effects
@@ -104,7 +111,7 @@ def test_fresh_water_that_nobody_measures_is_no_probe(seed: int) -> None:
 
 
 def test_what_wanders_at_a_place_without_a_site_is_no_event_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    search, base, told = judged(record(2, fresh=6.0))
+    search, base, told = fresh_water(2)
     monkeypatch.setattr(row_by_row, "wanders", lambda further, explanation, event, gain: True)
     kept = unless_without_a_site(search, base, told)
     assert kept.word == "abstain" and "so that it wanders" in kept.why and NO_SITE not in kept.why
