@@ -44,6 +44,8 @@ def extended(model: Model) -> Model:
 def test_estimator_with_an_extended_model(name: str, extended: Model) -> None:
     """All checks of the kit, with n, C and the exponent of the effect adapted."""
     address, options = ESTIMATOR_CASES[name]
+    if name == "mhe":
+        options = {"window_s": 6, "solve_every_s": 4}  # each interval of the window has the whole extended model
     names = ("growth_exponent", "coalescence_rate", EXPONENT)
     case = estimator_case(load(address, ESTIMATORS, "estimator"), model=extended, parameters=names, **options)
     for check in ESTIMATOR_CHECKS:

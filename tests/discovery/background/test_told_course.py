@@ -96,7 +96,7 @@ def searched(measured: Dataset, processes: int = 1) -> tuple[Problem, SearchResu
 
 def test_an_exchange_that_wanders_is_found_beside_the_room() -> None:
     """The circulation is a factor of it, so that the two are one; nothing else comes near."""
-    _, nothing, result = searched(record(OFF, wander=2.0, exchange=0.8, seed=2))
+    _, _, result = searched(record(OFF, wander=2.0, exchange=0.8, seed=2))
     assert {a.names[0] for a in result.alternatives[:2]} == {("exchange", "time"), ("circulation", "time")}
     assert all(a.delta_bic > result.alternatives[0].delta_bic + LEAST_EVIDENCE for a in result.alternatives[2:])
     parted = searched(record(OFF, wander=2.0, exchange=0.8, seed=2), processes=2)[2]  # a fit comes without its model
