@@ -187,7 +187,7 @@ def test_constants_that_may_not_move_change_no_fit() -> None:
     assert again.loss == pytest.approx(plain.loss, abs=0.5)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1])
 def test_an_effect_beside_constants_that_are_off_is_named(seed: int) -> None:
     found = discover(jacketed_tank(), record(0.05, exponent=0.5, seed=seed))
     assert found.verdict.word == "named", found.verdict.reason
