@@ -87,12 +87,21 @@ def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("in_a_thread")
 def test_a_few_lost_samples_are_rows_without_values_and_no_new_beginning(watched: Link) -> None:
-    discovery = LiveDiscovery(watched, judge)
+    lost, records = (20, 21, 50, 80), list[Dataset]()
+
+    def keep(link_file: Path, record: Dataset, effects: tuple[Effect, ...]) -> Finding:
+        records.append(record)
+        return judge(link_file, record, effects)
+
+    discovery = LiveDiscovery(watched, keep)
     try:
-        words = said(discovery, watched, offset=2.0, rows=130, lost=(20, 21, 50, 80))
+        words = said(discovery, watched, offset=2.0, rows=130, lost=lost)
     finally:
         discovery.close()
     assert words[-1].startswith("search ended") and "with 100 rows" in words[-1]
+    (record,) = records
+    assert np.flatnonzero(np.isnan(record.outputs).all(axis=1)).tolist() == list(lost)
+    np.testing.assert_allclose(np.diff(record.time), watched.scenario.dt)
 
 
 def test_a_long_gap_begins_a_new_record(watched: Link) -> None:
