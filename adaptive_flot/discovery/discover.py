@@ -51,8 +51,8 @@ from adaptive_flot.parallel import one_thread
 
 SEARCH_SHARE = 0.7
 """Share of a budget that the search may take; the rest is for the last fits, the report and the proposed test."""
-MOST_AGAIN = 2
-"""How often a search is begun again in shorter steps, which what it has found asks for."""
+MOST_AGAIN = 3
+"""How often a search is begun again, in shorter steps or with inputs moved by a row: what it has found asks for it."""
 
 
 @one_thread()
@@ -115,22 +115,21 @@ def discover(
         now = time.monotonic()
         state = replace(state, ends=now + budget, search_ends=now + SEARCH_SHARE * budget)
     ended, verdict = _run(state)
+    moved: Dataset | None = None
     for _ in range(MOST_AGAIN):
         finer = _finer(ended, verdict)
-        if finer is None or time.monotonic() > state.search_ends:
+        later = with_later_inputs(ended, verdict) if moved is None else None
+        if (finer is None and later is None) or time.monotonic() > state.search_ends:
             break
-        progress("once more, in shorter steps")
-        noted = replace(record, notes=(*record.notes, *steps_words(model, finer)))
-        screening = Screening(noted, (), ())
-        ended, verdict = _run(replace(state, model=finer, screening=screening, steps_stay=True))
-    else:
-        finer = _finer(ended, verdict)
+        asked = {"in shorter steps": finer, "with inputs moved by a row": later}
+        progress(f"once more, {' and '.join(how for how, what in asked.items() if what is not None)}")
+        moved = moved if later is None else later
+        own, read = ended.model if finer is None else finer, record if moved is None else moved
+        noted = replace(read, notes=(*read.notes, *steps_words(model, own)))
+        ended, verdict = _run(replace(state, model=own, screening=Screening(noted, (), ()), steps_stay=True))
+    finer = _finer(ended, verdict)
     if finer is not None:
         verdict = _taken_back(verdict, finer)
-    later = with_later_inputs(ended, verdict)
-    if later is not None and time.monotonic() < state.search_ends:
-        progress("once more, with inputs moved by a row")
-        ended, verdict = _run(replace(state, model=ended.model, screening=Screening(later, (), ()), steps_stay=True))
     verdict = _unless_cut_short(verdict)
     return ended.ended(replace(verdict, seconds=time.perf_counter() - began))
 

@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adaptive_flot.discovery.discover import STAGES, discover
-from adaptive_flot.discovery.innovations.verdicts.second_opinion import second_opinion
+from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.record.moved_inputs import MOVED
 from adaptive_flot.discovery.verdict.words.curve import effect_curves
 from adaptive_flot.discovery.verdict.words.sizes import words_of_effects
@@ -74,13 +73,8 @@ def record(cubic: float, rows: int = ROWS) -> Dataset:
     return Dataset("oscillator", DT * np.arange(rows, dtype=float), DT, voltage[:, None], seen[:, None])
 
 
-def test_inputs_that_act_a_row_later_than_the_record_says_are_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A logger writes an input with what was measured when it was given. A drive that "answers late" was told.
-
-    A second opinion is not asked: it takes two thirds of the time, and what the free run tells is what this is about.
-    """
-    stages = tuple(stage for stage in STAGES if stage is not second_opinion)
-    monkeypatch.setattr("adaptive_flot.discovery.discover.STAGES", stages)
+def test_inputs_that_act_a_row_later_than_the_record_says_are_no_effect() -> None:
+    """A logger writes an input with what was measured when it was given. A drive that "answers late" was told."""
     there = record(0.0, 200)
     logged = replace(there, inputs=np.vstack([there.inputs[1:], there.inputs[-1:]]))
     verdict = discover(oscillator(), logged).verdict

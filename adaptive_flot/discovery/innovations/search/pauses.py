@@ -65,8 +65,8 @@ def with_pauses_closed(search: Search, found: Sequence[Explanation]) -> list[Exp
 def without_short_pauses(search: Search, explanation: Explanation) -> Explanation:
     """The explanation, its event without what is short and gains less than LEAST_GAIN beside its numbers.
 
-    That is a pause, a blip, or the end before that of the record. An outlier of a gauge was told as a leak of two rows,
-    before the one that stayed; a brine that is weaker from some time on, as if it were so until four rows before the end.
+    That is a pause, a blip, or an end before that of the record. An outlier of a gauge was told as a leak of two rows,
+    before the one that stayed. A brine was weaker from some time on, and told so up to four rows before the end.
     """
     dt, end = search.record.dt, float(search.record.time[-1])
 

@@ -27,6 +27,8 @@ from adaptive_flot.greybox.effects import Effect
 from tests.discovery.innovations.verdicts.test_without_a_site import judged, record
 
 PROBE = 0.85
+SHORTEST = 10
+"""Rows at the end below which what follows an event here is none."""
 
 
 def switched(*spells: tuple[float, float]) -> Hypothesis:
@@ -115,6 +117,20 @@ def test_a_pause_that_is_not_there_is_closed_and_one_that_is_stays() -> None:
     parted = fitted(search, base, switched((2000.0, 1100.0), (3220.0, 780.0)))
     with np.errstate(all="ignore"):
         assert without_short_pauses(search, parted) is parted
+
+
+@pytest.mark.parametrize("rows", [3, 30])
+def test_an_event_that_ends_just_before_the_record_lasts_unless_the_rows_after_it_say_so(rows: int) -> None:
+    """A brine was weaker "from 12020 to 21920 s", four rows before the end of a record in which it stayed so."""
+    data = record(2)
+    begin, end = 2000.0, float(data.time[-1]) - rows * data.dt
+    over = data.time >= (end if rows > SHORTEST else np.inf)
+    data.outputs[(data.time >= begin) & ~over] *= PROBE
+    search, base, _ = judged(data)
+    ended = fitted(search, base, switched((begin, end - begin)))
+    with np.errstate(all="ignore"):
+        told = without_short_pauses(search, ended)
+    assert told.hypotheses[0].pulses == (((begin, FOREVER),) if rows <= SHORTEST else ended.hypotheses[0].pulses)
 
 
 @pytest.mark.parametrize(("beside", "word"), [(None, "abstain"), ("rate of salt", "named")])
