@@ -28,6 +28,7 @@ from typing import TypeVar
 import casadi as ca
 from platformdirs import user_cache_path
 
+from adaptive_flot.greybox.stepping.compiling.kept import tidy, used
 from adaptive_flot.greybox.stepping.compiling.safe_folder import make_private, problem_of
 
 FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
@@ -135,7 +136,9 @@ def load_library(name: str, source: str | Written, flags: Sequence[str], load: C
         _check_safe(library)
         # an unfinished library is never there, but a disk may have lost part of one
         with suppress(RuntimeError, OSError):
-            return load(library)
+            loaded = load(library)
+            used(library)
+            return loaded
     _build(source, compiler, flags, library)
     _check_safe(library)
     try:
@@ -164,7 +167,7 @@ def _check_safe(path: Path, levels: int = CACHE_LEVELS) -> None:
 
 
 def cache_folder() -> Path:
-    """Folder of compiled functions; deleting it costs nothing but the time to compile again."""
+    """Folder of compiled functions, those used last; deleting it costs nothing but the time to compile again."""
     return user_cache_path("adaptive-flot", appauthor=False) / "compiled"
 
 
@@ -212,6 +215,7 @@ def _build(source: str | Written, compiler: Compiler, flags: Sequence[str], libr
             _run([*compiler.command, *flags, str(code), "-o", str(made), "-lm"], library.name)
             made.chmod(0o700)
             made.replace(library)
+        tidy(library.parent)
     except OSError as error:
         reason = error.strerror or str(error)
         raise CompileError(f"compiled functions can not be kept in {library.parent} ({reason})") from error
