@@ -8,4 +8,5 @@ least_shown.py  How small a change the record shows.
 beam.py         The explanations, found effect by effect.
 turned_over.py  Events that are there from the first row on.
 pauses.py       What is short of an event that lasts: a pause, or a blip.
+walking.py      Whether an event that comes again and again is a quantity that wanders.
 """

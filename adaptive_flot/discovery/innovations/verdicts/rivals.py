@@ -14,6 +14,7 @@ from adaptive_flot.discovery.innovations.given_up import WANDERS, changes_within
 from adaptive_flot.discovery.innovations.search.explanation import LEAST_GAIN, Explanation
 from adaptive_flot.discovery.innovations.search.pauses import is_hardly_off
 from adaptive_flot.discovery.innovations.search.search import Search
+from adaptive_flot.discovery.innovations.search.walking import comes_again, gain_of_a_walk, told_once
 from adaptive_flot.discovery.innovations.telling_apart import NEAR
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.record.robust import clipped_std, noise_by_differences
@@ -30,6 +31,9 @@ MUCH = 100.0
 """Fall of the Bayesian information criterion by which an alternative explains much; half of it where the model errs."""
 ERRS = 1.5
 """Times the noise from row to row from which the model as it is surely errs."""
+ONCE = 1 / (1 + WANDERS)
+"""Share of the gain of an event that comes again and again which a single spell has: further ones have less than
+WANDERS of that."""
 TREND = 100.0
 """Gain of log-likelihood below which a change that lasts to the end of a record may be slow wandering."""
 
@@ -201,12 +205,21 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     An event is there or not. What wanders goes up and down all the time, and the largest of its swings looks like one:
     beside that, a further switch at the site gains about as much (WANDERS). A switch is found where it gains
     LEAST_GAIN, so an event that gains less than LEAST_GAIN / WANDERS can not be told from what wanders.
+
+    One that comes again and again is held against a random walk (see `walking`). Where that explains as much, a single
+    spell that explains most of it (ONCE) is told in its place, or nothing.
     """
     event = next((h for h in told.best.hypotheses if _begins(h) and h in told.effects), None)
     if told.word not in WITH_A_NAME or event is None:
         return told
     rest = base if len(told.best.hypotheses) == 1 else search.without(told.best, event)
     gain = told.best.criterion - rest.criterion
+    if comes_again(event) and gain_of_a_walk(search, told.best, rest, event) > gain - LEAST_GAIN:
+        once = _with_single_spells(search, base, told)
+        if once is None:
+            why = f"{event.site} changes again and again, as what wanders does"
+            return replace(told, word="abstain", certain=(), open=(), why=why)
+        return once
     if WANDERS * gain < LEAST_GAIN:
         why = f"{event.site} changes so little that what wanders may do it: no search would find a further such change"
     elif wanders(search, told.best, event, gain):
@@ -214,6 +227,35 @@ def unless_it_wanders(search: Search, base: Explanation, told: Told) -> Told:
     else:
         return told
     return replace(told, word="abstain", certain=(), open=(), why=why)
+
+
+def _with_single_spells(search: Search, base: Explanation, told: Told) -> Told | None:
+    """The same, each event that comes again and again there once; None where that explains less than ONCE of it."""
+
+    def single(explanation: Explanation) -> Explanation | None:
+        event = next((h for h in explanation.hypotheses if comes_again(h)), None)
+        if event is None:
+            return explanation
+        rest = base if len(explanation.hypotheses) == 1 else search.without(explanation, event)
+        once = told_once(search, explanation, rest, event)
+        least = ONCE * (explanation.criterion - rest.criterion)
+        return once if once is not None and once.criterion - rest.criterion >= least else None
+
+    def same(h: Hypothesis, explanation: Explanation) -> Hypothesis:
+        return next(own for own in explanation.hypotheses if own.effect.label == h.effect.label)
+
+    opened = []
+    for explanation, h in told.open:
+        once = single(explanation)
+        if once is None:
+            return None
+        opened.append((once, same(h, once)))
+    best = opened[0][0] if opened else single(told.best)
+    if best is None:
+        return None
+    certain = tuple(same(h, best) for h in told.certain)
+    alike = tuple(e for e, _ in opened) or (best,)
+    return replace(told, best=best, certain=certain, open=tuple(opened), alike=alike)
 
 
 def unless_a_trend(base: Explanation, told: Told) -> Told:
