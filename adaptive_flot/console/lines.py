@@ -83,10 +83,12 @@ def print_verdict(verdict: Verdict, level: str = "noise") -> None:
         rows = []
         for c in verdict.error:
             low, high = (number(100 * r, ".0f") for r in c.reduction95)
-            errors = (f"{c.before:.4g}", f"{c.after:.4g}", f"{c.noise:.4g}", f"{low} to {high}")
-            rows.append((c.output, c.unit, *errors))
+            before, after = (c.size(error, f"{error:.4g}") for error in (c.before, c.after))
+            rows.append((c.output, c.unit, before, after, f"{c.noise:.4g}", f"{low} to {high}"))
         header = ("output", "unit", "before", "after", level, "reduction [%], 95 % interval")
         print_table(console, Content("", header, tuple(rows), words=2), title)
+        if verdict.about_errors:
+            console.print(verdict.about_errors, highlight=False)
     if verdict.experiment is not None:
         console.print(f"{verdict.experiment}", highlight=False)
     console.file.flush()

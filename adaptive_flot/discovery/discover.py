@@ -125,8 +125,7 @@ def discover(
         progress(f"once more, {' and '.join(how for how, what in asked.items() if what is not None)}")
         moved = moved if later is None else later
         own, read = ended.model if finer is None else finer, record if moved is None else moved
-        noted = replace(read, notes=(*read.notes, *steps_words(model, own)))
-        ended, verdict = _run(replace(state, model=own, screening=Screening(noted, (), ()), steps_stay=True))
+        ended, verdict = _run(_in_steps_of(replace(state, screening=Screening(read, (), ())), own))
     finer = _finer(ended, verdict)
     if finer is not None:
         verdict = _taken_back(verdict, finer)
@@ -135,13 +134,40 @@ def discover(
 
 
 def _run(state: State) -> tuple[State, Verdict]:
-    """All stages: what was worked out, and the verdict."""
-    for stage in STAGES:
-        outcome = stage(state)
+    """All stages: what was worked out, and the verdict.
+
+    The first ones once more in shorter steps where the best single effect asks for these: what is found in the end then
+    asks for them, too, and all stages would be for nothing.
+    """
+    given, again, ahead = state, True, list(STAGES)
+    while ahead:
+        outcome = ahead.pop(0)(state)
         if isinstance(outcome, Verdict):
             return state, outcome
         state = outcome
+        if again and state.first is not None:
+            again, finer = False, _finer_for_one(state)
+            if finer is not None and time.monotonic() < state.search_ends:
+                state.progress("once more, in shorter steps")
+                state, ahead = _in_steps_of(given, finer), list(STAGES)
     raise AssertionError("the last stage gives a verdict")
+
+
+def _in_steps_of(state: State, model: Model) -> State:
+    """A state before the first stage, with the steps of a model, which stay, and a note on these."""
+    record = state.screening.record
+    notes = dict.fromkeys((*record.notes, *steps_words(state.model, model)))
+    noted = Screening(replace(record, notes=tuple(notes)), (), ())
+    return replace(state, model=model, screening=noted, steps_stay=True)
+
+
+def _finer_for_one(state: State) -> Model | None:
+    """The model with steps as short as the best single effect asks for; None where it has them (see `_finer`)."""
+    best = next(iter(state.first.round.alternatives), None) if state.first is not None else None
+    if best is None or any(e.driver == "time" for e in best.effects):
+        return None
+    finer = steps_for(state.known_problem, state.model, best.fit)
+    return None if finer is state.model else finer
 
 
 def _finer(state: State, verdict: Verdict) -> Model | None:

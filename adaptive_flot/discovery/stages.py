@@ -107,6 +107,7 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     said += wrong_start(base.model, problem.record, *start, problem.columns, np.maximum(noise, problem.floor))
     if not state.adapted:
         said += (NONE_FITTED,)
+    said += at_the_end_of_their_range(base)
     measured = [state.model.outputs[c].name for c in problem.columns]
     doubtful = where_noise_changes(problem.noise_changes, measured, problem.record.time)
     said += tuple(f"{each}: rows with more noise count less" for each in doubtful)
@@ -116,6 +117,26 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     problem = replace(problem, deadline=min(problem.deadline, state.ends - FINAL_SHARE * took))
     state = replace(state, model=model, screening=screening, problem=problem, base_seconds=took)
     return replace(state, base=base, responses=responses)
+
+
+def at_the_end_of_their_range(base: Fit) -> tuple[str, ...]:
+    """Notes on constants that the fit of the model as it is has moved to where they end.
+
+    At a lower end of zero all that they multiply is zero, and no factor on it changes anything: a leak that opened
+    later could not be found at a leak of zero.
+    """
+    said = []
+    for name, value in zip(base.names, map(float, base.values), strict=True):
+        q = base.model.parameters[base.model.index("parameters", name)]
+        lower = value <= q.lower
+        if not lower and value < q.upper:
+            continue
+        advice = "give it a lower end above zero" if lower and q.lower == 0 else "widen the range if it may lie beyond"
+        why = ", so that nothing that it multiplies can change" if value == 0 else ""
+        said.append(
+            f"{q.label} is fitted at the {'lower' if lower else 'upper'} end of its range, {value:g}{why}: {advice}"
+        )
+    return tuple(said)
 
 
 def check_explained(state: State) -> State | Verdict:

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.further_sites.places import AMOUNT, BALANCE, DRAG, LOSS, RATE, READING, loss_size
-from adaptive_flot.discovery.results.words import short
+from adaptive_flot.discovery.results.words import NO_SITE, short
 from adaptive_flot.greybox.model import Model
 
-NO_SITE = "the model has no site for that"
 MOST_SAID = 3
 """So many of what is not told apart are said."""
 

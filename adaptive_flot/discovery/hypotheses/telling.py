@@ -8,7 +8,6 @@ from itertools import groupby
 
 import numpy as np
 
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.calibration import Calibration
 from adaptive_flot.discovery.hypotheses.comparison import Blocks, reduction, rms
 from adaptive_flot.discovery.hypotheses.cross_validation import Tested, model_with
@@ -19,7 +18,7 @@ from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.record.robust import AT_NOISE
 from adaptive_flot.discovery.record.slip_jump import band_ranges
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
-from adaptive_flot.discovery.results.words import NORMAL95, WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, NORMAL95, WITH_A_NAME
 from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.search.explanation import Explanation
 from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results import NamedEffect
+from adaptive_flot.discovery.results.words import NO_SITE
 from adaptive_flot.discovery.verdict.words.sizes import words_of_effect
 
 

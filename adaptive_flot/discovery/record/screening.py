@@ -32,6 +32,8 @@ LEAST_OF_SCALE = 0.1
 """The same for a temperature, as a share of its scale: shares of its value depend on the unit."""
 OUTLIER_SHARE = 0.15
 """Share of samples far outside from which a signal is an outlier storm."""
+MOST_STOPS = 3
+"""An input that stands still more often is held in between, as a set-point is: it says nothing of a sensor."""
 MOST_UNRECORDED = 3
 """More holes than these are how the record is, and say nothing of one place."""
 NEIGHBOURS = 9
@@ -123,7 +125,8 @@ def clean_outputs(record: Dataset, model: Model) -> tuple[Dataset, tuple[str, ..
         ]
     for q, u in zip(model.inputs, record.inputs.T, strict=True):
         stopped = _frozen(u) & (u > u.min()) & (u < u.max()) & (u != 0)  # a valve may stay shut, a battery at rest
-        for a, b in runs_of(stopped, FROZEN_ROWS) if stopped.mean() < MOST_FROZEN else ():
+        stops = runs_of(stopped, FROZEN_ROWS)
+        for a, b in stops if stopped.mean() < MOST_FROZEN and len(stops) <= MOST_STOPS else ():
             suspects.append(Suspect(float(record.time[a]), float(record.time[b - 1]), f"{q.name} stands still"))
             notes.append(f"{suspects[-1]}, where it else changes from row to row: a sensor that had stopped?")
     suspects += _unrecorded(record)

@@ -108,6 +108,10 @@ class Location:
         return {"outputs": list(self.outputs), "places": rows(self.places), "causes": rows(self.causes)}
 
 
+RUNS_AWAY = 1e6
+"""Times the noise from which an error is no number to compare: the free run has left all bounds."""
+
+
 @dataclass(frozen=True)
 class OutputChange:
     """Free-run error of one output on one split: before, after, its noise, and a 95 % interval of the reduction."""
@@ -129,8 +133,12 @@ class OutputChange:
     @property
     def words(self) -> str:
         """Output and errors before and after, once where they are the same, without a unit where there is none."""
-        changed = "" if self.after == self.before else f" -> {short(self.after)}"
-        return f"{self.output} {short(self.before)}{changed} {self.unit}".rstrip(" -")
+        changed = "" if self.after == self.before else f" -> {self.size(self.after, short(self.after))}"
+        return f"{self.output} {self.size(self.before, short(self.before))}{changed} {self.unit}".rstrip(" -")
+
+    def size(self, error: float, number: str) -> str:
+        """One of the two errors: its number, or that the run leaves all bounds, as one that empties a tank may do."""
+        return number if error < RUNS_AWAY * max(self.noise, 1e-300) else "runs away"
 
 
 @dataclass(frozen=True)

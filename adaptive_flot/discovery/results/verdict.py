@@ -13,7 +13,7 @@ from adaptive_flot.discovery.results.alternatives import Judgement, SearchResult
 from adaptive_flot.discovery.results.evidence import Detection, Location, OutputChange
 from adaptive_flot.discovery.results.experiment import Experiment
 from adaptive_flot.discovery.results.least_shown import LeastShown
-from adaptive_flot.discovery.results.words import Word
+from adaptive_flot.discovery.results.words import NO_SITE, NOTHING_ADDED, Word
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 
@@ -105,6 +105,12 @@ class Verdict:
     def sites(self) -> frozenset[str]:
         """Sites of what is named, and of every member of a class."""
         return frozenset(e.effect.site for e in self.effects) | frozenset(site for site, _ in self.members)
+
+    @property
+    def about_errors(self) -> str:
+        """A word on errors that are the same before and after; empty where none is needed."""
+        alike = bool(self.error) and all(c.after == c.before for c in self.error)
+        return NOTHING_ADDED if alike and NO_SITE in self.reason else ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the machine-readable verdict."""

@@ -16,6 +16,10 @@ NORMAL95 = 1.96
 """Standard deviations on either side of an estimate that hold 95 % of a normal distribution."""
 ONE_CAUSE = "One cause that acts at several places looks like that, and the catalogue has none"
 """Why several changes with one course are not told."""
+NO_SITE = "the model has no site for that"
+"""What is said of something that acts where the model has no site,"""
+NOTHING_ADDED = "Before and after are alike: what acts there has no site, so that nothing was added to the model."
+"""and of its errors."""
 DRIFTS = "Something changes with time."
 """How the reason of an abstention begins where a constant drifts far that the model does not say to drift."""
 

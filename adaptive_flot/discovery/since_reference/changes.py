@@ -19,7 +19,6 @@ import numpy as np
 from adaptive_flot.discovery.assessment.swings import swing_notes
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.fitting.step_length import steps_words
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS, STRUCTURE
 from adaptive_flot.discovery.hypotheses.procedure import Comparison, compare
 from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL
@@ -35,7 +34,7 @@ from adaptive_flot.discovery.innovations.verdicts.event import with_event
 from adaptive_flot.discovery.innovations.verdicts.rivals import unless_a_trend, unless_hardly_off
 from adaptive_flot.discovery.record.screening import clean_outputs, out_of_range
 from adaptive_flot.discovery.results.least_shown import what_is_hidden, what_is_shown
-from adaptive_flot.discovery.results.words import WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, WITH_A_NAME
 from adaptive_flot.discovery.since_reference.not_new import why_not_new
 from adaptive_flot.discovery.since_reference.places import with_what_is_nearest, with_words_without_a_site
 from adaptive_flot.discovery.since_reference.process_noise import Looked, with_process_noise

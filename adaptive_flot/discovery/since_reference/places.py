@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
-from adaptive_flot.discovery.further_sites.wording import NO_SITE, as_if
+from adaptive_flot.discovery.further_sites.wording import as_if
 from adaptive_flot.discovery.hypotheses.comparison import rms
 from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows, fitted_and_tested
 from adaptive_flot.discovery.hypotheses.families import Hypothesis
@@ -25,7 +25,7 @@ from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts.rivals import explains_too_little
-from adaptive_flot.discovery.results.words import WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, WITH_A_NAME
 from adaptive_flot.discovery.since_reference.taken_back import taken_back
 
 REFITTED = 12

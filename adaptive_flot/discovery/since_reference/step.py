@@ -15,7 +15,7 @@ import numpy as np
 
 from adaptive_flot.discovery.further_sites.places import further_sites, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_same_part
-from adaptive_flot.discovery.further_sites.wording import NO_SITE, change_in_words
+from adaptive_flot.discovery.further_sites.wording import change_in_words
 from adaptive_flot.discovery.hypotheses.comparison import rms
 from adaptive_flot.discovery.hypotheses.cross_validation import fit_all_rows
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
@@ -26,7 +26,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.events.at_times import switch_at
 from adaptive_flot.discovery.innovations.verdicts.event import with_hypotheses
-from adaptive_flot.discovery.results.words import LARGEST_CLASS
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, NO_SITE
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 from adaptive_flot.parallel import parallel_map

@@ -32,7 +32,7 @@ def error_table(discovery: Discovery) -> Table:
     rows = []
     for c in discovery.verdict.error:
         power = exponent(np.array([c.before, c.after]))
-        values = (number(v * 10.0**-power, ".4g") for v in (c.before, c.after, c.noise))
+        values = (c.size(v, number(v * 10.0**-power, ".4g")) for v in (c.before, c.after, c.noise))
         low, high = (number(100 * r, ".0f") for r in c.reduction95)
         rows.append((spaced(c.output), unit_text(c.unit, power), *values, f"{low} to {high}"))
     caption = (
@@ -40,6 +40,7 @@ def error_table(discovery: Discovery) -> Table:
         "nor fitted anything. Noise: what no model can remove, as fitted. Reduction: 95 % interval of a paired block "
         "bootstrap."
     )
+    caption = " ".join(filter(None, (caption, discovery.verdict.about_errors)))
     return Table(caption, ("Output", "Unit", "Before", "After", "Noise", "Reduction [%]"), tuple(rows), words=2)
 
 

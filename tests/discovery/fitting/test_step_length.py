@@ -5,9 +5,16 @@ Its plant is the solution of the same equations, so that nothing is missing. In 
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
 
+import numpy as np
+import pytest
+
+from adaptive_flot.discovery import discover as module
 from adaptive_flot.discovery.discover import discover
+from adaptive_flot.discovery.results import FirstRound, State, Verdict
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 
 TAU, GAIN, ROWS, NOISE = 0.3, 2.0, 600, 0.02
@@ -48,3 +55,28 @@ def test_a_model_that_runs_off_in_its_own_steps_is_judged_in_shorter_ones() -> N
     assert verdict.word == "none", verdict.reason
     assert abs(verdict.parameters["K"] / GAIN - 1) < 0.01
     assert any("too long for this record" in note for note in verdict.notes)
+
+
+def test_shorter_steps_are_asked_for_once_the_best_single_effect_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search of a lag went through all stages in steps of 1 s, and then again in steps of 0.25 s."""
+    given = model()
+    finer = replace(given, max_step_s=given.max_step_s / 4)
+    done: list[tuple[str, float]] = []
+
+    def stage(name: str) -> Callable[[State], State | Verdict]:
+        def step(state: State) -> State | Verdict:
+            done.append((name, state.model.max_step_s))
+            if name == "conclude":
+                return Verdict("none", "", notes=state.screening.record.notes)
+            return replace(state, first=cast(FirstRound, object()) if name == "single effects" else state.first)
+
+        return step
+
+    monkeypatch.setattr(module, "STAGES", tuple(map(stage, ("fit", "single effects", "conclude"))))
+    monkeypatch.setattr(module, "_finer_for_one", lambda state: finer if state.model is given else None)
+    monkeypatch.setattr(module, "_finer", lambda state, verdict: None)
+    rows = np.arange(40, dtype=float)
+    verdict = discover(given, Dataset("coil", rows, 1.0, rows[:, None], rows[:, None])).verdict
+    assert [name for name, _ in done] == ["fit", "single effects"] * 2 + ["conclude"]
+    assert {length for _, length in done[2:]} == {finer.max_step_s}
+    assert len(verdict.notes) == 1 and "too long for this record" in verdict.notes[0]

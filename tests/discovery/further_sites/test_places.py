@@ -15,9 +15,10 @@ import pytest
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.further_sites.places import further_sites, is_possible, with_further_sites
 from adaptive_flot.discovery.further_sites.same_meaning import is_meant, twins
-from adaptive_flot.discovery.further_sites.wording import NO_SITE, change_in_words
+from adaptive_flot.discovery.further_sites.wording import change_in_words
 from adaptive_flot.discovery.hypotheses import without_a_site
 from adaptive_flot.discovery.hypotheses.procedure import compare
+from adaptive_flot.discovery.results.words import NO_SITE
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.effects import Effect, Mode
 from adaptive_flot.greybox.stepping.record import RecordSimulator

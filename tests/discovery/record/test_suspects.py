@@ -99,3 +99,14 @@ def test_an_output_outside_its_range_gets_a_word() -> None:
     celsius = replace(record, outputs=record.outputs - 273.15)
     assert "check its unit and its zero" in clean_outputs(celsius, ranged)[1][0]
     assert clean_outputs(record, ranged)[1] == ()
+
+
+@pytest.mark.parametrize(("stops", "told"), [(3, 3), (4, 0)])
+def test_an_input_that_stands_still_often_is_held_and_its_sensor_has_not_stopped(stops: int, told: int) -> None:
+    """The pitch that a turbine asks for stays where it is while the speed is right."""
+    record = tank_record(Truth(exponent=0.0), 900)
+    u = record.inputs.copy()
+    u[:, 1] = np.random.default_rng(0).standard_normal(900)
+    for k in range(stops):
+        u[100 + 200 * k : 140 + 200 * k, 1] = 0.1 * (k + 1)
+    assert len(clean_outputs(replace(record, inputs=u), heated_tank())[2]) == told

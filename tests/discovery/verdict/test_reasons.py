@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 
 from adaptive_flot.discovery.candidates.catalogue import has_a_reason
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Verdict
-from adaptive_flot.discovery.results.words import DRIFTS
+from adaptive_flot.discovery.results.words import DRIFTS, NO_SITE
 from adaptive_flot.discovery.verdict import conclude
 from adaptive_flot.discovery.verdict.conclude import _meaning
 from adaptive_flot.discovery.verdict.words import wording

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
@@ -41,7 +40,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
 )
 from adaptive_flot.discovery.innovations.verdicts.telling import kept, taken_back, tell, with_note
 from adaptive_flot.discovery.results import State
-from adaptive_flot.discovery.results.words import ONE_CAUSE, TELLING, WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, ONE_CAUSE, TELLING, WITH_A_NAME
 from adaptive_flot.discovery.verdict.large_drift import unexpected_drift
 
 

@@ -13,7 +13,6 @@ from adaptive_flot.discovery.assessment.verification import AT_NOISE
 from adaptive_flot.discovery.candidates.catalogue import nameable
 from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.fitter import Fitter
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import EVENTS
 from adaptive_flot.discovery.innovations.filter.thinning import searchable
 from adaptive_flot.discovery.innovations.in_words import told_in_words
@@ -38,7 +37,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
-from adaptive_flot.discovery.results.words import TELLING, WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, TELLING, WITH_A_NAME
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.large_drift import unexpected_drift
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.fitting.fit import Fit
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.results import Alternative, Judgement, NamedEffect, SearchResult
+from adaptive_flot.discovery.results.words import NO_SITE
 from adaptive_flot.discovery.verdict.judge import leads_by_far, same_signal, same_site
 from adaptive_flot.discovery.verdict.words.sizes import spaced, words_alone, words_each
 from adaptive_flot.greybox.forms.form import CoefficientRole

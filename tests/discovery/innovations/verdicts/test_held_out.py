@@ -48,7 +48,7 @@ def verdict(
     monkeypatch.setattr(telling, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
     state: Any = SimpleNamespace(
         judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
-        known_problem=None, model=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
+        known_problem=SimpleNamespace(background=None), model=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
     )  # fmt: skip
     monkeypatch.setattr(telling, "_is_nameable", lambda model, site, driver: True)
     search: Any = SimpleNamespace(sizes=lambda explanation: ({}, np.zeros((0, 0))))
@@ -78,6 +78,15 @@ def test_a_curve_in_time_beside_what_is_told_is_no_other_cause(monkeypatch: pyte
     free, over = change(SURELY_LESS, 0.1), change(UNSURE, 0.199)
     assert verdict(monkeypatch, "class", free, over, both=True).word == "named"
     assert verdict(monkeypatch, "class", free, over).word == "abstain"
+
+
+def test_beside_a_course_it_is_said_why_free_runs_may_be_alike() -> None:
+    """A brine 18 % weaker was told beside a table in which it changed nothing: both runs had a brine that wanders."""
+    wanders: Any = SimpleNamespace(background=SimpleNamespace(course=SimpleNamespace(site="brine_strength")))
+    plain: Any = SimpleNamespace(background=None)
+    said = telling._over_words((change(SURELY_LESS, 0.05),), wanders)
+    assert said.endswith("Both free runs have a brine strength that wanders, which may take the event up.")
+    assert "wanders" not in telling._over_words((change(SURELY_LESS, 0.05),), plain)
 
 
 @pytest.mark.parametrize(("over", "stands"), [((0.15, 0.9), True), ((0.25, 0.99), False), ((0.21, 1.01), False)])

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import rivals, telling
 from adaptive_flot.discovery.innovations.verdicts import second_opinion as asking
 from adaptive_flot.discovery.results import Judgement, OutputChange, State
+from adaptive_flot.discovery.results.words import NO_SITE
 from adaptive_flot.greybox.effects import Effect
 from tests.discovery.innovations.box import model
 

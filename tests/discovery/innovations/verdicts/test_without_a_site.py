@@ -14,7 +14,6 @@ import pytest
 
 from adaptive_flot.discovery.discover import discover
 from adaptive_flot.discovery.further_sites.places import with_further_sites
-from adaptive_flot.discovery.further_sites.wording import NO_SITE
 from adaptive_flot.discovery.hypotheses import procedure
 from adaptive_flot.discovery.hypotheses.joint.rows import noise_floor
 from adaptive_flot.discovery.hypotheses.judgement import WithoutSite
@@ -28,6 +27,7 @@ from adaptive_flot.discovery.innovations.search.search import Search
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.innovations.verdicts import second_opinion
 from adaptive_flot.discovery.results import State
+from adaptive_flot.discovery.results.words import NO_SITE
 from adaptive_flot.discovery.since_reference import changes
 from adaptive_flot.discovery.since_reference.changes import find_changes
 from adaptive_flot.greybox import Dataset, Model, Parameter, Quantity, Scope
