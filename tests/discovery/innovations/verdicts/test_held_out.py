@@ -48,7 +48,8 @@ def verdict(
     monkeypatch.setattr(telling, "replace", lambda given, **new: SimpleNamespace(**vars(given) | new))
     state: Any = SimpleNamespace(
         judgement=judged, judged=judged, error=(change(SURELY_LESS, 0.02),), contradiction="", report_record=None,
-        known_problem=SimpleNamespace(background=None), model=None, refitted=(fit, fit), searched=(None, SimpleNamespace(alternatives=[])),
+        known_problem=SimpleNamespace(background=None), model=None, refitted=(fit, fit),
+        searched=(None, SimpleNamespace(alternatives=[])),
     )  # fmt: skip
     monkeypatch.setattr(telling, "_is_nameable", lambda model, site, driver: True)
     search: Any = SimpleNamespace(sizes=lambda explanation: ({}, np.zeros((0, 0))))
