@@ -27,6 +27,7 @@ from adaptive_flot.discovery.fitting.fit import Fit, parameters_of
 from adaptive_flot.discovery.fitting.fitter import Fitter
 from adaptive_flot.discovery.fitting.node_spacing import at_every_row
 from adaptive_flot.discovery.fitting.onsets import with_onset_sought
+from adaptive_flot.discovery.fitting.running_off import where_it_runs_off
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.fitting.unseen_times import with_unseen_changes, with_unseen_ends
 from adaptive_flot.discovery.record.even_steps import steps_evenly
@@ -93,8 +94,9 @@ def fit_model_as_it_is(state: State) -> State | Verdict:
     if again is not model:
         model, prepared = again, prepare(state.known_problem, again)
     if prepared is None:
-        name = state.model.name
-        reason = f"the model can not simulate the record: check the units of its columns and the model '{name}'"
+        ran_off = where_it_runs_off(state.known_problem, model)
+        reason = f"the model '{model.name}' can not simulate the record{f': {ran_off}' if ran_off else ''}; "
+        reason += "check the units of the columns, and the values that the model starts from"
         return insufficient(replace(state.screening, reasons=(reason,)))
     problem, base = prepared
     responses = Responses(problem, base)
