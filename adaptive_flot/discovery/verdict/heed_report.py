@@ -30,6 +30,8 @@ from adaptive_flot.discovery.verdict.report_veto import (
     surely_better,
     unexplained,
 )
+from adaptive_flot.discovery.verdict.words.sizes import spaced
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS
 from adaptive_flot.greybox.model import FloatArray
 
 FITTED = ("estimate", "confirm")
@@ -88,14 +90,19 @@ def heed_report(state: State) -> State:
 def _nearest_drift(judgement: Judgement, error: Sequence[OutputChange]) -> str:
     """What is fitted and surely takes up a part of the error as it drifts, in words: the error after is that beside it.
 
-    Without its size: a free curve goes too far where something else is the matter.
+    Without its size: a free curve goes too far where something else is the matter. With the signals on which a single
+    dependence of the same site comes as near.
 
     Friction that grew at 7 s, which the constants of a drive follow, left a tenth of the error.
     """
     if judgement.best is None or not any(c.reduction95[0] > 0 for c in error):
         return ""
-    moved = " and ".join(site.replace("_", " ") for site, _ in judgement.best.names)
-    return f" What comes nearest is a change of what is fitted: {moved}, in time."
+    sites = [site for site, _ in judgement.best.names]
+    near = [a.names[0] for a in judgement.rivals if len(a.names) == len(sites) == 1 and judgement.near(a)]
+    signals = [driver for site, driver in near if site == sites[0] and driver not in STATELESS_DRIVERS]
+    moved = " and ".join(map(spaced, sites))
+    depends = f", or as it depends on {' or on '.join(map(spaced, signals))}" if signals else ""
+    return f" What comes nearest is a change of what is fitted: {moved}, in time{depends}."
 
 
 def _many_and_none(judgement: Judgement, error: Sequence[OutputChange]) -> bool:

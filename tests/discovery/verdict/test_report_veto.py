@@ -203,4 +203,8 @@ def test_an_abstention_says_which_drift_took_up_most_of_the_error(
     left = stage.heed_report(state)
     assert left.judged.word == "abstain"
     assert "What comes nearest is a change of what is fitted: heat loss, in time." in left.certain
+    assert drifting.best is not None
+    as_near = replace(drifting.best, names=(("heat_loss", "fan_speed"),))
+    said = stage.heed_report(state_of(draught, replace(drifting, rivals=(as_near,)))).certain
+    assert "heat loss, in time, or as it depends on fan speed." in said
     assert "nearest" not in stage.heed_report(replace(state, after=draught.before, before=draught.after)).certain
