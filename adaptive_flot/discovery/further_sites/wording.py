@@ -52,11 +52,12 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
     if site.startswith(DRAG):
         name = site.removeprefix(DRAG)
         state = model.states[model.index("states", name)]
-        lost = abs(amount) * (state.scale / loss_size(state)) ** 2
+        usual = abs(float(model.first_guess[model.index("states", name)])) or state.scale  # a plant may never be at 0
+        lost = abs(amount) * (usual / loss_size(state)) ** 2
         unit = "1" if state.unit in ("", "-") else state.unit
-        at_scale = f"{short(state.scale)} {unit}".removesuffix(" 1")
+        at_usual = f"{short(usual)} {unit}".removesuffix(" 1")
         rate = (
-            f"{short(lost)} {unit}/s where it is {at_scale}, and more with its square"
+            f"{short(lost)} {unit}/s where it is {at_usual}, and more with its square"
             if measured
             else "more with its square"
         )

@@ -161,7 +161,7 @@ def test_a_drag_grows_with_the_square_of_its_state() -> None:
     found = RecordSimulator(extended, DT).outputs(data, np.array([2.0]), extended.parameter_values)
     np.testing.assert_allclose(found[:, 0], expected, rtol=2e-4)
     said = change_in_words(model, effect.site, 0.02, "", measured=True)
-    assert said == "pressure lost 5e-05 bar/s where it is 0.5 bar, and more with its square"
+    assert said == "pressure lost 0.0008 bar/s where it is 2 bar, and more with its square"
 
 
 def test_a_capacity_says_what_its_place_says_and_a_heater_does_not() -> None:
