@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,12 @@ from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
 MOST_STEPS = 5_000_000
 """Most integration steps of one run over a record: some minutes on one core for a flotation cell."""
+ALIKE = 0.85
+"""Likeness from which a column that nothing uses may be meant for an output (1 where all letters are the same)."""
 UNITS = frozenset(
-    "s ms min h d m mm cm km ft in m3 l L ml lpm cfm gpm kg g t pct percent ppm frac V mV mA kW Pa kPa bar C K degC "
-    "degF".split()
+    "s ms min h d m mm cm km um ft in m2 cm2 mm2 m3 cm3 mm3 dm3 Nm3 l L ml lpm cfm gpm kg g mg ug t lb mol mmol kmol "
+    "pct percent ppm ppb frac V mV mA uA kW MW kWh Wh MJ kJ Ah mAh Pa hPa kPa MPa bar mbar psi C K degC degF rpm Hz "
+    "kHz rad deg kN Nm kNm uS mS".split()
 )
 """Parts of a suffix that make it one of a unit. Single letters that may be part of a name (A, F, W) are left out."""
 
@@ -135,7 +139,8 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
             empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
             raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
     first = _first_state(table, columns, model, file)
-    return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, (*lost, *others))
+    notes = (*lost, *others, *_meant(columns, model, taken))
+    return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, notes)
 
 
 def check_record(record: Dataset, model: Model, table: pd.DataFrame, file: Path) -> Dataset:
@@ -184,6 +189,16 @@ def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path,
     free = [c for c in columns if c not in taken]
     meant = near_match(column, free) if free else "every column of the file has another use"
     raise DataError(f"{file}: column {column!r} is missing; add it ({meant}){hint}")
+
+
+def _meant(columns: Sequence[str], model: Model, taken: Collection[str]) -> tuple[str, ...]:
+    """A word on each output without a column, where one that nothing uses has nearly its name: a slip of the pen."""
+    said = []
+    for q in model.outputs:
+        free = [c for c in columns if c not in taken and not c.startswith(q.name)]  # not the truth of a simulation
+        close = [] if q.column in columns else get_close_matches(q.column, free, 1, ALIKE)
+        said += [f"{q.name} is not measured: there is no column {q.column!r}; {c!r} is not used" for c in close]
+    return tuple(said)
 
 
 def _other_unit(columns: Sequence[str], name: str, column: str) -> str | None:

@@ -143,6 +143,18 @@ def changed(line: int, text: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("outflw_m3_s", ("outflow is not measured: there is no column 'outflow_m3_s'; 'outflw_m3_s' is not used",)),
+        ("outflow_m3_s_true", ()),
+        ("density_kg_m3", ()),
+    ],
+)
+def test_an_output_is_not_lost_by_a_slip_of_the_pen_unseen(write: Write, column: str, said: tuple[str, ...]) -> None:
+    assert read_dataset(write(f"time_s,inflow_m3_s,level_m,{column}", *ROWS), TANK).notes == said
+
+
+@pytest.mark.parametrize(
     ("lines", "parts"),
     [
         (changed(1, "time_s,inflo_m3_s,level_m,outflow_m3_s"), ("'inflow_m3_s' is missing", "mean 'inflo_m3_s'")),
@@ -153,6 +165,8 @@ def changed(line: int, text: str) -> tuple[str, ...]:
         (changed(1, "time_s,inflow,level_m,outflow_m3_s"), ("'inflow' has the wrong unit", "name it 'inflow_m3_s'")),
         (changed(1, "time_s,inflow_m3_s,level_cm,outflow_m3_s"),
          ("'level_cm' has the wrong unit", "by 0.01 and name it 'level_m'")),
+        (changed(1, "time_s,inflow_m3_s,level_m,outflow_mol_s"),
+         ("'outflow_mol_s' has the wrong unit", "'outflow_m3_s'")),
         (changed(3, "2,,1.1,0.2"), ("input 'inflow_m3_s' has no value in line 3", "1 in all", "fill in")),
         (changed(4, "4,inf,1.1,0.2"), ("'inflow_m3_s', line 4: inf is no measured value", "correct it")),
         (changed(4, "4,0.1,high,0.2"), ("column 'level_m', line 4: 'high' is not a number", "correct it")),
