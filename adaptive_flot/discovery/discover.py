@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from adaptive_flot.discovery.fallbacks import tell_part_alone, try_as_course
+from adaptive_flot.discovery.fitting.fit import Fit
 from adaptive_flot.discovery.fitting.step_length import steps_for, steps_words
 from adaptive_flot.discovery.innovations.places.constants import with_constants_alike
 from adaptive_flot.discovery.innovations.places.free_run import compare_with_what_has_no_site
@@ -162,24 +163,26 @@ def _in_steps_of(state: State, model: Model) -> State:
 
 
 def _finer_for_one(state: State) -> Model | None:
-    """The model with steps as short as the best single effect asks for; None where it has them (see `_finer`)."""
+    """The model with steps as short as the best single effect asks for; None where it has them."""
     best = next(iter(state.first.round.alternatives), None) if state.first is not None else None
-    if best is None or any(e.driver == "time" for e in best.effects):
-        return None
-    finer = steps_for(state.known_problem, state.model, best.fit)
-    return None if finer is state.model else finer
+    return None if best is None else _finer_along(state, best.fit)
 
 
 def _finer(state: State, verdict: Verdict) -> Model | None:
-    """The model with steps as short as what is told asks for; None where it has them, and where nothing is told.
+    """The model with steps as short as what is told asks for; None where it has them, and where nothing is told."""
+    if verdict.word not in TELLING or state.after is None:
+        return None
+    return _finer_along(state, state.after)
+
+
+def _finer_along(state: State, fit: Fit) -> Model | None:
+    """The model with steps as short as a fit with effects asks for; None where it has them.
 
     The edges of an event in time fall between steps, whose length moves them a little: no stiffness.
     """
-    if verdict.word not in TELLING or state.problem is None or state.after is None:
+    if any(e.driver == "time" for e in fit.model.effects):
         return None
-    if any(e.driver == "time" for e in state.after.model.effects):
-        return None
-    finer = steps_for(state.problem, state.model, state.after)
+    finer = steps_for(state.known_problem, state.model, fit)
     return None if finer is state.model else finer
 
 
