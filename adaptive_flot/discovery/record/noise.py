@@ -59,16 +59,12 @@ class Noise:
 
         The series (N, m, q), weighted already, has no missing value.
         """
-        n, m, q = series.shape  # q may be 0: nothing is fitted
-        rows, outputs = np.nonzero(inside)
-        flat, at = series.reshape(n * m, q), rows * m + outputs
-        white: FloatArray = flat[at]
+        white = series.copy()
         for i, lags in enumerate(self.lags.T):
-            own = np.where(rows > i, lags[outputs], 0.0)  # the first rows have no past
-            if own.any():
-                white -= own[:, None] * flat[np.maximum(at - (i + 1) * m, 0)]
-        white /= self.std[outputs][:, None]
-        return white
+            if lags.any():
+                white[i + 1 :] -= lags[:, None] * series[: -(i + 1)]
+        white /= self.std[:, None]
+        return white[inside]
 
     def stationary_std(self) -> FloatArray:
         """Standard deviation of the noise itself (m,), from its spectrum.

@@ -29,6 +29,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     rests_on_memory,
     surely_better,
     unexplained,
+    without_gain,
 )
 from adaptive_flot.discovery.verdict.words.sizes import spaced
 from adaptive_flot.greybox.effects import STATELESS_DRIVERS
@@ -69,6 +70,8 @@ def heed_report(state: State) -> State:
         against = _at_the_end(judgement, whole, state.problem_after or whole, before, after, surely)
     if not against and told:
         against = explains_little(error, np.hypot(noise, unknown))
+    if not against and told and not whole.whiten:
+        against = without_gain(error, noise)
     none_near = not against and judgement.word == "class" and _many_and_none(judgement, error)
     if none_near:
         against = "several other sets of effects do about as well, and none comes near the noise"

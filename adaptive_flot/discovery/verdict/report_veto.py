@@ -1,11 +1,12 @@
 """The report split has a veto: what held-out rows contradict is not told as a name.
 
 A name is contradicted where an output gets worse on these rows, where no output surely gets better, or where nearly all
-of a large error is left. Beside a background the likelihood of these rows may stand for that, as it knows what a
-wandering feed does to the error: where they are surely likelier, one error must be much smaller. The constants of a
-background, each a little off, may also predict what one does that is far off: then no error need be smaller. A free
-curve in time at a sensor must also hold on the last of these rows, which lie beyond all that it was fitted to: such a
-curve can mimic any residual between rows that it has seen.
+of a large error is left. Of effects that were looked for at once, each output that stays far above its noise must get
+better. Beside a background the likelihood of these rows may stand for that, as it knows what a wandering feed does to
+the error: where they are surely likelier, one error must be much smaller. The constants of a background, each a little
+off, may also predict what one does that is far off: then no error need be smaller. A free curve in time at a sensor
+must also hold on the last of these rows, which lie beyond all that it was fitted to: such a curve can mimic any
+residual between rows that it has seen.
 """
 
 from __future__ import annotations
@@ -166,6 +167,21 @@ def explains_little(changes: Sequence[OutputChange], noise: FloatArray) -> str:
     return (
         f"on held-out rows it removes only {removed:.0f} % of the squared error, over all outputs. {left.rstrip('.')}"
     )
+
+
+def without_gain(changes: Sequence[OutputChange], noise: FloatArray) -> str:
+    """Outputs, in words, that stay far from their noise (m,) and that a set of effects surely improves nothing of.
+
+    Asked of sets that were looked for at once: all rows but these chose them, so these alone can contradict. An
+    oxygen demand that nobody measured came in spells, and a control loop made it look like laws of other signals.
+    """
+    left = [
+        c
+        for c, s in zip(changes, noise, strict=True)
+        if min(c.before, c.after) > WELL_ABOVE * s and c.reduction95[0] <= 0
+    ]
+    said = ", ".join(c.words for c in left)
+    return f"on held-out rows nothing is surely gained of what stays far above its noise ({said})" if left else ""
 
 
 def _may_be_chance(change: OutputChange) -> bool:

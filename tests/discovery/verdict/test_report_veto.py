@@ -20,6 +20,7 @@ from adaptive_flot.discovery.verdict.report_veto import (
     noise_from_row_to_row,
     rests_on_memory,
     unexplained,
+    without_gain,
 )
 from adaptive_flot.greybox import Effect
 from tests.discovery.heated import heated_tank
@@ -208,3 +209,24 @@ def test_an_abstention_says_which_drift_took_up_most_of_the_error(
     said = stage.heed_report(state_of(draught, replace(drifting, rivals=(as_near,)))).certain
     assert "heat loss, in time, or as it depends on fan speed." in said
     assert "nearest" not in stage.heed_report(replace(state, after=draught.before, before=draught.after)).certain
+
+
+def test_effects_that_were_looked_for_at_once_improve_each_output_that_stays_wrong() -> None:
+    """An oxygen demand that nobody measured came in spells; a joint search told laws of other signals for certain."""
+    noise = np.array([0.03, 0.08])
+    oxygen, ammonium = _change(0.551, 0.447, -0.62, 0.46), _change(0.694, 0.148, 0.74, 0.82)
+    assert "0.551 -> 0.447" in without_gain([oxygen, ammonium], noise)
+    assert not without_gain([oxygen, ammonium], np.array([0.3, 0.08]))  # what is left is near the noise
+    assert not without_gain([replace(oxygen, reduction95=(0.02, 0.46)), ammonium], noise)
+    assert not without_gain([replace(oxygen, before=0.05), ammonium], noise)  # it was not wrong before
+
+
+def test_only_effects_that_were_looked_for_at_once_are_asked_that(
+    draught: Discovery, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = state_of(draught, _judged(draught))
+    monkeypatch.setattr(stage, "without_gain", lambda error, noise: "nothing is gained")
+    assert stage.heed_report(state).judged.word == "named"
+    assert state.problem is not None
+    jointly = stage.heed_report(replace(state, problem=replace(state.problem, whiten=False)))
+    assert jointly.judged.word == "abstain" and jointly.contradiction == "nothing is gained"

@@ -17,6 +17,7 @@ from adaptive_flot.discovery.innovations.telling_apart import told_apart
 from adaptive_flot.discovery.innovations.told import Told
 from adaptive_flot.discovery.results import State
 from adaptive_flot.discovery.results.words import LARGEST_CLASS, WITH_A_NAME
+from adaptive_flot.greybox.effects import STATELESS_DRIVERS
 
 COMPARED = 6
 """Alternatives of the free run that are fitted, the best ones."""
@@ -37,7 +38,7 @@ def beside_alternatives(state: State, search: Search, base: Explanation, told: T
     Told or None
         None where an alternative elsewhere explains more, where one can not be fitted, where one that explains about as
         much has several effects, and where more sites are left than a class may hold. Where one at the same site
-        explains more, a curve that bends after what else is wrong, both are a class.
+        explains more, a curve that bends after what else is wrong, both are a class, unless both depend on one signal.
     """
     if state.judged.word != "abstain" or state.contradiction:
         return None
@@ -49,8 +50,8 @@ def beside_alternatives(state: State, search: Search, base: Explanation, told: T
     better = [e for e in alike if told_apart(search, base, e, told.best)]
     if len(fitted) < len(found) or any(not _alone_at(e, own) for e in better):
         return None
-    if better and told.word == "named":  # it is that part, and how it is off is not told
-        (curve,) = better[0].hypotheses
+    if better and told.word == "named" and not _one_dependence((*own, *better[0].hypotheses)):
+        (curve,) = better[0].hypotheses  # it is that part, and how it is off is not told
         return replace(
             told, word="class", certain=(), open=((told.best, own[0]), (better[0], curve)), alike=(told.best, *alike)
         )
@@ -100,6 +101,14 @@ def among_alternatives(
 
 def _name(explanation: Explanation) -> tuple[tuple[str, str], ...]:
     return tuple(sorted((h.site, h.driver) for h in explanation.hypotheses))
+
+
+def _one_dependence(hypotheses: Sequence[Hypothesis]) -> bool:
+    """Whether all are forms of one dependence on a signal."""
+    first = hypotheses[0]
+    return first.driver not in STATELESS_DRIVERS and all(
+        (h.site, h.driver) == (first.site, first.driver) for h in hypotheses
+    )
 
 
 def _alone_at(explanation: Explanation, own: Sequence[Hypothesis]) -> bool:

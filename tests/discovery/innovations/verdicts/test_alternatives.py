@@ -139,6 +139,13 @@ def test_a_curve_that_explains_more_at_the_same_site_leaves_the_site(site: str, 
         assert [(h.site, h.driver) for h in said.effects] == [("doser", "saturation"), ("doser", "dose")]
 
 
+@pytest.mark.parametrize(("driver", "word"), [("dose", "named"), ("constant", "class"), ("time", "class")])
+def test_two_forms_of_one_dependence_are_one_name(driver: str, word: str) -> None:
+    """A loss that depends on the wind was told as a class of itself and itself. An offset and a gain are two causes."""
+    said = beside(told(hypothesis("doser", "depends", driver)), Given(150.0, (hypothesis("doser", driver=driver),)))
+    assert said is not None and said.word == word
+
+
 def test_a_curve_that_explains_more_with_something_else_leaves_nothing() -> None:
     assert beside(told(LIMIT), Given(150.0, (hypothesis("doser"), hypothesis("decay")))) is None
 
