@@ -36,6 +36,9 @@ CONTROLLERS: Mapping[str, str] = {
     "pi": "controllers.pi:Pi",
     "schedule": "controllers.schedule:Schedule",
 }
+WITHOUT_A_VALUE = "Cannot compute the truth value of a CasADi"
+"""Of what CasADi says where an equation has a condition."""
+WITHOUT_A_CONDITION = "write casadi.if_else, fmin, fmax or logic_and in place of if, min, max or and"
 METHODS: Mapping[str, tuple[str, ...]] = {
     "estimator": ("init", "update"),
     "controller": ("init", "decide"),
@@ -186,6 +189,8 @@ def plugin_failure(error: BaseException, *, full_path: bool = True) -> PluginErr
     if place is None:
         return None
     said = "ends the program" if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
+    if WITHOUT_A_VALUE in said:
+        return PluginError(f"{place}: what a model computes with has no value yet; {WITHOUT_A_CONDITION}")
     return PluginError(f"{place}: {said}; correct the plug-in")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -33,6 +34,8 @@ def main() -> None:
     Exit codes: 0 done, 1 a defect of this program, 2 a mistake of the user, 130 interrupted. A program that a signal
     ended gives 128 and the number of the signal.
     """
+    # where equations call NumPy on a model's quantities, which is right: a page of text, with every run
+    warnings.filterwarnings("ignore", "\\s*casadi: a numpy function", FutureWarning)
     arguments, debug = _debug_first(sys.argv[1:])
     with terminable():
         try:

@@ -65,3 +65,39 @@ def test_an_unknown_coefficient_names_the_near_one(call: Call, record: pd.DataFr
     result = call("estimate", "record.csv", "--model", "extended.yaml", *fit, "--save-model", "f.yaml", "--out", "r")
     assert result.code == 2 and f"did you mean '{EXPONENT}'" in result.err
     assert not (tmp_path / "f.yaml").exists() and not (tmp_path / "r").exists()
+
+
+TANK = """
+import casadi
+import numpy as np
+from adaptive_flot.greybox import Model, Quantity, Scope
+
+def equations(m: Scope) -> None:
+    level, inflow = m.state("level"), m.input("inflow")
+    {line}
+    m.derivative("level", 0.1 * (used - level))
+    m.output("level", level)
+
+def make_model() -> Model:
+    return Model("tank", (Quantity("level", "m", "state", 0, 10),), (Quantity("inflow", "-", "input", 0, 10),), (),
+                 (Quantity("level", "m", "output", 0, 10),), equations, max_step_s=1.0)
+"""
+
+
+@pytest.mark.parametrize("line", ["used = np.maximum(inflow, 2.0)", "used = casadi.fmax(inflow, 2.0)"])
+def test_numpy_on_a_quantity_works_without_a_page_of_warnings(call: Call, line: str, tmp_path: Path) -> None:
+    (tmp_path / "tank.py").write_text(TANK.format(line=line))
+    time = np.arange(200.0)
+    pd.DataFrame({"time_s": time, "inflow": np.where(time < 100, 1.0, 3.0)}).to_csv("record.csv", index=False)
+    result = call("simulate", "record.csv", "--model", "tank.py:make_model", "--out", "s.csv")
+    assert result.code == 0 and "Warning" not in result.err, result.err
+    level = pd.read_csv("s.csv")["level_m"]
+    assert level[99] == pytest.approx(2.0, abs=1e-3) and level.iloc[-1] == pytest.approx(3.0, abs=1e-3)
+
+
+def test_a_condition_on_a_quantity_says_what_to_write(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "tank.py").write_text(TANK.format(line="used = inflow if inflow > 2.0 else 2.0"))
+    pd.DataFrame({"time_s": np.arange(200.0), "inflow": 1.0}).to_csv("record.csv", index=False)
+    result = call("simulate", "record.csv", "--model", "tank.py:make_model", "--out", "s.csv")
+    assert result.code == 2 and len(result.err.splitlines()) == 1
+    assert "tank.py, line 8: " in result.err and "write casadi.if_else" in result.err

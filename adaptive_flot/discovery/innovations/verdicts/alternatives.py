@@ -55,6 +55,9 @@ def beside_alternatives(state: State, search: Search, base: Explanation, told: T
         return replace(
             told, word="class", certain=(), open=((told.best, own[0]), (better[0], curve)), alike=(told.best, *alike)
         )
+    if better:  # another form of the same dependence: others are near that, or are not
+        best = max(better, key=lambda e: e.criterion)
+        alike = [e for e in fitted if not told_apart(search, base, best, e)]
     others = [(e, h) for e in alike for h in e.hypotheses if h.site not in {h.site for h in own}]
     if not others:
         return told

@@ -146,6 +146,13 @@ def test_two_forms_of_one_dependence_are_one_name(driver: str, word: str) -> Non
     assert said is not None and said.word == word
 
 
+@pytest.mark.parametrize(("criterion", "word"), [(97.0, "named"), (105.0, "class")])
+def test_others_are_compared_with_the_better_form(criterion: float, word: str) -> None:
+    better, other = Given(112.0, (hypothesis("doser"),)), Given(criterion, (hypothesis("demand"),))
+    said = beside(told(hypothesis("doser", "depends")), better, other)
+    assert said is not None and said.word == word
+
+
 def test_a_curve_that_explains_more_with_something_else_leaves_nothing() -> None:
     assert beside(told(LIMIT), Given(150.0, (hypothesis("doser"), hypothesis("decay")))) is None
 
