@@ -50,12 +50,13 @@ def beside_alternatives(state: State, search: Search, base: Explanation, told: T
     better = [e for e in alike if told_apart(search, base, e, told.best)]
     if len(fitted) < len(found) or any(not _alone_at(e, own) for e in better):
         return None
-    if better and told.word == "named" and not _one_dependence((*own, *better[0].hypotheses)):
-        (curve,) = better[0].hypotheses  # it is that part, and how it is off is not told
+    otherwise = [e for e in better if not _one_dependence((*own, *e.hypotheses))]
+    if otherwise and told.word == "named":  # it is that part, and how it is off is not told
+        (curve,) = otherwise[0].hypotheses
         return replace(
-            told, word="class", certain=(), open=((told.best, own[0]), (better[0], curve)), alike=(told.best, *alike)
+            told, word="class", certain=(), open=((told.best, own[0]), (otherwise[0], curve)), alike=(told.best, *alike)
         )
-    if better:  # another form of the same dependence: others are near that, or are not
+    if better and told.word == "named":  # another form of the same dependence: others are near that, or are not
         best = max(better, key=lambda e: e.criterion)
         alike = [e for e in fitted if not told_apart(search, base, best, e)]
     others = [(e, h) for e in alike for h in e.hypotheses if h.site not in {h.site for h in own}]

@@ -146,6 +146,12 @@ def test_two_forms_of_one_dependence_are_one_name(driver: str, word: str) -> Non
     assert said is not None and said.word == word
 
 
+def test_another_cause_there_that_explains_more_is_a_member_beside_a_better_form() -> None:
+    better, other = Given(150.0, (hypothesis("doser"),)), Given(120.0, (hypothesis("doser", driver="time"),))
+    said = beside(told(hypothesis("doser", "depends")), better, other)
+    assert said is not None and [h.driver for h in said.effects] == ["dose", "time"]
+
+
 @pytest.mark.parametrize(("criterion", "word"), [(97.0, "named"), (105.0, "class")])
 def test_others_are_compared_with_the_better_form(criterion: float, word: str) -> None:
     better, other = Given(112.0, (hypothesis("doser"),)), Given(criterion, (hypothesis("demand"),))
