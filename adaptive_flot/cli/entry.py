@@ -35,7 +35,7 @@ def main() -> None:
     ended gives 128 and the number of the signal.
     """
     # where equations call NumPy on a model's quantities, which is right: a page of text, with every run
-    warnings.filterwarnings("ignore", "\\s*casadi: a numpy function", FutureWarning)
+    warnings.filterwarnings("ignore", r"\s*casadi: a numpy function", FutureWarning)
     arguments, debug = _debug_first(sys.argv[1:])
     with terminable():
         try:

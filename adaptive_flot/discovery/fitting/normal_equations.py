@@ -33,7 +33,7 @@ class NormalEquations:
         e = e[inside]
         everywhere = np.zeros(w.shape, dtype=bool)
         everywhere[rows] = inside
-        J = noise.whiten_some(slope / w[:, :, None], everywhere)
+        J = noise.whiten(slope / w[:, :, None])[everywhere]
         if self.problem.background is not None:
             J = np.hstack([J, self._whitened_background(noise)[inside.ravel()]])
         prior = 1 / self.unknowns.prior**2
@@ -46,6 +46,6 @@ class NormalEquations:
         if self._white_background is None or self._white_background[0] is not noise:
             assert self.problem.background is not None  # asked by the caller
             responses = self.problem.background.responses / self.problem.weights[:, :, None]
-            all_of_them = np.broadcast_to(self.rows[:, None], responses.shape[:2])
-            self._white_background = noise, noise.whiten_some(responses, all_of_them)
+            white = noise.whiten(responses)[self.rows]
+            self._white_background = noise, white.reshape(-1, white.shape[2])
         return self._white_background[1]

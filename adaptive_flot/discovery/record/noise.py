@@ -54,18 +54,6 @@ class Noise:
             white[:, j] /= self.std[j]
         return white
 
-    def whiten_some(self, series: FloatArray, inside: NDArray[np.bool_]) -> FloatArray:
-        """Whitened series (count, q) of the values that are true in `inside` (N, m), by rows: `whiten(series)[inside]`.
-
-        The series (N, m, q), weighted already, has no missing value.
-        """
-        white = series.copy()
-        for i, lags in enumerate(self.lags.T):
-            if lags.any():
-                white[i + 1 :] -= lags[:, None] * series[: -(i + 1)]
-        white /= self.std[:, None]
-        return white[inside]
-
     def stationary_std(self) -> FloatArray:
         """Standard deviation of the noise itself (m,), from its spectrum.
 

@@ -111,12 +111,3 @@ def test_correlation_time_of_an_autoregression_is_the_closed_form(a: float, expe
     """1 + 2 sum a^k = (1 + a) / (1 - a)."""
     found = np.mean([correlation_times(_ar(a, s, 20_000)[:, None])[0] for s in range(5)])
     assert found == pytest.approx(expected, rel=0.15)
-
-
-@given(seed=st.integers(0, 2**16), lags=st.integers(0, 3))
-def test_some_values_are_whitened_as_all_of_them_are(seed: int, lags: int) -> None:
-    rng = np.random.default_rng(seed)
-    series, inside = rng.normal(size=(30, 2, 3)), rng.random((30, 2)) < 0.4
-    inside[:4] = True
-    noise = Noise(rng.uniform(0.5, 2, 2), np.where(np.arange(3) < lags, rng.uniform(-1, 1, (2, 3)), 0.0))
-    np.testing.assert_array_equal(noise.whiten_some(series, inside), noise.whiten(series)[inside])
