@@ -15,7 +15,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo live-demo test pytest browser postgresql check lint types format docs bench bench-discovery bench-discovery-quick bench-live bench-lanes bench-measured lock clean
+.PHONY: help install demo live-demo test pytest debian browser postgresql check lint types format docs bench bench-discovery bench-discovery-quick bench-live bench-lanes bench-measured lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-21s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,10 +26,16 @@ install: $(READY) ## Create .venv with the pinned dependencies and this project
 demo: $(READY) ## Run the demonstration
 	@$(BIN)/python -m adaptive_flot.demo
 
-# Types are checked beside the tests. Those keep all cores busy: a further thread of the linear algebra would only be in
-# their way. Programs that they start find the bytecode of those before.
-test: lint browser postgresql ## Run all checks and the test suite
+# What Debian gives is installed beside what Python's index gives, and types are checked beside the tests. Those keep all
+# cores busy: a further thread of the linear algebra would only be in their way. Programs that they start find the
+# bytecode of those before.
+test: ## Run all checks and the test suite
+	@$(MAKE) --no-print-directory -j 2 lint debian
 	@$(MAKE) --no-print-directory -j 2 types pytest
+
+debian:  # one after the other: there is one lock
+	@$(install_chromium)
+	@$(install_postgresql)
 
 pytest: export OPENBLAS_NUM_THREADS = 1
 pytest: export PYTHONDONTWRITEBYTECODE =

@@ -183,5 +183,5 @@ def check_range(quantities: Sequence[Quantity], table: FloatArray, time: FloatAr
             at = f"row {k}" if time is None else f"time {time[k]:g} s"
             raise RangeError(
                 f"{where}: {q.name} = {values[k]:g} {q.unit} at {at} is outside the model's range "
-                f"[{q.lower:g}, {q.upper:g}] {q.unit}; correct the value or its unit"
+                f"[{q.lower:g}, {q.upper:g}] {q.unit}; correct the value, its unit, or the range in the model"
             )

@@ -85,7 +85,7 @@ FILES = {
     "blank": (b"\n \n\n", "record.csv"),
     "binary": (bytes(range(256)) * 8, "not a"),
     "separators": (b",,,\n,,,\n", "record.csv"),
-    "semicolons": (b"time_s;air_flow_m3_s\n0;1\n1;1\n", "'time_s' is missing"),
+    "semicolons": (b"time_s;air_flow_m3_s\n0;1\n1;1\n", "separated by a semicolon"),
 }
 
 

@@ -19,7 +19,8 @@ from adaptive_flot.greybox.data.columns import UNIFORMITY, line, numeric_column,
 from adaptive_flot.greybox.data.lost_rows import with_lost_rows
 from adaptive_flot.greybox.data.stretches import longest_stretch
 from adaptive_flot.greybox.data.tables import Source, named, read_table
-from adaptive_flot.greybox.data.wrong_unit import check_unit, conversion_of
+from adaptive_flot.greybox.data.value_checks import check_values
+from adaptive_flot.greybox.data.wrong_unit import conversion_of
 from adaptive_flot.greybox.model import FloatArray, Model, Quantity
 
 MOST_STEPS = 5_000_000
@@ -107,7 +108,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
         Missing column, wrong unit suffix, text in a number, NaN in an input, time that does not increase uniformly,
         more integration steps than MOST_STEPS.
     RangeError
-        An input outside the model's physical range, or a column in another unit than its name says (`check_unit`).
+        What is in a column can not be what it is called (`check_values`).
     """
     file = named(path)
     table, lost = with_lost_rows(read_table(path), TIME_COLUMN, file, {q.column for q in model.outputs})
@@ -119,14 +120,13 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
     _check_steps(model, dt, len(time), file)
 
     inputs = np.column_stack([_input(table, columns, q, file, taken) for q in model.inputs])
-    model.check_inputs(inputs, time, where=str(file))
     outputs = np.full((len(table), len(model.outputs)), np.nan)
     for j, q in enumerate(model.outputs):
         if q.column in columns:
             outputs[:, j] = numeric_column(table, q.column, file)
-            check_unit(_with_range(q, model), outputs[:, j], str(file))
         elif q.name in required_outputs or _other_unit(columns, q.name, q.column) is not None:
             _find(columns, q.name, q.column, q.unit, file, taken)
+    odd = check_values(model, inputs, outputs, time, str(file))
 
     parameters = {
         p.name: numeric_column(table, label, file)
@@ -139,7 +139,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
             empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
             raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
     first = _first_state(table, columns, model, file)
-    notes = (*lost, *others, *_meant(columns, model, taken))
+    notes = (*lost, *others, *_meant(columns, model, taken), *odd)
     return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, notes)
 
 
@@ -213,7 +213,6 @@ def _looks_like_unit(suffix: str) -> bool:
 def _input(table: pd.DataFrame, columns: Sequence[str], q: Quantity, file: Path, taken: Collection[str]) -> FloatArray:
     values = numeric_column(table, _find(columns, q.name, q.column, q.unit, file, taken), file)
     _check_input(table, q.column, values, file)
-    check_unit(q, values, str(file))
     return values
 
 
@@ -255,14 +254,6 @@ def _interval(table: pd.DataFrame, time: FloatArray, file: Path) -> float:
             f"put it on an even grid with 'adaptive-flot import {file} --out even.csv', and the same --model"
         )
     return float((time[-1] - time[0]) / (len(time) - 1))
-
-
-def _with_range(output: Quantity, model: Model) -> Quantity:
-    """An output; where it has no range of its own, with that of the state that it shows: same name, same unit."""
-    if output.usual is not None or np.isfinite([output.lower, output.upper]).any():
-        return output
-    shown = next((s for s in model.states if (s.name, s.unit) == (output.name, output.unit)), output)
-    return replace(output, lower=shown.lower, upper=shown.upper)
 
 
 def _check_steps(model: Model, dt: float, rows: int, file: Path) -> None:

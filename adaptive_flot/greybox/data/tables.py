@@ -16,6 +16,7 @@ from adaptive_flot.greybox.data.columns import shown
 
 MOST_ROWS = 2_000_000
 """Longest table: 23 days, one row a second."""
+OTHER_SEPARATORS = {";": "a semicolon", "\t": "a tab", "|": "a bar"}
 SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 Source: TypeAlias = Path | str | pd.DataFrame
@@ -44,7 +45,8 @@ def read_table(source: Source) -> pd.DataFrame:
     Raises
     ------
     DataError
-        No such file, unreadable, empty, not a table, rows longer than the header, a column twice, no rows or too many.
+        No such file, unreadable, empty, not a table, columns not separated by commas, rows longer than the header,
+        a column twice, no rows or too many.
     """
     file = named(source)
     if isinstance(source, pd.DataFrame):
@@ -98,12 +100,13 @@ def _read(file: Path) -> pd.DataFrame:
 def _read_csv(file: Path) -> pd.DataFrame:
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # else pandas cuts rows longer than the header
-        table = pd.read_csv(
-            file, skipinitialspace=True, index_col=False, skip_blank_lines=False, nrows=MOST_ROWS + 1, low_memory=False
-        )
         # pandas renames the second of two columns: what the file says is in its first line
         header = pd.read_csv(
             file, skipinitialspace=True, index_col=False, skip_blank_lines=False, nrows=1, header=None, dtype=str
+        )
+        _check_separator(header.iloc[0].dropna(), file)
+        table = pd.read_csv(
+            file, skipinitialspace=True, index_col=False, skip_blank_lines=False, nrows=MOST_ROWS + 1, low_memory=False
         )
     _check_repeated(header.iloc[0].dropna(), file)
     return table
@@ -121,6 +124,16 @@ def _plain(table: pd.DataFrame, file: Path) -> pd.DataFrame:
     plain.columns = pd.Index([str(c) for c in plain.columns], dtype=object)
     _check_repeated(plain.columns.to_series(), file)
     return plain
+
+
+def _check_separator(names: pd.Series, file: Path) -> None:
+    header = str(names.iloc[0]) if len(names) == 1 else ""
+    found = [said for sign, said in OTHER_SEPARATORS.items() if sign in header]
+    if found and header.replace("\t", "").isprintable():
+        raise DataError(
+            f"{file}: its columns are separated by {found[0]}, and not by a comma; make a record of it with "
+            "'adaptive-flot import', which reads both"
+        )
 
 
 def _check_repeated(names: pd.Series, file: Path) -> None:
