@@ -29,7 +29,11 @@ class Checks(Lookup):
     """What `Model` checks of itself when it is made."""
 
     states: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
+    signals: tuple[Quantity, ...]
+    algebraic: tuple[Quantity, ...]
+    parameters: tuple[Parameter, ...]
     initial_guess: Mapping[str, float]
     max_step_s: float
     drivers: tuple[str, ...]
@@ -41,6 +45,11 @@ class Checks(Lookup):
     @property
     def sites(self) -> tuple[Site, ...]:
         """Sites that the equations pass through."""
+        raise NotImplementedError
+
+    @property
+    def asked(self) -> frozenset[str]:
+        """Names of the parameters that the equations ask for."""
         raise NotImplementedError
 
     def check_groups(self) -> None:
@@ -65,7 +74,8 @@ class Checks(Lookup):
         Raises
         ------
         ModelError
-            A name, role or mode that does not exist; a scale or a step that is not above zero; a value out of range.
+            A name, role or mode that does not exist; a scale or a step that is not above zero; a value out of range; a
+        range whose ends are exchanged; a parameter that is estimated and that no equation asks for.
         """
         own = (*self.names("inputs"), *self.names("states"), *self.names("signals"))
         drivers, sites = (*own, *STATELESS_DRIVERS, "time"), [site.name for site in self.sites]
@@ -78,6 +88,7 @@ class Checks(Lookup):
         for site in self.sites:
             self._known(f"site {site.name!r}, role", [site.role], get_args(Role))
             self._known(f"site {site.name!r}, mode", [site.mode], get_args(Mode))
+        self._check_ranges()
         searched = {
             e.parameter(c.name) for e in self.effects for c in e.terms
         }  # a search narrows their ranges as it goes
@@ -88,12 +99,26 @@ class Checks(Lookup):
                     f"model '{self.name}': parameter {p.name!r} = {p.value:g} {p.unit} is outside its range "
                     f"[{p.lower:g}, {p.upper:g}]; correct the value or the range"
                 )
+            if p.role == "estimated" and p.name not in self.asked:
+                raise ModelError(
+                    f"model '{self.name}': parameter {p.name!r} is estimated, and no equation asks for it; use "
+                    f"m.parameter({p.name!r}), or leave it out"
+                )
         scaled: tuple[Quantity | Parameter, ...] = (*self.states, *self.inputs, *self.outputs, *self.parameters)
         for item in scaled:
             if not (item.scale > 0 and np.isfinite(item.scale)):
                 raise ModelError(f"model '{self.name}': {item.name!r} has scale {item.scale:g}; give one above zero")
         if not self.max_step_s > 0:
             raise ModelError(f"model '{self.name}': max_step_s is {self.max_step_s:g}; give a step above zero [s]")
+
+    def _check_ranges(self) -> None:
+        quantities = (*self.states, *self.inputs, *self.outputs, *self.signals, *self.algebraic)
+        ranged: tuple[Quantity | Parameter, ...] = (*quantities, *self.parameters)
+        for q in ranged:
+            if q.lower > q.upper:
+                raise ModelError(
+                    f"model '{self.name}': {q.name!r} has lower = {q.lower:g} above upper = {q.upper:g}; exchange them"
+                )
 
     def _known(self, where: str, given: Iterable[str], known: Iterable[str]) -> None:
         listed = list(known)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from adaptive_flot.discovery.record.background import Background
+from adaptive_flot.discovery.results.words import rough
 
 
 def background_words(background: Background, units: dict[str, str]) -> str:
     """What wanders and how, and how far the constants are off, in sentences; `units` are those of the sites."""
     said, course = [], background.course
     if course is not None:
-        size = f"{course.std:.3g} {units[course.site]}".rstrip() if course.offset else f"{100 * course.std:.2g} %"
+        size = f"{course.std:.3g} {units[course.site]}".rstrip() if course.offset else f"{rough(100 * course.std)} %"
         said.append(
             f"The {course.site} wanders: standard deviation about {size}, correlation time about {course.time:.0f} s. "
             "Its course was estimated beside every alternative, and is in the errors before and after. What acts as "

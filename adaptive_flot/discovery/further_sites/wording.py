@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.discovery.further_sites.places import AMOUNT, BALANCE, DRAG, LOSS, RATE, READING, loss_size
-from adaptive_flot.discovery.results.words import NO_SITE, short
+from adaptive_flot.discovery.results.words import NO_SITE, rough, short
 from adaptive_flot.greybox.model import Model
 
 MOST_SAID = 3
@@ -43,7 +43,7 @@ def change_in_words(model: Model, site: str, amount: float, when: str, measured:
         return f"{_plain(name)} were {much}{'larger' if amount > 0 else 'smaller'} at any value{at}"
     if site.startswith(RATE):
         name = _plain(site.removeprefix(RATE))
-        return f"what stores {name} (a capacity, a volume or a mass) were {np.exp(-amount):.2g} times as large{at}"
+        return f"what stores {name} (a capacity, a volume or a mass) were {rough(np.exp(-amount))} times as large{at}"
     if site.startswith(LOSS):
         name = site.removeprefix(LOSS)
         share = abs(amount) / loss_size(model.states[model.index("states", name)])

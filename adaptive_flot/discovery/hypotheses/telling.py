@@ -18,7 +18,7 @@ from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.record.robust import AT_NOISE
 from adaptive_flot.discovery.record.slip_jump import band_ranges
 from adaptive_flot.discovery.results import NamedEffect, OutputChange, Verdict
-from adaptive_flot.discovery.results.words import NO_SITE, NORMAL95, WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, NORMAL95, WITH_A_NAME, rough
 from adaptive_flot.greybox.model import Model
 
 ABOVE_NOISE, ABOVE_USUAL = 3.0, 1.5
@@ -213,7 +213,9 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
     changed = "has changed" if reference else "is missing"
     most = max((c.before / c.noise for c in error if c.noise > 0), default=np.inf)
     if judged.word == "none":
-        larger = f"its errors are up to {most:.2g} times those of the reference, which vary as much between stretches"
+        larger = (
+            f"its errors are up to {rough(most)} times those of the reference, which vary as much between stretches"
+        )
         why = larger if judged.why == USUAL and LARGER < most < np.inf else judged.why
         return f"Nothing {changed} that these records show: {why}."
     if judged.word == "insufficient":
@@ -224,7 +226,7 @@ def _reason(model: Model, judged: Judged, reference: bool, error: Sequence[Outpu
         if NO_SITE in judged.why:
             return f"Something {differs}, {judged.why}. Nearest at a site: {near}."
         if reference and most <= FAR_ABOVE:
-            larger = f"up to {most:.2g} times those of the reference"
+            larger = f"up to {rough(most)} times those of the reference"
             size = larger if most > JUST_ABOVE else "no larger than those of the reference, but unlike them"
             first = f"Errors are {size}, and the records do not say why"
             return f"{first}: {judged.why}. What wanders in the process may do that. Nearest: {near}."

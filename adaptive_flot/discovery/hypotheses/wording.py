@@ -8,7 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.families import FOREVER, Hypothesis
 from adaptive_flot.discovery.record.slip_jump import PLAY
-from adaptive_flot.discovery.results.words import in_seconds, short
+from adaptive_flot.discovery.results.words import in_seconds, rough, short
 from adaptive_flot.greybox.effects import Effect
 from adaptive_flot.greybox.model import Model
 from adaptive_flot.greybox.quantities import ARBITRARY_ZERO
@@ -16,6 +16,8 @@ from adaptive_flot.greybox.quantities import ARBITRARY_ZERO
 MOST_TIMES = 6
 """Times that a sentence lists at most."""
 NOTHING = "next to nothing"
+LEAST_SPAN = 5e-3
+"""An error of a span that is told as a percentage above zero."""
 PROPORTIONAL = 0.05
 """A sensor's error in the middle of its range is its share of the value, where it is so close to that."""
 WITHOUT_SIZE = {
@@ -100,11 +102,10 @@ def words_of(model: Model, h: Hypothesis, value: Callable[[str], float]) -> str:
         middle = h.effect.settings["middle"]
         if site.unit not in ARBITRARY_ZERO and _is_proportional(values["offset"], values["slope"], middle):
             much = "much" if values["slope"] > 0 else "little"
-            return f"{name} shows {abs(100 * values['slope']):.2g} % too {much}"
-        return (
-            f"{name} is wrongly calibrated: {values['offset']:+.3g}{unit} in the middle of its range, "
-            f"and a span {_factor(float(np.log(max(1 + values['slope'], 1e-9))))}"
-        )
+            return f"{name} shows {rough(abs(100 * values['slope']))} % too {much}"
+        span = max(1 + values["slope"], 1e-9)
+        rest = f"and a span {_factor(float(np.log(span)))}" if abs(span - 1) >= LEAST_SPAN else "and its span is right"
+        return f"{name} is wrongly calibrated: {values['offset']:+.3g}{unit} in the middle of its range, {rest}"
     if h.kind == "sign":
         return f"{name} does not see the sign: it shows the absolute value ({100 * first:.0f} % of the way)"
     if h.kind == "lag":
@@ -147,7 +148,7 @@ def _factor(log: float) -> str:
         return NOTHING
     if 0.5 < factor < 2.0:
         return f"{abs(100 * (factor - 1)):.0f} % {'larger' if factor > 1 else 'smaller'}"
-    return f"{factor:.2g} times as large"
+    return f"{rough(factor)} times as large"
 
 
 def _compared(log: float, here: str, there: str) -> str:
@@ -160,7 +161,7 @@ def _compared(log: float, here: str, there: str) -> str:
 
 def _swings(size: float, period: float, mode: str, unit: str) -> str:
     """How far it goes up and down, and how often: `swings by 0.4 K up and down every 900 s`."""
-    swing = f"{short(size)}{unit}" if mode == "offset" else f"{100 * size:.2g} %"
+    swing = f"{short(size)}{unit}" if mode == "offset" else f"{rough(100 * size)} %"
     return f"swings by {swing} up and down every {in_seconds(period)} s"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adaptive_flot.discovery.results.words import short
+from adaptive_flot.discovery.results.words import rough, short
 
 FALLS_BY = 0.5
 """A value that may fall by more than this share without being seen is told by itself."""
@@ -51,7 +51,7 @@ class LeastShown:
         """The size with its unit; that not even half shows, or nothing."""
         if self.hidden:
             return "not by half" if self.by_factor else "nothing"
-        return f"{100 * self.size:.2g} %" if self.by_factor else f"{short(self.size)} {self.unit}".rstrip(" -")
+        return f"{rough(100 * self.size)} %" if self.by_factor else f"{short(self.size)} {self.unit}".rstrip(" -")
 
     def __str__(self) -> str:
         return f"{self.site.replace('_', ' ')} {self.size_text}"

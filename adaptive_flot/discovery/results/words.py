@@ -31,5 +31,17 @@ def in_seconds(period: float) -> str:
 
 def short(value: float) -> str:
     """A number as it is read: three digits, and no power of ten below a million (`1140`, not `1.14e+03`)."""
-    digits = f"{value:.3g}"
-    return f"{float(digits):.0f}" if 1e3 <= abs(float(digits)) < 1e6 else digits
+    return _plain(f"{value:.3g}")
+
+
+def rough(value: float) -> str:
+    """The same with two digits.
+
+    >>> rough(168.0), rough(1.04), rough(2.3e7)
+    ('170', '1', '2.3e+07')
+    """
+    return _plain(f"{value:.2g}")
+
+
+def _plain(digits: str) -> str:
+    return f"{float(digits):.0f}" if "e+" in digits and abs(float(digits)) < 1e6 else digits

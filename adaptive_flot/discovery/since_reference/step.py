@@ -26,7 +26,7 @@ from adaptive_flot.discovery.hypotheses.telling import ABOVE_USUAL, FAR_ABOVE
 from adaptive_flot.discovery.hypotheses.wording import words_of
 from adaptive_flot.discovery.innovations.events.at_times import switch_at
 from adaptive_flot.discovery.innovations.verdicts.event import with_hypotheses
-from adaptive_flot.discovery.results.words import LARGEST_CLASS, NO_SITE
+from adaptive_flot.discovery.results.words import LARGEST_CLASS, NO_SITE, rough
 from adaptive_flot.greybox.model import FloatArray, Model
 from adaptive_flot.greybox.scope import Site
 from adaptive_flot.parallel import parallel_map
@@ -93,7 +93,7 @@ def with_step(compared: Comparison, processes: int, ends: float) -> Comparison:
             return told
     said = "; or ".join(_at_site(own, s) for s in (best, *elsewhere))
     also = f"; or as if {words}" if words else ""
-    left = f"It leaves {best.worst:.2g} times the usual errors"
+    left = f"It leaves {rough(best.worst)} times the usual errors"
     note = f"One step in time comes near, and is not told: {said}{also}. {left}."
     return replace(compared, verdict=replace(verdict, notes=(*verdict.notes, note)))
 

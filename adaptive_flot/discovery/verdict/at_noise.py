@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from adaptive_flot.discovery.record.robust import AT_NOISE, memory, without_memory
 from adaptive_flot.discovery.results import Judgement, State
+from adaptive_flot.discovery.results.words import rough
 
 MOST_MEMORY = 0.3
 """Correlation of neighbouring errors above which they are no noise from row to row.
@@ -40,7 +41,10 @@ def none_at_noise(state: State) -> State:
     if judgement.best is not None:
         best = " with ".join(f"{site} by {driver}" for site, driver in judgement.best.names).replace("_", " ")
         share = 100 * max(max(1 - c.after / c.before for c in state.error if c.before > 0), 0.0)
-        notes = (*notes, f"of what was tried, {best} explains most: an error is {share:.2g} % smaller with it, at most")
+        notes = (
+            *notes,
+            f"of what was tried, {best} explains most: an error is {rough(share)} % smaller with it, at most",
+        )
     return replace(
         state,
         judgement=Judgement("none", None, (), judgement.rivals, judgement.margin),

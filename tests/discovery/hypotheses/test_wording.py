@@ -82,6 +82,7 @@ def test_one_interval_is_not_said_to_be_switched(begins: tuple[float, ...], said
             -0.3,
             "gauge is wrongly calibrated: -3 K in the middle of its range, and a span 30 % smaller",
         ),
+        ("K", 3.0, 0.004, "gauge is wrongly calibrated: +3 K in the middle of its range, and its span is right"),
     ],
 )
 def test_a_gauge_that_errs_by_one_share_is_told_so(unit: str, offset: float, slope: float, said: str) -> None:

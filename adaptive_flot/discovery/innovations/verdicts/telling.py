@@ -37,7 +37,7 @@ from adaptive_flot.discovery.innovations.verdicts.rivals import (
 from adaptive_flot.discovery.innovations.verdicts.stretches import errors_over_folds, errors_over_stretches, is_on
 from adaptive_flot.discovery.record.problem import Problem
 from adaptive_flot.discovery.results import Alternative, Judgement, OutputChange, State, Word
-from adaptive_flot.discovery.results.words import NO_SITE, TELLING, WITH_A_NAME
+from adaptive_flot.discovery.results.words import NO_SITE, TELLING, WITH_A_NAME, rough
 from adaptive_flot.discovery.verdict.conclude import report_errors
 from adaptive_flot.discovery.verdict.large_drift import unexpected_drift
 from adaptive_flot.discovery.verdict.report_veto import contradiction, noise_from_row_to_row
@@ -146,7 +146,7 @@ def _with_hint(state: State, search: Search, told: Told) -> State:
 def _times_noise(state: State) -> str:
     """How far errors on the report rows are above the noise from row to row, in words."""
     most = max((c.after / c.noise for c in state.error if c.noise > 0), default=0.0)
-    return f"the error is up to {most:.2g} times the noise from row to row" if most > 1 else "little is left"
+    return f"the error is up to {rough(most)} times the noise from row to row" if most >= 1.05 else "little is left"
 
 
 def _knows(told: Told, judgement: Judgement) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from adaptive_flot.discovery.hypotheses.wording import clock, last_digit, sticks
 from adaptive_flot.discovery.results import Alternative, NamedEffect
-from adaptive_flot.discovery.results.words import short
+from adaptive_flot.discovery.results.words import rough, short
 from adaptive_flot.discovery.verdict.words.curve import EffectCurve
 from adaptive_flot.greybox.effects import LATE, Effect
 from adaptive_flot.greybox.forms.form import CoefficientRole, number
@@ -191,7 +191,7 @@ def _in_time(site: Site, curve: EffectCurve) -> str:
 def _moved(site: Site, size: str, *, rises: bool, factor: float | None) -> str:
     """What has happened: `fell by 20 %`, `rose to 2.8 times what it was`; `factor` is None of an offset."""
     if factor is not None and factor > LARGE and site.role != "sensor":
-        return f"rose to {factor:.2g} times what it was"
+        return f"rose to {rough(factor)} times what it was"
     if site.role == "sensor":
         return f"came to show {size} {'more' if rises else 'less'}"
     return f"{'rose' if rises else 'fell'} by {size}"
@@ -259,7 +259,7 @@ def _is_factor(site: Site, effect: Effect) -> bool:
 def _times(factor: float) -> str:
     """A factor with the word that compares: `20 % less than`, `2.8 times as much as`."""
     if factor > LARGE:
-        return f"{factor:.2g} times as much as"
+        return f"{rough(factor)} times as much as"
     return f"{_percent(factor)} {'more' if factor > 1 else 'less'} than"
 
 
