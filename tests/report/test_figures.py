@@ -6,9 +6,10 @@ import matplotlib
 import numpy as np
 import pytest
 
-from adaptive_flot.charts.plotdata import Panel, Role, Trace
+from adaptive_flot.charts.plotdata import Chart, Panel, Role, Trace
 from adaptive_flot.report.kit import distributions, figures, style
 from adaptive_flot.report.kit.album import Album
+from adaptive_flot.report.kit.heat import HeatMap
 from adaptive_flot.report.kit.plotdata import Residuals, Spread
 from adaptive_flot.report.kit.residuals import autocorrelation, residual_pictures
 from adaptive_flot.runner.results.whiteness import ljung_box_p
@@ -40,6 +41,18 @@ def test_zoom_follows_the_estimates_not_the_constant() -> None:
     figure = figures.time_figure([Panel("error", "-", traces, zoom=True)])
     low, high = figure.axes[0].get_ylim()
     assert -1.0 < low < 0.1 < high < 1.0
+
+
+def test_each_chart_has_its_own_picture_for_readers_without_scripts() -> None:
+    """They are drawn last, by several processes: each must come back to its place, as it is drawn alone."""
+    charts = [Chart((Panel(name, "-", (Trace("a", TIME, k * TIME, Role.ESTIMATE),)),)) for k, name in enumerate("pqr")]
+    album = Album()
+    album.heat(HeatMap("", ("a",), ()), "a map between them has none", "")
+    pictures = [album.chart(chart, f"chart {k}", "") for k, chart in enumerate(charts)]
+    stills = album.stills()
+    assert list(stills) == [album.pictures.index(p) for p in pictures] == [1, 2, 3]
+    assert list(stills.values()) == [style.data_uri(figures.chart_figure(c), small=True) for c in charts]
+    assert len(set(stills.values())) == 3
 
 
 @pytest.mark.parametrize("values", [np.full(400, np.nan), np.zeros(400), np.r_[np.full(398, np.nan), 1.0, 2.0]])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from adaptive_flot.charts.block import blocks
 from adaptive_flot.charts.plotdata import Chart
+from adaptive_flot.greybox.stepping.rows import worker_threads
+from adaptive_flot.parallel import parallel_map
 from adaptive_flot.report.kit.parts import Picture
 
 if TYPE_CHECKING:  # what prints tables has no need of Matplotlib, which takes a while to load
@@ -26,18 +29,15 @@ class Album:
         """Embed a figure."""
         from adaptive_flot.report.kit.style import data_uri
 
-        return self._kept(Picture(data_uri(figure), caption, alt))
+        return self._kept(Picture(caption, alt, data_uri(figure)))
 
     def heat(self, heat: HeatMap, caption: str, alt: str) -> Picture:
         """Embed a map."""
-        return self._kept(Picture("", caption, alt, heat=heat))
+        return self._kept(Picture(caption, alt, heat=heat))
 
     def chart(self, chart: Chart, caption: str, alt: str) -> Picture:
         """Embed a chart, and a picture of it for readers without scripts."""
-        from adaptive_flot.report.kit.figures import chart_figure
-        from adaptive_flot.report.kit.style import data_uri
-
-        return self._kept(Picture(data_uri(chart_figure(chart), small=True), caption, alt, chart))
+        return self._kept(Picture(caption, alt, chart=chart))
 
     def number(self, picture: Picture) -> int:
         """Return the number of a picture: the next one where it has none."""
@@ -47,9 +47,21 @@ class Album:
 
     def blocks(self) -> dict[int, str]:
         """JSON of each chart by the place of its picture."""
-        charts = [(i, p.chart) for i, p in enumerate(self.pictures) if p.chart is not None]
-        made = blocks([chart for _, chart in charts])
-        return {i: text for (i, _), text in zip(charts, made, strict=True)}
+        return self._of_charts(blocks)
+
+    def stills(self) -> dict[int, str]:
+        """Picture of each chart, as a data URI, by its place: for readers without scripts. On all cores."""
+        from adaptive_flot.report.kit.figures import chart_figure
+        from adaptive_flot.report.kit.style import data_uri
+
+        def still(chart: Chart) -> str:
+            return data_uri(chart_figure(chart), small=True)
+
+        return self._of_charts(lambda charts: parallel_map(still, charts, worker_threads()))
+
+    def _of_charts(self, make: Callable[[list[Chart]], list[str]]) -> dict[int, str]:
+        charts = {i: p.chart for i, p in enumerate(self.pictures) if p.chart is not None}
+        return dict(zip(charts, make(list(charts.values())), strict=True))
 
     def _kept(self, picture: Picture) -> Picture:
         self.pictures.append(picture)

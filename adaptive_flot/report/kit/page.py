@@ -63,6 +63,7 @@ def render(page: Page, album: Album) -> str:
             page=page,
             album=album,
             blocks=album.blocks(),
+            stills=album.stills(),
             scripts=scripts,
             policy="; ".join(_policy(scripts)),
             styles=f"{assets.styles()}\n{_own('page.css')}",

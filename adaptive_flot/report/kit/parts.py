@@ -54,15 +54,15 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure of the page: data URI, caption, what it shows for readers who do not see it, and chart or map if any.
+    """A figure of the page: caption, what it shows for readers who do not see it, and one of data URI, chart and map.
 
-    The data URI of a chart is for readers without scripts; a map has none.
+    What a chart shows to readers without scripts is drawn with the page: see `Album.stills`.
     """
 
     kind: ClassVar[str] = "picture"
-    uri: str
     caption: str
     alt: str
+    uri: str = ""
     chart: Chart | None = None
     heat: HeatMap | None = None
 
