@@ -14,7 +14,9 @@ import adaptive_flot as af
 from adaptive_flot.discovery.results import Word
 from adaptive_flot.processes.flotation.economics import Prices
 from adaptive_flot.runner.scenario.keys import EconomicsPart
+from benchmarks.hidden_effects.score.summary import rates
 from benchmarks.plant_like.score import TOLD
+from benchmarks.real_records.asked import SIMULATED
 from tests.discovery.heated import Truth, tank_record
 from tests.docs.pages import DOCS, ROOT, fences
 
@@ -70,6 +72,26 @@ def test_the_sum_over_fresh_sets_of_other_processes_is_that_of_the_published_ver
     assert f"{wrong} of {len(found)} names were wrong" in (ROOT / "README.md").read_text(encoding="utf-8")
     words = (DOCS / "discovery" / "verdicts.md").read_text(encoding="utf-8")
     assert f"{wrong} names of {len(found)} records were wrong" in words
+
+
+@pytest.mark.parametrize(
+    ("row", "what"),
+    [
+        ("| Discovery, 160 hidden effects of ordinary size |", "truth named or in a class of 3, single ordinary"),
+        ("| ... 210 records with an effect |", "wrong name, of records with an effect"),
+        ("| ... 60 records with none, or a drift |", "false alarm, of controls (none, drift)"),
+        ("| ... 30 pairs of effects |", "pairs: both named, or in a class of three names each"),
+    ],
+)
+def test_the_figures_of_the_readme_on_300_records_are_those_of_the_last_whole_run(row: str, what: str) -> None:
+    """In percent, with its interval, to the digits that are printed."""
+    rate = next(r for r in rates(pd.read_csv(SIMULATED)) if r.what == what)
+    (line,) = (each for each in (ROOT / "README.md").read_text(encoding="utf-8").splitlines() if each.startswith(row))
+    printed = re.search(r"([\d.]+) % \[([\d.]+), ([\d.]+)\]", line)
+    assert printed is not None, line
+    for text, exact in zip(printed.groups(), (rate.share, rate.low, rate.high), strict=True):
+        digits = len(text.partition(".")[2])
+        assert text == f"{100 * exact:.{digits}f}", line
 
 
 @pytest.mark.slow

@@ -31,6 +31,8 @@ FEWEST_REPEATED, REPEATED = 30, 0.1
 """An output that shows one value for so many rows, and for such a share of them, may have stopped."""
 SEEN, WIDER, BEYOND = (0.002, 0.998), 0.05, 0.05
 """Quantiles that a reference covers, wider by a share of their distance; and the share of rows beyond that counts."""
+AT_AN_END = 1e-3
+"""Share of its value by which a constant may lie off the end of its range, and is still at it."""
 MOVED = 1.0
 """A constant is said to have moved from so many of its standard deviations on."""
 JUDGED_ON = "free run, fresh stretches"
@@ -98,7 +100,7 @@ def verdict_of(
             *what_is_left(more, reference),
             *(_moved(calibration, after) if reference else ()),
             *(_beyond(calibration, rows, null) if reference and word == "abstain" else ()),
-            *(_by_a_factor(calibration, model, judged) if reference and told else ()),
+            *(_open_sizes(calibration, model, judged) if reference and told else ()),
         ),
         seconds=seconds,
     )
@@ -163,22 +165,33 @@ def _beyond(calibration: Calibration, rows: Rows, null: Tested) -> tuple[str, ..
     return (f"The model was never compared with the plant there: {'; '.join(notes)}.",)
 
 
-def _by_a_factor(calibration: Calibration, model: Model, judged: Judged) -> tuple[str, ...]:
-    """Constants that the reference tells up to a factor only, where a size that is told is in the unit of a part.
+def _open_sizes(calibration: Calibration, model: Model, judged: Judged) -> tuple[str, ...]:
+    """Why a size that is told in the unit of a part may be off; a sensor's size is in the unit of what is measured.
 
-    A sensor's size is in the unit of what is measured.
+    The reference tells some constants up to a factor only. Or one has ended where its range does, and holds those that
+    act with it.
     """
     label = {p.name: p.label for p in model.parameters}
     loose = [label[name] for name in calibration.constants.up_to_a_factor()]
     sensors = {site.name for site in model.sites if site.role == "sensor"}
     modes = {site.name: site.mode for site in model.sites}
     told = (t.hypothesis for t in judged.parts if t.hypothesis is not None)
-    if not loose or not any(h.site not in sensors and h.has_size_in_unit(modes[h.site]) for h in told):
+    if not any(h.site not in sensors and h.has_size_in_unit(modes[h.site]) for h in told):
         return ()
-    return (
-        f"The reference tells these constants only up to a factor: {', '.join(loose)}. Sizes in the unit of a part may "
-        "be off by as much; shares and times are not.",
-    )
+    notes = []
+    if loose:
+        notes.append(
+            f"The reference tells these constants only up to a factor: {', '.join(loose)}. Sizes in the unit of a part "
+            "may be off by as much; shares and times are not."
+        )
+    for p in (model.parameters[i] for i in model.indices("parameters", calibration.constants.names)):
+        for end, which in ((p.lower, "lower"), (p.upper, "upper")):
+            if np.isfinite(end) and abs(p.value - end) <= AT_AN_END * abs(p.value):
+                notes.append(
+                    f"With the reference {p.label} is fitted at the {which} end of its range, {end:g}. Sizes in the unit "
+                    "of a part may be off; widen the range, or hold a constant fixed that acts with it."
+                )
+    return tuple(notes)
 
 
 def what_is_left(error: Sequence[OutputChange], reference: bool) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import pytest
 from adaptive_flot.discovery.hypotheses import calibration
 from adaptive_flot.discovery.hypotheses.procedure import OTHER_CONSTANTS, compare
 from adaptive_flot.greybox import Effect, Model, Parameter, Scope
+from tests.discovery.hypotheses import tank as heated
 from tests.discovery.hypotheses.test_constants import AGED, record, tank
 
 
@@ -61,3 +62,18 @@ def test_a_size_in_the_unit_of_a_part_says_that_its_factor_is_open() -> None:
     in_shares = compare(tank(), [record(11, AGED)], [record(1)])
     assert [t.hypothesis and t.hypothesis.kind for t in in_shares.judged.parts] == ["gain"]
     assert not any("only up to a factor" in note for note in in_shares.verdict.notes)
+
+
+def test_a_size_in_the_unit_of_a_part_says_that_a_constant_has_ended_where_its_range_does() -> None:
+    """The heater's efficiency is 0.8: where it may not be above 0.7, watts at the heater are too few."""
+    model = heated.tank()
+    efficiency, loss = model.parameters
+    limited = Effect("heater", "saturation", "saturation", {"amplitude": 1.0, "limit": 1000.0}, {"width": 1.0})
+    new, old = heated.record("new", 1, limited), heated.record("old", 2)
+    said = []
+    for upper in (0.7, 1.5):
+        efficiency = replace(efficiency, value=0.65, upper=upper)
+        found = compare(replace(model, parameters=(efficiency, loss)), [new], [old]).verdict
+        assert found.word == "named" and "does not go above" in found.reason, found.reason
+        said.append([note for note in found.notes if "efficiency is fitted at the upper end of its range, 0.7" in note])
+    assert [len(notes) for notes in said] == [1, 0]
