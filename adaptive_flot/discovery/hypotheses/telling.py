@@ -188,8 +188,8 @@ def _open_sizes(calibration: Calibration, model: Model, judged: Judged) -> tuple
         for end, which in ((p.lower, "lower"), (p.upper, "upper")):
             if np.isfinite(end) and abs(p.value - end) <= AT_AN_END * abs(p.value):
                 notes.append(
-                    f"With the reference {p.label} is fitted at the {which} end of its range, {end:g}. Sizes in the unit "
-                    "of a part may be off; widen the range, or hold a constant fixed that acts with it."
+                    f"With the reference {p.label} is fitted at the {which} end of its range, {end:g}. Sizes in the "
+                    "unit of a part may be off; widen the range, or hold a constant fixed that acts with it."
                 )
     return tuple(notes)
 
