@@ -20,6 +20,8 @@ from benchmarks.plant_like.score import figures
 
 BENCHMARKS = Path(__file__).parents[1]
 SIMULATED = BENCHMARKS / "hidden_effects" / "published" / "discover_2f630032.csv"
+PAIRS = SIMULATED.with_name("discover_62d3a7d0_pairs.csv")
+"""The pairs of the 300 alone, by a later commit."""
 PLANT_LIKE = BENCHMARKS / "plant_like" / "published" / "discover_23226a9_seed_2083.csv"
 """The last tables of all records that one commit has judged, `discover_COMMIT[_seed_SEED].csv`."""
 OF_THE_300 = {
@@ -110,11 +112,14 @@ def of_simulated_records() -> list[Asked]:
         A published table is missing.
     """
     asked = []
-    for rate in rates(pd.read_csv(SIMULATED)):
-        if rate.what in OF_THE_300:
+    for file, prefix in ((SIMULATED, ""), (PAIRS, "the same pairs again: ")):
+        for rate in (r for r in rates(pd.read_csv(file)) if r.what in OF_THE_300):
+            if prefix and not rate.what.startswith("pairs"):
+                continue
             bound = float(rate.asked.split()[1]) / 100
             met = rate.share <= bound if rate.asked.startswith("<") else rate.share >= bound
-            asked.append(Asked(OF_THE_300[rate.what], rate.asked, str(rate), met, _by(SIMULATED)))
+            figure = prefix + OF_THE_300[rate.what].removeprefix("pairs of the 300: " if prefix else "")
+            asked.append(Asked(figure, rate.asked, str(rate), met, _by(file)))
     table = pd.read_csv(PLANT_LIKE, keep_default_na=False)
     for row in figures(table).itertuples():
         share = float(str(row.share).split()[0])

@@ -6,15 +6,24 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from adaptive_flot.discovery.results import Verdict, Word
 from adaptive_flot.greybox import Dataset, Model
 from adaptive_flot.greybox.stepping.record import RecordSimulator
+from benchmarks.hidden_effects.score.summary import rates
 from benchmarks.real_records import __main__ as judging
 from benchmarks.real_records import air_handling_unit, electric_drives, heat_exchanger, lamp, unchanged
 from benchmarks.real_records.__main__ import worth_of
-from benchmarks.real_records.asked import PLANT_LIKE, SIMULATED, Judged, of_measured_records, of_simulated_records
+from benchmarks.real_records.asked import (
+    PAIRS,
+    PLANT_LIKE,
+    SIMULATED,
+    Judged,
+    of_measured_records,
+    of_simulated_records,
+)
 
 ROOT = Path(__file__).parents[2]
 INPUTS = {
@@ -90,12 +99,17 @@ def test_published_figures_are_those_of_the_last_table() -> None:
     The table that comes first in the list of tables is the last one. `make bench-measured` told an earlier one.
     """
     figures = {a.figure: a for a in of_simulated_records()}
-    assert len(figures) == 7
+    assert len(figures) == 9
     listed = (SIMULATED.parent / "README.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| `(discover_\w+\.csv)` \| 0 to 299 \|", listed, re.MULTILINE)[0] == SIMULATED.name
     page = (ROOT / "docs" / "results" / "plant_like.md").read_text(encoding="utf-8")
     commit, seed = re.findall(r"^\| \*\*(\w+), (\d+)\*\* \|", page, re.MULTILINE)[0]
     assert PLANT_LIKE.name == f"discover_{commit}_seed_{seed}.csv"
+    again = rates(pd.read_csv(PAIRS))
+    assert (pd.read_csv(PAIRS).category == "pair").sum() == 30
+    for what, figure in (("both named, or", "both told"), ("one effect told", "what is certain")):
+        (rate,) = (r for r in again if r.what.startswith(f"pairs: {what}"))
+        assert figures[f"the same pairs again: {figure}"].measured == str(rate)
     assert figures["the 300: told"].by == f"{SIMULATED.stem.split('_')[1]}, published"
     assert figures["plant-like: told"].by == f"{commit}, published"
 
