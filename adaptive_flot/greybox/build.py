@@ -30,8 +30,6 @@ class Built:
     decay: ca.Function
     sites: tuple[Site, ...]
     site_values: ca.Function
-    asked: frozenset[str]
-    """Parameters that the equations ask for."""
 
 
 def _collect(what: str, declared: Sequence[str], given: Mapping[str, ca.SX], model: str) -> ca.SX:
@@ -90,7 +88,7 @@ def build(model: str, names: Names, equations: Callable[[Scope], None], effects:
     decay = ca.Function("decay", [t, x, u, p, z], [ca.densify(rates_of_decay)], options)
     values = ca.vertcat(*scope.site_values.values()) if scope.site_values else ca.SX(0, 1)
     site_values = ca.Function("site_values", [t, x, u, p, z], [ca.densify(values)], options)
-    return Built(dae, ode, decay, tuple(scope.sites.values()), site_values, frozenset(scope.asked))
+    return Built(dae, ode, decay, tuple(scope.sites.values()), site_values)
 
 
 def tangent(built: Built, seeds: ca.DM) -> ca.Function:

@@ -280,11 +280,6 @@ class Model(Checks, Described):
         return self._built.sites
 
     @property
-    def asked(self) -> frozenset[str]:
-        """Names of the parameters that the equations ask for."""
-        return self._built.asked
-
-    @property
     def site_values(self) -> ca.Function:
         """`(t, x, u, p, z)` to the value at each site (sites,) before any effect; the first of several components."""
         return self._built.site_values

@@ -47,11 +47,6 @@ class Checks(Lookup):
         """Sites that the equations pass through."""
         raise NotImplementedError
 
-    @property
-    def asked(self) -> frozenset[str]:
-        """Names of the parameters that the equations ask for."""
-        raise NotImplementedError
-
     def check_groups(self) -> None:
         """Check that fields which hold several things are tuples of these.
 
@@ -75,7 +70,7 @@ class Checks(Lookup):
         ------
         ModelError
             A name, role or mode that does not exist; a scale or a step that is not above zero; a value out of range; a
-        range whose ends are exchanged; a parameter that is estimated and that no equation asks for.
+        range whose ends are exchanged.
         """
         own = (*self.names("inputs"), *self.names("states"), *self.names("signals"))
         drivers, sites = (*own, *STATELESS_DRIVERS, "time"), [site.name for site in self.sites]
@@ -98,11 +93,6 @@ class Checks(Lookup):
                 raise ModelError(
                     f"model '{self.name}': parameter {p.name!r} = {p.value:g} {p.unit} is outside its range "
                     f"[{p.lower:g}, {p.upper:g}]; correct the value or the range"
-                )
-            if p.role == "estimated" and p.name not in self.asked:
-                raise ModelError(
-                    f"model '{self.name}': parameter {p.name!r} is estimated, and no equation asks for it; use "
-                    f"m.parameter({p.name!r}), or leave it out"
                 )
         scaled: tuple[Quantity | Parameter, ...] = (*self.states, *self.inputs, *self.outputs, *self.parameters)
         for item in scaled:

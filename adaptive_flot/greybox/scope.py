@@ -70,7 +70,6 @@ class Scope:
         self.sites: dict[str, Site] = {}
         self.site_values: dict[str, ca.SX] = {}
         self.factors: Mapping[str, float] = {}
-        self.asked: set[str] = set()
         self._seen: dict[str, ca.SX] = {}
 
     def _symbol(self, kind: Kind, name: str) -> ca.SX:
@@ -89,14 +88,11 @@ class Scope:
 
     def parameter(self, name: str) -> ca.SX:
         """Symbol of a parameter."""
-        self.asked.add(name)
         return self._symbol("parameters", name)
 
     def parameter_group(self, prefix: str) -> list[ca.SX]:
         """Symbols of all parameters named `prefix.something`, in the order of the model."""
-        group = {name: s for name, s in self._symbols["parameters"].items() if name.startswith(prefix + ".")}
-        self.asked |= group.keys()
-        return list(group.values())
+        return [s for name, s in self._symbols["parameters"].items() if name.startswith(prefix + ".")]
 
     def algebraic(self, name: str) -> ca.SX:
         """Symbol of an algebraic variable; give its equation with `residual`."""

@@ -10,8 +10,6 @@ import pytest
 from adaptive_flot.errors import ModelError
 from adaptive_flot.greybox import Effect, KnownEffect, Model, Parameter, Quantity, Scope
 
-K = Parameter("k", 1.0, "1/s", "guess", role="estimated")
-
 
 def box(site: tuple[str, str] = ("process", "factor"), role: str = "estimated", **changes: Any) -> Model:
     """One warm box; `site` is role and mode of its only site."""
@@ -50,7 +48,6 @@ def box(site: tuple[str, str] = ("process", "factor"), role: str = "estimated", 
         ({"parameters": (Parameter("k", 1.0, "1/s", "guess", lower=2.0),)}, "outside its range"),
         ({"states": (Quantity("warmth", "K", "", 373.0, 273.0),)}, "'warmth' has lower = 373 above upper = 273"),
         ({"parameters": (Parameter("k", 1.0, "1/s", "guess", lower=2.0, upper=0.0),)}, "exchange them"),
-        ({"parameters": (K, Parameter("unused", 1.0, "-", "", role="estimated"))}, "no equation asks for it"),
         ({"states": Quantity("warmth", "K", "")}, "states is no tuple of Quantity"),
         ({"outputs": ("shown",)}, "outputs is no tuple of Quantity"),
     ],
