@@ -130,14 +130,13 @@ def at_the_end_of_their_range(base: Fit) -> tuple[str, ...]:
     said = []
     for name, value in zip(base.names, map(float, base.values), strict=True):
         q = base.model.parameters[base.model.index("parameters", name)]
-        lower = value <= q.lower
-        if not lower and value < q.upper:
+        end = q.end_at(value)
+        if not end:
             continue
-        advice = "give it a lower end above zero" if lower and q.lower == 0 else "widen the range if it may lie beyond"
+        zero = end == "lower" and q.lower == 0
+        advice = "give it a lower end above zero" if zero else "widen the range if it may lie beyond"
         why = ", so that nothing that it multiplies can change" if value == 0 else ""
-        said.append(
-            f"{q.label} is fitted at the {'lower' if lower else 'upper'} end of its range, {value:g}{why}: {advice}"
-        )
+        said.append(f"{q.label} is fitted at the {end} end of its range, {value:g}{why}: {advice}")
     return tuple(said)
 
 

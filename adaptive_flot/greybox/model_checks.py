@@ -70,7 +70,7 @@ class Checks(Lookup):
         ------
         ModelError
             A name, role or mode that does not exist; a scale or a step that is not above zero; a value out of range; a
-        range whose ends are exchanged.
+            range whose ends are exchanged.
         """
         own = (*self.names("inputs"), *self.names("states"), *self.names("signals"))
         drivers, sites = (*own, *STATELESS_DRIVERS, "time"), [site.name for site in self.sites]

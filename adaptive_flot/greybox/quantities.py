@@ -113,6 +113,16 @@ class Parameter:
     disturbance: bool = False
     drifts: bool = False
 
+    def end_at(self, value: float, share: float = 0.0) -> Literal["lower", "upper", ""]:
+        """Which end of its range a value is at or beyond, or within a share of its size of; empty where at none.
+
+        >>> k = Parameter("k", 2.0, "1/s", "guess", lower=1.0, upper=4.0)
+        >>> k.end_at(1.0), k.end_at(3.999), k.end_at(3.999, share=1e-3)
+        ('lower', '', 'upper')
+        """
+        near = share * abs(value)
+        return "lower" if value <= self.lower + near else "upper" if value >= self.upper - near else ""
+
     def with_value(self, value: float) -> Parameter:
         """The same parameter with another value, in its unit; one a rounding error beyond its range is at the end.
 

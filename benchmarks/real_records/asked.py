@@ -15,7 +15,7 @@ import pandas as pd
 from rich.table import Table
 
 from adaptive_flot.discovery.results import Verdict
-from benchmarks.hidden_effects.score.summary import rates
+from benchmarks.hidden_effects.score.summary import Rate, rates
 from benchmarks.plant_like.score import figures
 
 BENCHMARKS = Path(__file__).parents[1]
@@ -111,15 +111,9 @@ def of_simulated_records() -> list[Asked]:
     FileNotFoundError
         A published table is missing.
     """
-    asked = []
-    for file, prefix in ((SIMULATED, ""), (PAIRS, "the same pairs again: ")):
-        for rate in (r for r in rates(pd.read_csv(file)) if r.what in OF_THE_300):
-            if prefix and not rate.what.startswith("pairs"):
-                continue
-            bound = float(rate.asked.split()[1]) / 100
-            met = rate.share <= bound if rate.asked.startswith("<") else rate.share >= bound
-            figure = prefix + OF_THE_300[rate.what].removeprefix("pairs of the 300: " if prefix else "")
-            asked.append(Asked(figure, rate.asked, str(rate), met, _by(file)))
+    asked = [_asked(OF_THE_300[r.what], r, SIMULATED) for r in rates(pd.read_csv(SIMULATED)) if r.what in OF_THE_300]
+    again = {r.what: r for r in rates(pd.read_csv(PAIRS))}
+    asked += [_asked(f"{name}, again", again[what], PAIRS) for what, name in OF_THE_300.items() if "pairs" in what]
     table = pd.read_csv(PLANT_LIKE, keep_default_na=False)
     for row in figures(table).itertuples():
         share = float(str(row.share).split()[0])
@@ -139,6 +133,12 @@ def table_of(asked: Sequence[Asked]) -> Table:
     for a in asked:
         table.add_row(a.figure, a.target, a.measured, "yes" if a.met else "no", a.by)
     return table
+
+
+def _asked(figure: str, rate: Rate, table: Path) -> Asked:
+    bound = float(rate.asked.split()[1]) / 100
+    met = rate.share <= bound if rate.asked.startswith("<") else rate.share >= bound
+    return Asked(figure, rate.asked, str(rate), met, _by(table))
 
 
 def _by(table: Path) -> str:

@@ -184,7 +184,8 @@ def first_estimate(prior: Prior, coordinates: Coordinates, shape: Layout) -> tup
     """Z (n,) and its covariance (n, n) from a prior; drift rates are zero.
 
     A direction of the coordinates that the prior leaves open beyond their range is taken as known to that range, whose
-    standard deviation is that of a uniform distribution (see `_limited`).
+    standard deviation is that of a uniform distribution (see `_limited`). So is all of a batch fit that failed, whose
+    covariance is NaN.
     """
     nx, q = shape.nx, shape.q
     c = np.clip(coordinates.from_parameters(prior.parameters), coordinates.lower, coordinates.upper)
@@ -195,7 +196,11 @@ def first_estimate(prior: Prior, coordinates: Coordinates, shape: Layout) -> tup
     if joint is None:
         joint = np.zeros((nx + q, nx + q))
         joint[nx:, nx:] = prior.covariance
-    P[: nx + q, : nx + q] = _limited(to_z @ joint @ to_z, (coordinates.upper - coordinates.lower) / np.sqrt(12.0))
+    widest = (coordinates.upper - coordinates.lower) / np.sqrt(12.0)
+    known = to_z @ joint @ to_z
+    if not np.isfinite(known).all():
+        known = np.diag(np.concatenate([np.zeros(nx), np.where(np.isfinite(widest), widest, coordinates.scale) ** 2]))
+    P[: nx + q, : nx + q] = _limited(known, widest)
     return z, P
 
 

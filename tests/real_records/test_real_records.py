@@ -109,7 +109,7 @@ def test_published_figures_are_those_of_the_last_table() -> None:
     assert (pd.read_csv(PAIRS).category == "pair").sum() == 30
     for what, figure in (("both named, or", "both told"), ("one effect told", "what is certain")):
         (rate,) = (r for r in again if r.what.startswith(f"pairs: {what}"))
-        assert figures[f"the same pairs again: {figure}"].measured == str(rate)
+        assert figures[f"pairs of the 300: {figure}, again"].measured == str(rate)
     assert figures["the 300: told"].by == f"{SIMULATED.stem.split('_')[1]}, published"
     assert figures["plant-like: told"].by == f"{commit}, published"
 

@@ -185,12 +185,11 @@ def _open_sizes(calibration: Calibration, model: Model, judged: Judged) -> tuple
             "may be off by as much; shares and times are not."
         )
     for p in (model.parameters[i] for i in model.indices("parameters", calibration.constants.names)):
-        for end, which in ((p.lower, "lower"), (p.upper, "upper")):
-            if np.isfinite(end) and abs(p.value - end) <= AT_AN_END * abs(p.value):
-                notes.append(
-                    f"With the reference {p.label} is fitted at the {which} end of its range, {end:g}. Sizes in the "
-                    "unit of a part may be off; widen the range, or hold a constant fixed that acts with it."
-                )
+        if end := p.end_at(p.value, AT_AN_END):
+            notes.append(
+                f"With the reference {p.label} is fitted at the {end} end of its range, {p.value:g}. Sizes in the unit "
+                "of a part may be off; widen the range, or hold a constant fixed that acts with it."
+            )
     return tuple(notes)
 
 

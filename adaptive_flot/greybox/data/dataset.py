@@ -139,7 +139,7 @@ def read_dataset(path: Source, model: Model, *, required_outputs: Sequence[str] 
             empty = line(table, int(np.flatnonzero(np.isnan(values))[0]))
             raise DataError(f"{file}: parameter {name!r} is empty in line {empty}; give it in every row or in none")
     first = _first_state(table, columns, model, file)
-    notes = (*lost, *others, *_meant(columns, model, taken), *odd)
+    notes = (*lost, *others, *_unmeasured(table, columns, model, taken), *odd)
     return Dataset(file.stem, time, dt, inputs, outputs, parameters, first, notes)
 
 
@@ -191,10 +191,12 @@ def _find(columns: Sequence[str], name: str, column: str, unit: str, file: Path,
     raise DataError(f"{file}: column {column!r} is missing; add it ({meant}){hint}")
 
 
-def _meant(columns: Sequence[str], model: Model, taken: Collection[str]) -> tuple[str, ...]:
-    """A word on each output without a column, where one that nothing uses has nearly its name: a slip of the pen."""
+def _unmeasured(table: pd.DataFrame, columns: Sequence[str], model: Model, taken: Collection[str]) -> tuple[str, ...]:
+    """A word on each output whose column is empty, or that has none where one that nothing uses has nearly its name."""
     said = []
     for q in model.outputs:
+        if q.column in columns and not table[q.column].notna().any():
+            said.append(f"{q.name} is not measured: column {q.column!r} is empty")
         free = [c for c in columns if c not in taken and not c.startswith(q.name)]  # not the truth of a simulation
         close = [] if q.column in columns else get_close_matches(q.column, free, 1, ALIKE)
         said += [f"{q.name} is not measured: there is no column {q.column!r}; {c!r} is not used" for c in close]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 import warnings
 from pathlib import Path
@@ -17,6 +18,8 @@ from adaptive_flot.greybox.data.columns import shown
 MOST_ROWS = 2_000_000
 """Longest table: 23 days, one row a second."""
 OTHER_SEPARATORS = {";": "a semicolon", "\t": "a tab", "|": "a bar"}
+RAGGED = re.compile(r"Expected (?!1 )(\d+) fields in line (\d+), saw (\d+)")
+"""What pandas says of a row that is longer than those before."""
 SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 Source: TypeAlias = Path | str | pd.DataFrame
@@ -94,6 +97,11 @@ def _read(file: Path) -> pd.DataFrame:
         raise DataError(f"{file}: {why}; give CSV or Parquet, or let `adaptive-flot import` read it") from error
     except Exception as error:  # damaged bytes: each of the unpackers and parsers has errors of its own
         said = next(iter(str(error).splitlines()), type(error).__name__)
+        if ragged := RAGGED.search(said):
+            expected, where, seen = ragged.groups()
+            raise DataError(
+                f"{file}: line {where} has {seen} values, where {expected} are expected; correct it"
+            ) from error
         raise DataError(f"{file}: not a readable table ({said}); give CSV or Parquet") from error
 
 

@@ -12,12 +12,16 @@ OTHER_UNITS = {
     "m": {"mm": 1e-3, "cm": 1e-2},
     "m3/s": {"L/min": 1e-3 / 60, "m3/h": 1 / 3600, "L/s": 1e-3},
     "kg": {"t": 1e3, "g": 1e-3},
+    "kg/m3": {"g/m3": 1e-3, "mg/m3": 1e-6},
+    "g/L": {"mg/L": 1e-3},
     "kg/s": {"t/h": 1e3 / 3600, "kg/h": 1 / 3600, "g/s": 1e-3},
     "Pa": {"kPa": 1e3, "bar": 1e5},
+    "bar": {"kPa": 1e-2, "mbar": 1e-3, "Pa": 1e-5},
     "s": {"min": 60.0, "h": 3600.0},
     "V": {"mV": 1e-3},
     "A": {"mA": 1e-3},
     "W": {"kW": 1e3},
+    "kW": {"W": 1e-3, "MW": 1e3},
     "1/s": {"1/min": 1 / 60},
 }
 """Units that plants use instead of a model's, and what one of them is in it."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adaptive_flot.charts.units import amount, exponent, with_std
+from adaptive_flot.contracts import Status
 from adaptive_flot.greybox.model import Quantity
 from adaptive_flot.report.estimate import series
 from adaptive_flot.report.kit.parts import Fact, Table
@@ -46,6 +47,8 @@ def title(result: RecordEstimate) -> str:
 
 def troubles(result: RecordEstimate) -> list[str]:
     """Why the fit is not to be used: parameters that the record does not tell, outputs that no estimator predicts."""
+    if result.batch.status is Status.NOT_FINITE:
+        return [result.batch.identifiability.verdict]
     judged = result.batch.identifiability.parameters
     unknown, bound = ([label for label, _, word in judged if word == w] for w in ("not identified", "on a bound"))
     best = [(q, _best(result, q)[1].free_run) for q in series.measured_outputs(result)]

@@ -41,6 +41,10 @@ class ReplayErrors:
     samples: int
 
 
+EXPLODED = 1e100
+"""An output beyond this, in its unit, is of a run that has left the model."""
+
+
 def replay_table(
     block: str, setup: Setup, record: Dataset, track: Track, free: FloatArray, known: FloatArray | None
 ) -> pd.DataFrame:
@@ -57,12 +61,13 @@ def replay_table(
     track
         Estimates at rows 1, 2, ... (N - 1).
     free
-        Outputs of the free run (N, ny).
+        Outputs of the free run (N, ny). Where a run has exploded, the table has NaN.
     known
         Covariance (q, q) of parameters that are held; None: the estimator's own.
     """
     model = setup.model
-    predicted = np.vstack([free[0], track.prediction])  # row 0 is the initial instant
+    free, follows = (np.where(np.abs(y) < EXPLODED, y, np.nan) for y in (free, track.prediction))
+    predicted = np.vstack([free[0], follows])  # row 0 is the initial instant
     columns: dict[str, object] = {"block": [block] * len(record), "time_s": record.time}
     columns |= {q.column: record.inputs[:, j] for j, q in enumerate(model.inputs)}
     for j, q in enumerate(model.outputs):

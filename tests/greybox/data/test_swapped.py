@@ -85,6 +85,18 @@ def test_another_separator_is_told_by_its_name(tmp_path_of: Callable[[str], str]
         read_dataset(tmp_path_of(text), room(90.0))
 
 
+def test_an_output_whose_column_is_empty_is_said_to_be_not_measured() -> None:
+    empty = record().assign(warmth_degC=np.nan)
+    assert read_dataset(empty, room(90.0)).notes == ("warmth is not measured: column 'warmth_degC' is empty",)
+
+
+def test_a_row_that_is_too_long_is_told_by_its_line(tmp_path_of: Callable[[str], str]) -> None:
+    lines = record().to_csv(index=False).splitlines()
+    lines[20] += ",1,2"
+    with pytest.raises(DataError, match="line 21 has 7 values, where 5 are expected"):
+        read_dataset(tmp_path_of("\n".join(lines)), room(90.0))
+
+
 @pytest.fixture
 def tmp_path_of(tmp_path: object) -> Callable[[str], str]:
     """Write a text to a file, and give its path."""

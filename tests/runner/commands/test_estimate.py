@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adaptive_flot.contracts import full_parameters
+from adaptive_flot.contracts import Status, full_parameters
 from adaptive_flot.contracts.batch import Identifiability
 from adaptive_flot.errors import DataError, ModelError, PluginError
-from adaptive_flot.greybox.model import Model
+from adaptive_flot.greybox.model import Model, Parameter, Quantity, Scope
 from adaptive_flot.greybox.stepping.record import RecordSimulator
 from adaptive_flot.plugins import DEFAULT_ESTIMATOR, OF_A_RECORD
 from adaptive_flot.processes.flotation import make_model as make_cell
@@ -214,6 +214,24 @@ def test_a_fit_that_fails_is_summarised_without_nan(model: Model, plant: PlantRe
     json.dumps(summary, allow_nan=False)
     assert summary["fit"]["status"] == "not_finite"
     assert "can not simulate" in summary["fit"]["identifiability"]["verdict"]
+
+
+def test_a_model_that_explodes_is_told_so_on_a_page() -> None:
+    """Steps that are six times the time constant: free runs end beyond all numbers, and no estimator begins."""
+
+    def equations(m: Scope) -> None:
+        m.derivative("x", m.parameter("rate") * (m.input("u") - m.state("x")))
+        m.output("x", m.state("x"))
+
+    x, u = Quantity("x", "m", ""), Quantity("u", "m", "")
+    rate = Parameter("rate", 0.3, "1/s", "a guess", lower=0.25, upper=0.35, scale=0.01, role="estimated")
+    stiff = Model("stiff", (x,), (u,), (rate,), (x,), equations, max_step_s=20.0)
+    time = 20.0 * np.arange(400.0)
+    table = pd.DataFrame({"time_s": time, "u_m": np.sign(np.sin(time / 300.0)), "x_m": np.sin(time / 300.0)})
+    found = estimate_record(read_blocks(table, stiff, 0.7), stiff)
+    assert found.batch.status is Status.NOT_FINITE
+    assert title(found) == "The model can not simulate the record from its first guess"
+    assert title(found) in estimate_report(found)
 
 
 def test_replays_are_written_by_estimator(result: RecordEstimate, tmp_path: Path) -> None:
