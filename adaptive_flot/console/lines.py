@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 from adaptive_flot.console.tables import print_table
+from adaptive_flot.contracts import Status
 from adaptive_flot.report.compare import tables as compare_tables
 from adaptive_flot.report.compare.findings import findings
 from adaptive_flot.report.kit.parts import Table as Content
@@ -126,7 +127,7 @@ def _fit_cell(values: Sequence[float], published: float | None) -> str:
 
 def print_estimate(result: RecordEstimate) -> None:
     """Print what the record identifies, then the errors of each estimator on the fit and the test block."""
-    from adaptive_flot.report.estimate.answer import title
+    from adaptive_flot.report.estimate.answer import NOTHING_FITTED, title
     from adaptive_flot.report.estimate.innovations import innovations_sentences
 
     rows = [
@@ -145,9 +146,12 @@ def print_estimate(result: RecordEstimate) -> None:
     header = ("estimator", "block", "output", "unit", "one step", "free run", "Ljung-Box p")
     console = standard_output()
     console.print(title(result), style="bold", highlight=False)
-    for estimate in result.batch.estimates:
-        console.print(f"{estimate.label} = {estimate.value:.6g} +- {estimate.std:.2g} {estimate.unit}", highlight=False)
-    console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
+    if result.batch.status is Status.NOT_FINITE:
+        console.print(NOTHING_FITTED, highlight=False)
+    else:
+        for e in result.batch.estimates:
+            console.print(f"{e.label} = {e.value:.6g} +- {e.std:.2g} {e.unit}", highlight=False)
+        console.print(f"Identifiability: {result.batch.identifiability.verdict}", highlight=False)
     if result.batch.agreement:
         console.print(f"Starts: {result.batch.agreement}", highlight=False)
     for note in result.blocks.fit.notes:

@@ -26,6 +26,13 @@ NOT_WHITE = 0.05
 """p value below which innovations are called not white."""
 
 
+NOTHING_FITTED = (
+    "Nothing was fitted. The estimators start from the model's own values. Check the units of the columns, and the "
+    "model's initial_guess and max_step_s."
+)
+"""What to do where the model can not simulate the record."""
+
+
 def title(result: RecordEstimate) -> str:
     """What is wrong with the fit; else who predicts the test block best, or who all do so about equally well."""
     wrong = troubles(result)
@@ -64,7 +71,9 @@ def troubles(result: RecordEstimate) -> list[str]:
 
 
 def sentences(result: RecordEstimate) -> list[str]:
-    """Who predicts best and how well, and in which outputs something is left."""
+    """Who predicts best and how well, and in which outputs something is left; or what to check."""
+    if result.batch.status is Status.NOT_FINITE:
+        return [NOTHING_FITTED]
     outputs = series.measured_outputs(result)
     reached = [f"{spaced(q.name)} {number(_fit(result, q, _best(result, q)[1].free_run), '.1f')} %" for q in outputs]
     parameters = [f"{e.label} = {with_std(e.value, e.std, e.unit)}" for e in result.batch.estimates]
@@ -104,7 +113,9 @@ def per_output(result: RecordEstimate) -> list[str]:
 
 
 def facts(result: RecordEstimate) -> list[Fact]:
-    """Fit of the best free run of each output, beside that of constant parameters; and the parameters."""
+    """Fit of the best free run of each output, beside that of constant parameters; and what was fitted."""
+    if result.batch.status is Status.NOT_FINITE:
+        return []
     found = []
     for q in series.measured_outputs(result)[:MOST_FACTS]:
         best, e = _best(result, q)
